@@ -1,0 +1,60 @@
+"""Errors a user can mend, and the exit codes of every command."""
+
+from pathlib import Path
+
+EXIT_OK = 0
+EXIT_CHECK_FAILED = 1
+EXIT_WRONG_INPUT = 2
+EXIT_HARNESS_ERRORS = 3
+
+
+class MutatorError(Exception):
+    """Something the user can mend: shown in one piece, without a traceback.
+
+    `where` is the file (or option) at fault, `line` its line when known; `got` what was found there
+    and `expected` what would be right; `remedy` what to do.
+    """
+
+    exit_code = EXIT_WRONG_INPUT
+
+    def __init__(
+        self,
+        got: str,
+        *,
+        where: str | Path | None = None,
+        line: int | None = None,
+        expected: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.got = got
+        self.where = str(where) if where is not None else None
+        self.line = line
+        self.expected = expected
+        self.remedy = remedy
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        place = self.where or ""
+        if place and self.line is not None:
+            place += f":{self.line}"
+        parts = [self.got]
+        if self.expected:
+            parts.append(f"expected {self.expected}")
+        if self.remedy:
+            parts.append(self.remedy)
+        text = "; ".join(parts)
+        return f"{place}: {text}" if place else text
+
+    def __reduce__(self) -> tuple:
+        state = dict(where=self.where, line=self.line, expected=self.expected, remedy=self.remedy)
+        return _rebuild, (type(self), self.got, state)
+
+
+def _rebuild(cls: type[MutatorError], got: str, state: dict) -> MutatorError:
+    return cls(got, **state)
+
+
+class CheckFailed(MutatorError):
+    """A check said no: the campaign does not start, or a comparison is beyond its bounds."""
+
+    exit_code = EXIT_CHECK_FAILED

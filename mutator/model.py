@@ -1,0 +1,171 @@
+"""The records that pass from spec to verdict: frozen, comparable, identified by their content."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+from mutator.ids import content_id
+
+Value = int | float | str | bool | None
+
+
+class AnchorKind(StrEnum):
+    """Where, relative to a statement of the target, a snippet goes."""
+
+    AFTER_ASSIGN = "after_assign"
+    BEFORE_ASSIGN = "before_assign"
+    AFTER_CALL = "after_call"
+    BEFORE_CALL = "before_call"
+    BEFORE_RETURN = "before_return"
+    ENTRY = "entry"
+
+
+class Hold(StrEnum):
+    """How long a fault stays active once its trigger fired."""
+
+    WHILE = "while"  # as long as the condition holds, again whenever it holds again
+    FOR = "for"  # for a fixed time after the condition first held
+    TO_END = "to_end"  # from the moment the condition first held to the end of the run
+
+
+class Method(StrEnum):
+    """How the trigger was chosen."""
+
+    GUIDED = "guided"
+    RANDOM = "random"
+
+
+class Status(StrEnum):
+    """Whether the experiment itself worked; never mixed with its outcome."""
+
+    OK = "ok"
+    CRASHED = "crashed"
+    TIMEOUT = "timeout"
+    INVALID_MUTANT = "invalid_mutant"
+    HARNESS_ERROR = "harness_error"
+
+
+class Outcome(StrEnum):
+    """What the fault did, for experiments that ran."""
+
+    NOT_ACTIVATED = "not_activated"
+    MASKED = "masked"
+    SDC = "sdc"
+    HAZARD = "hazard"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Anchor:
+    """A statement in a function: the `nth` (from 1) that assigns to, calls or returns `name`.
+
+    `name` is a dotted name as written in the source (`d_rel`, `self.angle`, `frames.append`), empty for
+    `entry` and for a bare `before_return`. Without `nth` there must be exactly one hit.
+    """
+
+    kind: AnchorKind
+    name: str = ""
+    nth: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultLocation:
+    """A place in the target: a file relative to its root, a qualified function name, an anchor."""
+
+    path: str
+    function: str
+    anchor: Anchor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Injection:
+    """One fault model applied at one location. `params` are sorted (name, value) pairs."""
+
+    location: FaultLocation
+    model: str
+    params: tuple[tuple[str, Value], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trigger:
+    """When a fault is active.
+
+    `condition` is a validated expression over the observed variables (`t, d_rel, v_ego, v_lead, hwt, rs`);
+    it can fire from `armed_after_s` on. A random time is the condition `t >= T` with hold `to_end`.
+    """
+
+    name: str
+    condition: str
+    hold: Hold = Hold.WHILE
+    hold_s: float | None = None
+    armed_after_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault with its value drawn: what is injected, where, and what it aims at.
+
+    `value` and `unit` are as the spec states them (for tables); `injections` carry SI values.
+    `hold` overrides the trigger's when the fault by its nature latches. `changes` are the changes
+    of the scenario that belong to the fault (`no_lead`).
+    """
+
+    spec: str
+    module: str
+    fault_type: str
+    reading: str
+    value: Value
+    unit: str
+    aim: str
+    injections: tuple[Injection, ...]
+    hold: Hold | None = None
+    changes: tuple[str, ...] = ()
+
+    @cached_property
+    def id(self) -> str:
+        return content_id(self)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One run: a fault (or none), in a scenario, under a trigger, with a seed."""
+
+    fault: Fault
+    scenario: str
+    scenario_digest: str
+    method: Method
+    trigger: Trigger
+    seed: int
+
+    @cached_property
+    def id(self) -> str:
+        return content_id(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Activation:
+    """How often an injected statement ran while triggered: simulation times in s, and a count."""
+
+    first: float
+    last: float
+    count: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """All that is kept of one experiment. Times are seconds of simulation; None: did not happen.
+
+    `hazards` and `alerts` are (name, first time) pairs sorted by time; only what came at or after the
+    activation is kept. `max_dev` and `t_manifest` refer to the manifest's compared channels.
+    """
+
+    experiment_id: str
+    status: Status
+    outcome: Outcome | None
+    detail: str  # empty, or why the status is not ok
+    tree: str  # digest of the tree that ran
+    activation: Activation | None
+    t_manifest: float | None
+    max_dev: tuple[tuple[str, float], ...]
+    hazards: tuple[tuple[str, float], ...]
+    alerts: tuple[tuple[str, float], ...]
+    trace_digest: str

@@ -1,0 +1,34 @@
+"""What a controller has to know of the car it drives."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarParams:
+    """Physical data and tuning of one car model. Tables are (breakpoints, values).
+
+    Speeds in m/s, masses in kg, lengths in m, stiffness in N/rad, inertia in kg m^2. Gains of the
+    lateral PI loop are per radian of steering-wheel angle.
+    """
+
+    name: str
+    mass: float
+    wheelbase: float
+    center_to_front: float
+    steer_ratio: float
+    rotational_inertia: float
+    tire_stiffness_front: float
+    tire_stiffness_rear: float
+    steer_kp: tuple[tuple[float, ...], tuple[float, ...]]
+    steer_ki: tuple[tuple[float, ...], tuple[float, ...]]
+    steer_max: float
+    steer_actuator_delay: float  # s
+    steer_rate_cost: float
+    long_kp: tuple[tuple[float, ...], tuple[float, ...]]
+    long_ki: tuple[tuple[float, ...], tuple[float, ...]]
+    gas_max: tuple[tuple[float, ...], tuple[float, ...]]
+    brake_max: tuple[tuple[float, ...], tuple[float, ...]]
+    acceleration_per_output: float  # m/s^2 for an output of 1, divides the feedforward
+    min_enable_speed: float  # m/s; negative: engages at standstill too
+    radar_offset: float  # m from the radar to the bumper reference
+    steer_limit_alert: bool

@@ -1,0 +1,196 @@
+"""What the parts of the controller tell each other.
+
+Every message is a plain slotted record in SI units and radians. Left is positive for lateral
+positions, angles and steering torque. Messages are created anew by their publisher and never
+changed by a receiver; they are not frozen only because a frozen record costs four times as much
+to create, and thousands are created in every run.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class CanFrame(NamedTuple):
+    """One CAN frame. Bus 0 is the car (and takes the commands), bus 1 the radar."""
+
+    address: int
+    data: bytes
+    bus: int
+
+
+@dataclass(slots=True)
+class ButtonEvent:
+    """A cruise button that was pressed or released: 'accel', 'decel', 'cancel' or 'setting'."""
+
+    type: str
+    pressed: bool
+
+
+@dataclass(slots=True)
+class CarState:
+    """The car as its CAN frames describe it, once per control cycle."""
+
+    t: float = 0.0  # s, when the frames were read
+    can_valid: bool = False
+    v_ego: float = 0.0  # m/s, filtered
+    v_ego_raw: float = 0.0  # m/s, as measured
+    a_ego: float = 0.0  # m/s^2, from the speed filter
+    standstill: bool = False
+    gas: float = 0.0  # pedal position, 0..1
+    gas_pressed: bool = False
+    brake_pressed: bool = False
+    steering_angle: float = 0.0  # rad at the steering wheel
+    steering_rate: float = 0.0  # rad/s
+    steering_torque: float = 0.0  # driver's torque, in the sensor's counts
+    steering_pressed: bool = False
+    cruise_available: bool = False  # the main switch is on
+    cruise_enabled: bool = False
+    cruise_speed: float = 0.0  # m/s
+    gear: str = "unknown"
+    left_blinker: bool = False
+    right_blinker: bool = False
+    door_open: bool = False
+    seatbelt_unlatched: bool = False
+    esp_disabled: bool = False
+    steer_error: bool = False
+    steer_not_allowed: bool = False
+    brake_error: bool = False
+    buttons: tuple[ButtonEvent, ...] = ()
+    events: tuple = ()  # of controls.lib.events.Event, raised by the car interface
+
+
+@dataclass(slots=True)
+class RadarPoint:
+    """One radar track as the radar interface read it."""
+
+    track_id: int
+    d_rel: float  # m, from the radar's mounting point
+    y_rel: float  # m, left positive
+    v_rel: float  # m/s, v_lead - v_ego
+
+
+@dataclass(slots=True)
+class RadarData:
+    """One complete radar cycle (20 Hz). `errors` is empty or names 'comm_issue' or 'fault'."""
+
+    t: float
+    points: tuple[RadarPoint, ...] = ()
+    errors: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class PathData:
+    """A line ahead of the car: lateral positions (m, left positive) at 0, 1, ... 49 m."""
+
+    points: tuple[float, ...]
+    prob: float
+    std: float
+
+
+@dataclass(slots=True)
+class LeadVision:
+    """The lead vehicle as the camera sees it; `d_rel` in m from the camera, `std` in m."""
+
+    d_rel: float
+    prob: float
+    std: float
+
+
+@dataclass(slots=True)
+class ModelData:
+    """What the vision model publishes at 20 Hz."""
+
+    t: float
+    path: PathData
+    left_lane: PathData
+    right_lane: PathData
+    lead: LeadVision
+
+
+@dataclass(slots=True)
+class LeadData:
+    """A lead vehicle as radard publishes it; all zero when `status` is False."""
+
+    status: bool = False
+    d_rel: float = 0.0  # m
+    y_rel: float = 0.0  # m
+    v_rel: float = 0.0  # m/s
+    a_rel: float = 0.0  # m/s^2
+    v_lead: float = 0.0  # m/s
+    d_path: float = 0.0  # m, lateral distance to the predicted path
+    v_lat: float = 0.0  # m/s
+    v_lead_k: float = 0.0  # m/s, filtered
+    a_lead_k: float = 0.0  # m/s^2, filtered
+    fcw: bool = False  # fused with the camera often enough to warn of it
+
+
+@dataclass(slots=True)
+class RadarState:
+    """radard's output (20 Hz)."""
+
+    t: float
+    lead_one: LeadData
+    lead_two: LeadData
+    errors: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class Actuators:
+    """Gas and brake in 0..1, steer torque in -1..1 (left positive)."""
+
+    gas: float = 0.0
+    brake: float = 0.0
+    steer: float = 0.0
+
+
+@dataclass(slots=True)
+class CarControl:
+    """The controller's demand, handed to the car interface every cycle."""
+
+    enabled: bool = False
+    actuators: Actuators = field(default_factory=Actuators)
+    cancel_cruise: bool = False
+    set_speed: float = 0.0  # m/s, shown on the dashboard
+    speed_visible: bool = False
+    lanes_visible: bool = False
+    lead_visible: bool = False
+    visual_alert: str = "none"  # none, fcw, steer_required, brake_pressed, wrong_gear, ...
+    audible_alert: str = "none"
+
+
+@dataclass(slots=True)
+class Plan:
+    """The planner's output, refreshed every control cycle."""
+
+    t: float = 0.0
+    v_target: float = 0.0  # m/s
+    a_target: float = 0.0  # m/s^2
+    v_target_future: float = 0.0  # m/s, the plan's end, decides stopping and starting
+    source: str = "cruise"  # cruise, mpc1 or mpc2
+    has_lead: bool = False
+    fcw: bool = False
+    d_poly: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # path to follow, highest power first
+    lane_width: float = 3.7  # m
+    events: tuple = ()
+
+
+@dataclass(slots=True)
+class ControlsState:
+    """What controlsd tells the rest of the system and the log, every cycle."""
+
+    t: float = 0.0
+    state: str = "disabled"  # disabled, pre_enabled, enabled, soft_disabling
+    enabled: bool = False
+    active: bool = False
+    v_ego: float = 0.0  # m/s
+    a_ego: float = 0.0  # m/s^2
+    steering_angle: float = 0.0  # rad, as measured
+    angle_desired: float = 0.0  # rad at the steering wheel
+    v_cruise: float = 0.0  # m/s, the set speed; 255 km/h before the first engagement
+    v_pid: float = 0.0  # m/s
+    long_state: str = "off"  # off, pid, stopping, starting
+    steer_saturated: bool = False
+    alerts: tuple[str, ...] = ()  # names of all alerts active now, highest priority first
+    alert_text1: str = ""
+    alert_text2: str = ""
+    events: tuple[str, ...] = ()  # names of the events of this cycle
