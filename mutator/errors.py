@@ -46,7 +46,12 @@ class MutatorError(Exception):
         return f"{place}: {text}" if place else text
 
     def __reduce__(self) -> tuple:
-        state = dict(where=self.where, line=self.line, expected=self.expected, remedy=self.remedy)
+        state = {
+            "where": self.where,
+            "line": self.line,
+            "expected": self.expected,
+            "remedy": self.remedy,
+        }
         return _rebuild, (type(self), self.got, state)
 
 
