@@ -1,0 +1,20 @@
+"""Piecewise linear tables on plain floats; an array library costs twenty times as much here."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+
+
+def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
+    """Value at `x` of the line through (xp, fp), held constant beyond its ends. `xp` ascends."""
+    if not x > xp[0]:
+        return fp[0]
+    if x >= xp[-1]:
+        return fp[-1]
+    i = bisect_right(xp, x)
+    x0 = xp[i - 1]
+    return fp[i - 1] + (fp[i] - fp[i - 1]) * (x - x0) / (xp[i] - x0)
+
+
+def clip(x: float, lo: float, hi: float) -> float:
+    """`x` limited to lo..hi."""
+    return lo if x < lo else hi if x > hi else x
