@@ -16,7 +16,6 @@ class Lanes:
     path_poly: Poly  # the model's path
     left_prob: float
     right_prob: float
-    path_prob: float
     lane_width: float  # m
 
 
@@ -48,12 +47,12 @@ class LateralMpc:
         steering_angle: float,
         angle_offset: float,
         curvature_factor: float,
-        active: bool,
     ) -> float:
         """Plan for `lanes`; returns `angle_desired` (rad at the steering wheel).
 
         Speed in m/s; measured steering-wheel angle and its learnt offset in rad; `curvature_factor`
-        in 1/m, the curvature of the car's path for a road-wheel angle of 1 rad. Not `active`: the
-        plan starts from the measured angle the next time, and that angle is the result.
+        in 1/m, the curvature of the car's path for a road-wheel angle of 1 rad. Call it with
+        every model message, engaged or not, as the original does: the plan starts from its own last
+        angle. An unusable solution gives NaN, once; the next one starts anew at the measured angle.
         """
         raise NotImplementedError

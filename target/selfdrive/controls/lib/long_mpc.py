@@ -9,8 +9,8 @@ class LongitudinalMpc:
     Call `set_cur_state` with the plan's speed and acceleration now, then `update`. Results:
     `v_mpc`, `a_mpc` (m/s, m/s^2, 0.2 s ahead), `v_mpc_future` (m/s, 4 s ahead), `prev_lead_status`
     (the solution is for a real lead and may compete for the plan), `new_lead` (the lead appeared or
-    jumped in this update), `times`, `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s), and `resets`, the
-    number of times a solution was thrown away.
+    jumped in this update), `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s
+    to 1 s, then every 0.6 s), and `resets`, the number of times a solution was thrown away.
     """
 
     def __init__(self, mpc_id: int, solver=None) -> None:
@@ -37,5 +37,5 @@ class LongitudinalMpc:
         raise NotImplementedError
 
     def update(self, v_ego: float, a_ego: float, lead: LeadData | None) -> None:
-        """Plan for `lead` (None or status False: no lead). `v_ego`, `a_ego`: the car's own, used after a reset."""
+        """Plan for `lead` (None or status False: no lead). `v_ego`, `a_ego`: the car's own."""
         raise NotImplementedError
