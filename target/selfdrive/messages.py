@@ -55,6 +55,8 @@ class CarState:
     steer_error: bool = False
     steer_not_allowed: bool = False
     brake_error: bool = False
+    brake_hold: bool = False
+    park_brake: bool = False
     buttons: tuple[ButtonEvent, ...] = ()
     events: tuple = ()  # of controls.lib.events.Event, raised by the car interface
 
@@ -76,6 +78,16 @@ class RadarData:
     t: float
     points: tuple[RadarPoint, ...] = ()
     errors: tuple[str, ...] = ()
+
+
+class CameraView(NamedTuple):
+    """What the camera sees at one moment, as geometry in the car's frame (m, left positive)."""
+
+    left_lane_y: float  # at the car
+    right_lane_y: float  # at the car
+    path_y: float  # middle of the lane, at the car
+    bend: tuple[float, ...]  # how far the lines have moved sideways at 0, 1, ... 49 m ahead
+    lead_d_rel: float  # from the front bumper
 
 
 @dataclass(slots=True)
@@ -190,6 +202,7 @@ class ControlsState:
     v_pid: float = 0.0  # m/s
     long_state: str = "off"  # off, pid, stopping, starting
     steer_saturated: bool = False
+    steer_override: bool = False  # the driver steers
     alerts: tuple[str, ...] = ()  # names of all alerts active now, highest priority first
     alert_text1: str = ""
     alert_text2: str = ""

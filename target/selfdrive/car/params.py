@@ -32,3 +32,4 @@ class CarParams:
     min_enable_speed: float  # m/s; negative: engages at standstill too
     radar_offset: float  # m from the radar to the bumper reference
     steer_limit_alert: bool
+    start_acceleration: float = 0.5  # m/s^2, targeted while the brake is released to move off

@@ -2,17 +2,50 @@
 
 from collections.abc import Sequence
 
-from selfdrive.messages import CanFrame, RadarData
+from selfdrive.can.dbc import load
+from selfdrive.can.parser import CanParser
+from selfdrive.car.honda.values import (
+    NO_TRACK_DISTANCE,
+    RADAR_BUS,
+    RADAR_DBC,
+    RADAR_GOOD,
+    RADAR_MESSAGES,
+)
+from selfdrive.messages import CanFrame, RadarData, RadarPoint
+
+_LAST_OF_CYCLE = "TRACK_15"
 
 
 class RadarInterface:
     """Collects one radar cycle: state frame, then the track frame that completes it (20 Hz)."""
 
-    def __init__(self) -> None: ...
+    def __init__(self) -> None:
+        self._parser = CanParser(load(RADAR_DBC), RADAR_MESSAGES, RADAR_BUS)
+        self._track_id = 0
+        self._tracking = False
 
     def update(self, frames: Sequence[CanFrame], t: float) -> RadarData | None:
         """Take the frames of this step at time `t` (s); a RadarData when a cycle is complete, else None.
 
         A radar that falls silent gives None for ever: its age is for the receiver to judge.
         """
-        raise NotImplementedError
+        parser = self._parser
+        parser.update(frames, t)
+        if _LAST_OF_CYCLE not in parser.updated:
+            return None
+        errors = []
+        if not parser.valid:
+            errors.append("comm_issue")
+        if parser.values["RADAR_DIAGNOSTIC"][0] != RADAR_GOOD:
+            errors.append("fault")
+        return RadarData(t, self._points(), tuple(errors))
+
+    def _points(self) -> tuple[RadarPoint, ...]:
+        distance, lateral, speed = self._parser.values[_LAST_OF_CYCLE]
+        if distance >= NO_TRACK_DISTANCE:
+            self._tracking = False
+            return ()
+        if not self._tracking:  # a track that begins anew is another object, with another history
+            self._tracking = True
+            self._track_id += 1
+        return (RadarPoint(self._track_id, distance, -lateral, speed),)

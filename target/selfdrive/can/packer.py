@@ -1,0 +1,63 @@
+"""Physical values to CAN frames, with the car maker's counter and checksum."""
+
+from collections.abc import Sequence
+
+from selfdrive.can.dbc import Field, Message
+from selfdrive.messages import CanFrame
+
+_HALF_BYTE_SUMS = bytes((value >> 4) + (value & 0xF) for value in range(256))
+
+
+def half_byte_sum(data: bytes) -> int:
+    """Sum of the sixteen-valued halves of all bytes."""
+    return sum(data.translate(_HALF_BYTE_SUMS))
+
+
+def checksum_base(address: int) -> int:
+    """What the address contributes: address, payload and checksum add up to 8 modulo 16, by half bytes."""
+    return 8 - half_byte_sum(address.to_bytes(4, "big"))
+
+
+def encode(field: Field, value: float) -> int:
+    """Nearest raw value of the field, held at its ends; not-a-number becomes raw 0."""
+    mask, sign_bit = field.mask, field.sign_bit
+    scaled = (value - field.offset) / field.factor
+    try:
+        raw = round(scaled)
+    except (ValueError, OverflowError):
+        raw = 0 if scaled != scaled else mask if scaled > 0 else -mask
+    low = -sign_bit
+    high = mask + low
+    return (low if raw < low else high if raw > high else raw) & mask
+
+
+class Packer:
+    """Packs one message; `signals` fixes the order of the values given to `pack`."""
+
+    def __init__(self, message: Message, signals: Sequence[str], bus: int = 0) -> None:
+        self._fields = [message.fields[name] for name in signals]
+        self._address, self._size, self._bus = message.address, message.size, bus
+        self._counter_shift = message.counter_shift or 0
+        self._counter_mask = 0 if message.counter_shift is None else 0x3
+        self._has_checksum = message.has_checksum
+        self._checksum_base = checksum_base(message.address)
+        self._values: tuple[float, ...] | None = None
+        self._word = 0
+
+    def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
+        """The frame for physical `values`; `counter` counts the frames sent of this message."""
+        if values != self._values:
+            self._word = self._encode(values)
+            self._values = values
+        word = self._word | (counter & self._counter_mask) << self._counter_shift
+        data = word.to_bytes(self._size, "big")
+        if self._has_checksum:
+            word |= (self._checksum_base - half_byte_sum(data)) & 0xF
+            data = word.to_bytes(self._size, "big")
+        return CanFrame(self._address, data, self._bus)
+
+    def _encode(self, values: tuple[float, ...]) -> int:
+        word = 0
+        for field, value in zip(self._fields, values, strict=True):
+            word |= encode(field, value) << field.shift
+        return word

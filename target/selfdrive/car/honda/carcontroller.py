@@ -1,0 +1,94 @@
+"""From the controller's demand to what the Civic's actuators are sent."""
+
+from math import isfinite
+
+from selfdrive.car.honda.hondacan import CommandPacker
+from selfdrive.car.honda.values import BRAKE_COUNTS, PEDAL_COUNTS, PEDAL_REST, STEER_COUNTS
+from selfdrive.common.conversions import MS_TO_KPH
+from selfdrive.common.interp import clip
+from selfdrive.common.realtime import DT_CTRL
+from selfdrive.messages import CanFrame, CarControl, CarState
+
+BRAKE_ON = 0.02  # a demand from here on starts braking
+BRAKE_OFF = 0.005  # below this braking ends
+BRAKE_GAP = 0.01  # smaller changes of the demand are not passed on
+BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake may fall at once
+
+PEDALS_EVERY = 2  # cycles
+DISPLAY_EVERY = 10  # cycles
+
+
+class BrakeHysteresis:
+    """Keeps the brake from chattering: on and off at different demands, small changes ignored."""
+
+    def __init__(self) -> None:
+        self._braking = False
+        self._steady = 0.0
+
+    def update(self, brake: float) -> float:
+        """Brake to command for a demanded `brake`, both in 0..1."""
+        if brake < BRAKE_OFF or (brake < BRAKE_ON and not self._braking):
+            brake = 0.0
+        self._braking = brake > 0.0
+        if not self._braking:
+            self._steady = 0.0
+        elif brake > self._steady + BRAKE_GAP:
+            self._steady = brake - BRAKE_GAP
+        elif brake < self._steady - BRAKE_GAP:
+            self._steady = brake + BRAKE_GAP
+        return self._steady
+
+
+class CarController:
+    """Applies limits, hysteresis and rate limits, quantises, packs. One instance drives one run."""
+
+    def __init__(self) -> None:
+        self._hysteresis = BrakeHysteresis()
+        self._brake = 0.0
+        self._can = CommandPacker()
+
+    def update(self, control: CarControl, car: CarState, frame: int) -> list[CanFrame]:
+        """Frames of control cycle `frame`; `car` is the state the demand was made from.
+
+        A demand that is not a number is sent as zero.
+        """
+        demand = control.actuators
+        enabled = control.enabled
+        gas = _finite(demand.gas) if enabled else 0.0
+        steer = _finite(demand.steer) if enabled else 0.0
+        brake = self._hysteresis.update(_finite(demand.brake) if enabled else 0.0)
+        self._brake = min(brake, self._brake + BRAKE_RISE)
+
+        active = enabled and not car.steer_not_allowed
+        torque = int(clip(-steer, -1.0, 1.0) * STEER_COUNTS) if active else 0
+        frames = [self._can.steering(torque, active, frame)]
+        if frame % PEDALS_EVERY == 0:
+            frames += self._pedals(control, car, gas, frame // PEDALS_EVERY)
+        if frame % DISPLAY_EVERY == 0:
+            frames += self._display(control, frame // DISPLAY_EVERY)
+        return frames
+
+    def _pedals(self, control: CarControl, car: CarState, gas: float, counter: int) -> list[CanFrame]:
+        brake_counts = int(clip(self._brake * BRAKE_COUNTS, 0, BRAKE_COUNTS - 1))
+        gas_counts = int(min(gas, 1.0) * PEDAL_COUNTS) + PEDAL_REST if gas > 0.0 else 0
+        cancel = control.cancel_cruise or (car.cruise_enabled and not control.enabled)
+        fcw = control.visual_alert == "fcw"
+        chime = control.audible_alert != "none"
+        return [
+            self._can.brake(brake_counts, control.enabled, cancel, fcw, chime, counter),
+            self._can.gas(gas_counts, counter),
+        ]
+
+    def _display(self, control: CarControl, counter: int) -> list[CanFrame]:
+        speed_kph = round(control.set_speed * MS_TO_KPH) if control.speed_visible else 255
+        lead = (2 if control.lead_visible else 1) if control.enabled else 0
+        steering_required = control.visual_alert == "steer_required"
+        beep = control.audible_alert != "none"
+        return [
+            self._can.cruise_display(speed_kph, lead, control.enabled, counter),
+            self._can.lane_display(control.lanes_visible, steering_required, beep, counter),
+        ]
+
+
+def _finite(value: float) -> float:
+    return value if isfinite(value) else 0.0

@@ -1,0 +1,71 @@
+"""Facts of the car's electronics: bus numbers, codes, what is sent how often."""
+
+from pathlib import Path
+
+from selfdrive.can.parser import Expected
+
+CAR_BUS = 0
+RADAR_BUS = 1
+CAR_DBC = Path(__file__).parent / "honda_civic_touring_2016.dbc"
+RADAR_DBC = Path(__file__).parent / "nidec_radar.dbc"
+
+
+class CruiseButton:
+    """Codes of SCM_BUTTONS.CRUISE_BUTTONS."""
+
+    NONE = 0
+    MAIN = 1
+    CANCEL = 2
+    DECEL_SET = 3
+    RES_ACCEL = 4
+
+
+GEARS = {1: "park", 2: "reverse", 4: "neutral", 8: "drive", 16: "sport", 32: "low"}
+GEAR_CODES = {name: code for code, name in GEARS.items()}
+
+STEER_STATUS_NORMAL = 0
+STEER_STATUS_FAULT = 5  # what is assumed until the EPS has said otherwise
+STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS refuses torque for now at most, it is not broken
+
+RADAR_GOOD = 0x79
+NO_TRACK_DISTANCE = 255.0  # m; a track at this distance or beyond has ended
+
+STEER_COUNTS = 0x1000  # sent for a demand of 1
+STEER_FULL_COUNTS = 0xF00  # what the EPS takes as full torque
+BRAKE_COUNTS = 256
+PEDAL_COUNTS = 1004  # of the pedal interceptor, for a demand of 1
+PEDAL_REST = 328
+STEER_OVERRIDE_TORQUE = 1200  # counts of the driver's torque that mean hands on the wheel
+
+# What the controller listens to. STEER_STATUS, seat belt and the like start in their unsafe state.
+CAR_MESSAGES = {
+    "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100),
+    "WHEEL_SPEEDS": Expected(
+        ("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100
+    ),
+    "STEERING_SENSORS": Expected(("STEER_ANGLE", "STEER_ANGLE_RATE"), 100),
+    "STEER_STATUS": Expected(("STEER_TORQUE_SENSOR", "STEER_STATUS"), 100, (0, STEER_STATUS_FAULT)),
+    "POWERTRAIN_DATA": Expected(("PEDAL_GAS", "ACC_STATUS", "BRAKE_SWITCH", "BRAKE_PRESSED"), 100),
+    "GEARBOX": Expected(("GEAR_SHIFTER",), 50),
+    "VSA_STATUS": Expected(("ESP_DISABLED", "BRAKE_HOLD_ACTIVE"), 50, (1, 0)),
+    "STANDSTILL": Expected(("WHEELS_MOVING", "BRAKE_ERROR_1", "BRAKE_ERROR_2"), 50, (1, 0, 0)),
+    "EPB_STATUS": Expected(("EPB_STATE",), 10),
+    "SCM_BUTTONS": Expected(("CRUISE_BUTTONS", "CRUISE_SETTING"), 25),
+    "SCM_FEEDBACK": Expected(("MAIN_ON", "LEFT_BLINKER", "RIGHT_BLINKER"), 10),
+    "SEATBELT_STATUS": Expected(("SEATBELT_DRIVER_LAMP", "SEATBELT_DRIVER_LATCHED"), 10, (1, 0)),
+    "CRUISE": Expected(("CRUISE_SPEED_PCM",), 10),
+    "DOORS_STATUS": Expected(
+        ("DOOR_OPEN_FL", "DOOR_OPEN_FR", "DOOR_OPEN_RL", "DOOR_OPEN_RR"), 10, (1, 1, 1, 1)
+    ),
+}
+
+RADAR_MESSAGES = {
+    "RADAR_DIAGNOSTIC": Expected(("RADAR_STATE",), 20),
+    "TRACK_15": Expected(("LONG_DIST", "LAT_DIST", "REL_SPEED"), 20),
+}
+
+COMMAND_MESSAGES = {
+    "STEERING_CONTROL": Expected(("STEER_TORQUE", "STEER_TORQUE_REQUEST"), 100),
+    "BRAKE_COMMAND": Expected(("COMPUTER_BRAKE",), 50),
+    "GAS_COMMAND": Expected(("GAS_COMMAND",), 50),
+}
