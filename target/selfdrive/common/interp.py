@@ -5,8 +5,11 @@ from collections.abc import Sequence
 
 
 def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
-    """Value at `x` of the line through (xp, fp), held constant beyond its ends. `xp` ascends."""
-    if not x > xp[0]:
+    """Value at `x` of the line through (xp, fp), held constant beyond its ends. `xp` ascends.
+
+    An `x` that is no number gives the first value; where `xp` repeats, the last of its values counts.
+    """
+    if not x >= xp[0]:
         return fp[0]
     if x >= xp[-1]:
         return fp[-1]
@@ -16,5 +19,7 @@ def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
 
 
 def clip(x: float, lo: float, hi: float) -> float:
-    """`x` limited to lo..hi."""
-    return lo if x < lo else hi if x > hi else x
+    """`x` limited to lo..hi. A value that is no number becomes `hi`, as in the original."""
+    if not x < hi:
+        return hi
+    return x if x > lo else lo

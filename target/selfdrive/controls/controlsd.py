@@ -1,19 +1,57 @@
 """controlsd: sample, plan, decide, control, send - once every 10 ms."""
 
+from selfdrive.car.honda.interface import CarInterface
 from selfdrive.car.params import CarParams
-from selfdrive.messages import CanFrame, ControlsState, ModelData, Plan, RadarState
+from selfdrive.common.conversions import KPH_TO_MS
+from selfdrive.controls.lib.alertmanager import AlertManager
+from selfdrive.controls.lib.angle_offset import AngleOffset
+from selfdrive.controls.lib.cruise_speed import V_CRUISE_NONE, button_v_cruise, initial_v_cruise
+from selfdrive.controls.lib.driver_awareness import DriverAwareness
+from selfdrive.controls.lib.events import (
+    IMMEDIATE_DISABLE,
+    NO_ENTRY,
+    PERMANENT,
+    WARNING,
+    Event,
+    names_of_kind,
+)
+from selfdrive.controls.lib.latcontrol import LatControl
+from selfdrive.controls.lib.longcontrol import STARTING_TARGET_SPEED, LongControl
+from selfdrive.controls.lib.pathplanner import ModelFit
+from selfdrive.controls.lib.state_machine import StateMachine
+from selfdrive.controls.plannerd import Planner
+from selfdrive.messages import (
+    Actuators,
+    CanFrame,
+    CarControl,
+    CarState,
+    ControlsState,
+    ModelData,
+    Plan,
+    RadarState,
+)
+
+NO_TARGET = Event("no_target", (NO_ENTRY, IMMEDIATE_DISABLE))
+LEARN_EVERY, LEARN_AT = 5, 2  # cycles, angle offset learning at 20 Hz
 
 
 class Controlsd:
-    """The control loop. `car` is the CarInterface: `update(frames, t) -> CarState`, `apply(control, frame)`.
+    """The control loop. `state` and `plan` hold the newest ControlsState and Plan after each update."""
 
-    `state` and `plan` hold the newest ControlsState and Plan after each update.
-    """
-
-    def __init__(self, params: CarParams, car) -> None:
+    def __init__(self, params: CarParams, car: CarInterface, fit: ModelFit) -> None:
+        self._params = params
+        self._car = car
+        self._planner = Planner(params, fit)
+        self._lateral = LatControl(params)
+        self._longitudinal = LongControl(params)
+        self._machine = StateMachine()
+        self._alerts = AlertManager()
+        self._awareness = DriverAwareness()
+        self._angle_offset = AngleOffset()
+        self._v_cruise = V_CRUISE_NONE  # km/h
+        self._frame = 0
         self.state = ControlsState()
         self.plan = Plan()
-        raise NotImplementedError
 
     def update(
         self, t: float, frames: list[CanFrame], radar_state: RadarState | None, model: ModelData | None
@@ -22,4 +60,105 @@ class Controlsd:
 
         `radar_state` and `model` are the newest ones, however old; None before the first.
         """
-        raise NotImplementedError
+        if self._frame == 0:
+            self._alerts.add("startup", t)
+        car = self._car.update(frames, t)
+        self.plan = self._make_plan(t, car, radar_state, model)
+        events = self._collect_events(car)
+        v_cruise_before = self._v_cruise
+        self._transition(t, car, events)
+        actuators = self._control(t, car, events, self._v_cruise != v_cruise_before)
+        self._alerts.process(t)
+        self.state = self._publish(t, car, events)
+        sent = self._car.apply(self._car_control(actuators), self._frame)
+        self._frame += 1
+        return sent
+
+    def _make_plan(
+        self, t: float, car: CarState, radar_state: RadarState | None, model: ModelData | None
+    ) -> Plan:
+        """Plans are made in every state; so a lead is known before the driver engages."""
+        if self._planner.take_model(car.v_ego, model):
+            self._lateral.plan(t, car, self._planner.path.lanes, self._angle_offset.value)
+        state, absent = self._longitudinal.state, self._awareness.absent
+        return self._planner.update(t, car, radar_state, state, self._v_cruise, absent)
+
+    def _collect_events(self, car: CarState) -> tuple[Event, ...]:
+        events = car.events + self.plan.events
+        # braking by foot with nothing to stop for: letting go of the pedal would start the car
+        if car.brake_pressed and self.plan.v_target_future >= STARTING_TARGET_SPEED:
+            events += (NO_TARGET,)
+        return events
+
+    def _transition(self, t: float, car: CarState, events: tuple[Event, ...]) -> None:
+        if self._machine.enabled and car.buttons:
+            self._v_cruise = button_v_cruise(self._v_cruise, car.buttons)
+        if self._machine.update(events, self._alerts, t):
+            self._v_cruise = initial_v_cruise(car.v_ego)
+
+    def _control(self, t: float, car: CarState, events: tuple[Event, ...], speed_set: bool) -> Actuators:
+        active = self._machine.active
+        if self.plan.fcw:
+            self._alerts.add("fcw", t)
+        if active:
+            self._warn(t, events)
+        else:
+            self._lateral.reset()
+            self._longitudinal.reset(car.v_ego)
+        self._learn(car, active)
+        gas, brake = self._longitudinal.update(active, car, self.plan)
+        steer = self._lateral.update(t, car, active)
+        if not active or car.buttons or car.steering_pressed or speed_set:
+            self._awareness.reset()
+        if self._lateral.saturated and self._params.steer_limit_alert:
+            self._alerts.add("steer_saturated", t)
+        for name in names_of_kind(events, PERMANENT):
+            self._alerts.add(name + "_permanent", t)
+        return Actuators(gas, brake, steer)
+
+    def _warn(self, t: float, events: tuple[Event, ...]) -> None:
+        distracted = self._awareness.count_down()
+        if distracted:
+            self._alerts.add(distracted, t)
+        for name in names_of_kind(events, WARNING):
+            self._alerts.add(name, t)
+
+    def _learn(self, car: CarState, active: bool) -> None:
+        if self._frame % LEARN_EVERY == LEARN_AT and active and not car.steering_pressed:
+            path = self._planner.path
+            self._angle_offset.update(car.v_ego, path.c_poly[3], path.c_prob, car.steering_angle)
+
+    def _car_control(self, actuators: Actuators) -> CarControl:
+        enabled = self._machine.enabled
+        return CarControl(
+            enabled=enabled,
+            actuators=actuators,
+            cancel_cruise=not enabled,
+            set_speed=self._v_cruise * KPH_TO_MS,
+            speed_visible=enabled,
+            lanes_visible=enabled,
+            lead_visible=self.plan.has_lead,
+            visual_alert=self._alerts.visual,
+            audible_alert=self._alerts.audible,
+        )
+
+    def _publish(self, t: float, car: CarState, events: tuple[Event, ...]) -> ControlsState:
+        return ControlsState(
+            t=t,
+            state=self._machine.state,
+            enabled=self._machine.enabled,
+            active=self._machine.active,
+            v_ego=car.v_ego,
+            a_ego=car.a_ego,
+            steering_angle=car.steering_angle,
+            angle_desired=self._lateral.angle_desired,
+            v_cruise=self._v_cruise * KPH_TO_MS,
+            v_pid=self._longitudinal.v_pid,
+            long_state=self._longitudinal.state,
+            steer_saturated=self._lateral.saturated,
+            steer_override=car.steering_pressed,
+            alerts=self._alerts.active,
+            alert_text1=self._alerts.text1,
+            alert_text2=self._alerts.text2,
+            events=tuple(event.name for event in events),
+        )

@@ -1,0 +1,45 @@
+"""Keeps the alerts that are on and shows the most urgent."""
+
+from collections.abc import Mapping
+
+from selfdrive.controls.lib.alerts import ALERTS, Alert
+
+
+class AlertManager:
+    """Alerts last for their duration after they were last raised; higher priority, then newer, is shown."""
+
+    def __init__(self, table: Mapping[str, Alert] = ALERTS) -> None:
+        self._table = table
+        self._raised: dict[str, float] = {}  # name: time last raised
+        self.active: tuple[str, ...] = ()
+        self.text1 = ""
+        self.text2 = ""
+        self.visual = "none"
+        self.audible = "none"
+
+    def add(self, name: str, t: float) -> None:
+        """Raise an alert at time `t` (s). An unknown name raises KeyError."""
+        if name not in self._table:
+            raise KeyError(f"no alert is named {name!r}")
+        self._raised[name] = t
+
+    def process(self, t: float) -> None:
+        """Drop what has run out and set what is shown at time `t` (s)."""
+        if not self._raised and not self.active:
+            return
+        self._raised = {n: t0 for n, t0 in self._raised.items() if t0 + self._table[n].duration > t}
+        self.active = tuple(
+            sorted(self._raised, key=lambda n: (self._table[n].priority, self._raised[n]), reverse=True)
+        )
+        self.text1 = self.text2 = ""
+        self.visual = self.audible = "none"
+        if self.active:
+            self._show(self._table[self.active[0]], self._raised[self.active[0]], t)
+
+    def _show(self, alert: Alert, t0: float, t: float) -> None:
+        if t0 + alert.text_s > t:
+            self.text1, self.text2 = alert.text1, alert.text2
+        if t0 + alert.visual_s > t:
+            self.visual = alert.visual
+        if t0 + alert.sound_s > t:
+            self.audible = alert.audible

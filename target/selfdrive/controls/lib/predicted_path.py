@@ -1,0 +1,45 @@
+"""The way the car will go, against which radar tracks are placed."""
+
+from collections.abc import Callable
+from math import asin, copysign, hypot, tan
+
+from selfdrive.common.interp import clip
+from selfdrive.controls.lib.polynomial import Poly, slope, value
+
+REACH = 140.0  # m, further ahead no path is known
+NEAREST_STEPS = 3
+
+Curve = Callable[[float], tuple[float, float]]  # x in m to y and dy/dx
+
+
+def model_curve(poly: Poly) -> Curve:
+    """The path to follow."""
+    return lambda x: (value(poly, x), slope(poly, x))
+
+
+def steering_curve(curvature: float) -> Curve:
+    """The circle (curvature in 1/m) that the steering wheel describes."""
+
+    def curve(x: float) -> tuple[float, float]:
+        # the clip keeps sharp turns from leaving the circle
+        angle = asin(clip(x * curvature, -0.999, 0.999))
+        return x * tan(angle / 2.0), tan(angle)
+
+    return curve
+
+
+def distance_to(curve: Curve, x: float, y: float) -> float:
+    """Distance in m of the point (x, y) from the curve, positive left of it.
+
+    The nearest point is found by Gauss-Newton steps from abeam; on a straight line the first is exact.
+    """
+    y_abeam, steep = curve(clip(x, 0.0, REACH))
+    near, y_near = clip(x, 0.0, REACH), y_abeam
+    for _ in range(NEAREST_STEPS):
+        step = ((x - near) + (y - y_near) * steep) / (1.0 + steep * steep)
+        if not abs(step) > 1e-6:
+            break
+        near = clip(near + step, 0.0, REACH)
+        y_near, steep = curve(near)
+    gap = hypot(near - x, y_near - y)
+    return 0.0 if y == y_abeam else copysign(gap, y - y_abeam)
