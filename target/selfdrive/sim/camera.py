@@ -1,13 +1,40 @@
-"""The camera: what stands ahead of the car, 20 times a second."""
+"""The camera: where lane and lead are, seen from the car, 20 times a second."""
 
-from typing import NamedTuple
+from math import tan
+
+from selfdrive.messages import CameraView
+from selfdrive.sim.road import Road
+from selfdrive.sim.truth import GroundTruth
+
+LANE_WIDTH = 3.7  # m
+VIEW_LENGTH = 50  # points, a metre apart
+
+_STRAIGHT = (0.0,) * VIEW_LENGTH
+_AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))
 
 
-class CameraView(NamedTuple):
-    """One view. Lateral positions in m in the car's frame, left positive; distances from the bumper."""
+class Camera:
+    """Looks along the car: the lane moves in view as the car drifts, turns, or the road bends."""
 
-    left_lane_y: float  # m, at the car
-    right_lane_y: float  # m, at the car
-    path_y: float  # m, middle of the lane at the car
-    bend: tuple[float, ...]  # m, how far the lines have moved sideways at 0, 1, ... 49 m
-    lead_d_rel: float  # m
+    def __init__(self, road: Road) -> None:
+        self._road = road
+
+    def look(self, truth: GroundTruth) -> CameraView:
+        """The view at this moment."""
+        middle = -truth.lateral_offset
+        return CameraView(
+            left_lane_y=middle + 0.5 * LANE_WIDTH,
+            right_lane_y=middle - 0.5 * LANE_WIDTH,
+            path_y=middle,
+            bend=self._bend(truth),
+            lead_d_rel=truth.d_rel,
+        )
+
+    def _bend(self, truth: GroundTruth) -> tuple[float, ...]:
+        road = self._road.bend(truth.position, VIEW_LENGTH)
+        if truth.heading == 0.0:
+            return road or _STRAIGHT
+        slope = -tan(truth.heading)
+        if road is None:
+            return tuple([slope * x for x in _AHEAD])
+        return tuple([y + slope * x for x, y in zip(_AHEAD, road, strict=True)])

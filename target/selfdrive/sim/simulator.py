@@ -1,46 +1,129 @@
 """The closed loop: plant, sensors, camera and the controller, 10 ms a step."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
+import numpy as np
 
-class GroundTruth(NamedTuple):
-    """The world after the plant's step that began at `t`. SI units, radians, left positive."""
+from selfdrive.car.honda.interface import CarInterface
+from selfdrive.car.honda.radar_interface import RadarInterface
+from selfdrive.manager import Manager
+from selfdrive.messages import Actuators, CanFrame
+from selfdrive.sim.actuators import ActuatorReceiver
+from selfdrive.sim.camera import Camera
+from selfdrive.sim.hazards import HazardMonitor
+from selfdrive.sim.lead import LeadVehicle
+from selfdrive.sim.plant import Plant
+from selfdrive.sim.radar import RadarSensor
+from selfdrive.sim.recorder import Recorder
+from selfdrive.sim.road import Road
+from selfdrive.sim.scenario import Scenario
+from selfdrive.sim.sensors import CarSensors
+from selfdrive.sim.truth import GroundTruth
+from selfdrive.visiond.visiond import Visiond
 
-    t: float
-    d_rel: float  # m, bumper to bumper
-    v_ego: float  # m/s
-    v_lead: float  # m/s
-    a_ego: float  # m/s^2
-    lateral_offset: float  # m from the middle of the lane
-    heading: float  # rad relative to the road
-    steer_angle: float  # rad at the steering wheel
+RECORD_SCHEMA = "sim-record/1"
+STEPS_PER_SECOND = 100
+CYCLE = 5  # steps between radar cycles, and between pictures
+FREE_ROAD_DISTANCE = 200.0  # m; radar and camera see an object there that keeps its distance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationResult:
-    """What a finished run leaves: `record` (plain data for record.json) and `trace` (name to array)."""
+    """What a run leaves: `record` (plain data for record.json) and `trace` (channel to array)."""
 
     record: dict
-    trace: dict
+    trace: dict[str, np.ndarray]
 
 
 class Simulator:
-    """Runs one scenario at a time; may be reset and used again."""
+    """Runs one scenario at a time; `reset` starts the next one, with nothing left of the last."""
 
-    def reset(self, scenario, seed: int = 0) -> None:
-        """Build car, controller and recorder anew for `scenario` (a sim.scenario.Scenario)."""
-        raise NotImplementedError
+    def reset(self, scenario: Scenario, seed: int = 0) -> None:
+        """Build car, controller and recorder anew. Nothing is random yet; `seed` is recorded."""
+        self.frame = 0
+        self._scenario, self._seed = scenario, seed
+        lead = scenario.lead
+        self._road = Road(scenario.grade, scenario.curvature)
+        self._lead = LeadVehicle(lead.gap, lead.times, lead.speeds) if lead else None
+        self._sensors = CarSensors()
+        self._radar = RadarSensor(self._road)
+        self._camera = Camera(self._road)
+        self._receiver = ActuatorReceiver()
+        self._actuators = Actuators()
+        car = CarInterface()
+        self._plant = Plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
+        self.manager = Manager(car, RadarInterface(), Visiond())
+        self.hazards = HazardMonitor()
+        self.recorder = Recorder()
 
     @property
     def done(self) -> bool:
         """True once the scenario's duration has been simulated."""
-        raise NotImplementedError
+        return self.frame >= self._scenario.steps
 
     def step(self) -> None:
         """Advance 10 ms: plant, ground truth, sensors, controller, recorder."""
-        raise NotImplementedError
+        t = self.frame / STEPS_PER_SECOND
+        self._advance(t)
+        truth = self._observe(t)
+        self.hazards.update(truth)
+        measured = self._sensors.measure(truth, self._scenario.button(self.frame), self.frame)
+        view = None
+        if self.frame % CYCLE == 0:
+            measured += self._radar.measure(truth)
+            view = self._camera.look(truth)
+        frames: list[CanFrame] = []
+        frames.extend(measured)
+        sent = self.manager.step(t, frames, view)
+        self._record(truth)
+        self._actuators = self._receiver.update(sent, t)
+        self.frame += 1
 
     def result(self) -> SimulationResult:
         """Record and trace of the steps made so far."""
-        raise NotImplementedError
+        recorder = self.recorder
+        first_alerts: dict[str, float] = {}
+        for name, t in recorder.alerts:
+            first_alerts.setdefault(name, t)
+        record = {
+            "schema": RECORD_SCHEMA,
+            "scenario": self._scenario.name,
+            "scenario_digest": self._scenario.digest,
+            "seed": self._seed,
+            "no_lead": self._scenario.lead is None,
+            "steps": self.frame,
+            "engaged_from": recorder.engaged_from,
+            "engaged_to": recorder.engaged_to,
+            "hazards": dict(self.hazards.first),
+            "alerts": [{"name": name, "t": t} for name, t in first_alerts.items()],
+            "alert_events": [{"name": name, "t": t} for name, t in recorder.alerts],
+        }
+        return SimulationResult(record=record, trace=recorder.trace())
+
+    def _advance(self, t: float) -> None:
+        """The world's step that begins at `t`, with the commands of the step before."""
+        road, plant = self._road, self._plant
+        plant.step(self._actuators, road.grade(t), road.curvature(plant.position))
+        if self._lead:
+            self._lead.step(t)
+
+    def _observe(self, t: float) -> GroundTruth:
+        plant, lateral, lead = self._plant, self._plant.lateral, self._lead
+        return GroundTruth(
+            t=t,
+            d_rel=lead.position - plant.position if lead else FREE_ROAD_DISTANCE,
+            v_ego=plant.speed,
+            v_lead=lead.speed if lead else plant.speed,
+            a_ego=plant.acceleration,
+            lateral_offset=lateral.offset,
+            heading=lateral.heading,
+            steer_angle=lateral.steer_angle,
+            steer_rate=lateral.steer_rate,
+            position=plant.position,
+            free_road=lead is None,
+        )
+
+    def _record(self, truth: GroundTruth) -> None:
+        controlsd, radar_state = self.manager.controlsd, self.manager.radar_state
+        lead = radar_state.lead_one if radar_state else None
+        self.recorder.append(truth, self._actuators, controlsd.state, controlsd.plan, lead)

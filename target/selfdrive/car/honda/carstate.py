@@ -26,7 +26,11 @@ SPEED_GAINS = (0.12288, 0.29666)
 _BLEND_BP = (1.0, 6.0)  # m/s
 _BLEND_V = (0.0, 1.0)  # weight of the wheel speed
 
-_BUTTON_NAMES = {CruiseButton.RES_ACCEL: "accel", CruiseButton.DECEL_SET: "decel", CruiseButton.CANCEL: "cancel"}
+_BUTTON_NAMES = {
+    CruiseButton.RES_ACCEL: "accel",
+    CruiseButton.DECEL_SET: "decel",
+    CruiseButton.CANCEL: "cancel",
+}
 
 
 class CarStateReader:

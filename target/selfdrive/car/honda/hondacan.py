@@ -29,7 +29,9 @@ class CommandPacker:
         """Torque in counts, right positive."""
         return self._steering.pack((torque, active), counter)
 
-    def brake(self, counts: int, override: bool, cancel: bool, fcw: bool, chime: bool, counter: int) -> CanFrame:
+    def brake(
+        self, counts: int, override: bool, cancel: bool, fcw: bool, chime: bool, counter: int
+    ) -> CanFrame:
         """Brake in counts of 1/256. `override` keeps the car's own cruise control off the pedals."""
         braking = counts > 0
         values = (counts / BRAKE_COUNTS, braking, braking, braking, override, cancel, 2 if fcw else 0, chime)

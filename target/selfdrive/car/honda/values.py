@@ -40,9 +40,7 @@ STEER_OVERRIDE_TORQUE = 1200  # counts of the driver's torque that mean hands on
 # What the controller listens to. STEER_STATUS, seat belt and the like start in their unsafe state.
 CAR_MESSAGES = {
     "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100),
-    "WHEEL_SPEEDS": Expected(
-        ("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100
-    ),
+    "WHEEL_SPEEDS": Expected(("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100),
     "STEERING_SENSORS": Expected(("STEER_ANGLE", "STEER_ANGLE_RATE"), 100),
     "STEER_STATUS": Expected(("STEER_TORQUE_SENSOR", "STEER_STATUS"), 100, (0, STEER_STATUS_FAULT)),
     "POWERTRAIN_DATA": Expected(("PEDAL_GAS", "ACC_STATUS", "BRAKE_SWITCH", "BRAKE_PRESSED"), 100),

@@ -1,0 +1,32 @@
+"""The car's actuators: what they take from the frames the controller sends."""
+
+from collections.abc import Sequence
+
+from selfdrive.can.dbc import load
+from selfdrive.can.parser import CanParser
+from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, COMMAND_MESSAGES, STEER_FULL_COUNTS
+from selfdrive.messages import Actuators, CanFrame
+
+# What the pedal interceptor makes of its counts; 256 is the gas pedal's full travel.
+_PEDAL_SLOPE = 0.253984064
+_PEDAL_OFFSET = -83.3
+_PEDAL_FULL = 256.0
+
+
+class ActuatorReceiver:
+    """Decodes commands. Each actuator holds its last valid command until the next."""
+
+    def __init__(self) -> None:
+        self._parser = CanParser(load(CAR_DBC), COMMAND_MESSAGES, CAR_BUS)
+
+    def update(self, frames: Sequence[CanFrame], t: float) -> Actuators:
+        """Gas and brake in 0..1, steering torque relative to the EPS' full torque, left positive."""
+        self._parser.update(frames, t)
+        values = self._parser.values
+        torque, active = values["STEERING_CONTROL"]
+        pedal = (values["GAS_COMMAND"][0] * _PEDAL_SLOPE + _PEDAL_OFFSET) / _PEDAL_FULL
+        return Actuators(
+            gas=max(pedal, 0.0),
+            brake=values["BRAKE_COMMAND"][0],
+            steer=-torque / STEER_FULL_COUNTS if active else 0.0,
+        )

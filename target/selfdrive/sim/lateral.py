@@ -1,0 +1,90 @@
+"""How the car moves sideways: torque turns the steering wheel, tyres turn the car.
+
+Steering: `J w' = T u - c w - trail * F_front / ratio`. `u` is the commanded torque (1 is all the
+EPS gives), `F_front` the lateral force of the front tyres, which pulls the wheel straight. The
+column is dominated by its damping (motor friction, gearing, the EPS' own return damping), as LKAS
+actuators are: at 60 mph full torque turns the wheel by at most half a radian a second, and holds
+2.8 m/s^2 of lateral acceleration. With the controller's loop around it, the wheel answers
+a demand in about 0.1 s, the actuation delay the path planner assumes.
+
+Car: linear bicycle model in lateral speed and yaw rate, advanced by implicit Euler because its
+poles run away as 1/speed; at walking pace it becomes the kinematic model.
+"""
+
+from math import cos, sin
+
+from selfdrive.car.params import CarParams
+from selfdrive.common.interp import clip
+from selfdrive.common.realtime import DT_CTRL
+
+FULL_TORQUE = 10.0  # N m at the steering wheel, for a command of 1
+COLUMN_INERTIA = 0.1  # kg m^2, wheel, column and motor
+COLUMN_DAMPING = 20.0  # N m s/rad
+TRAIL = 0.053  # m, caster and pneumatic trail
+LARGEST_ANGLE = 8.7  # rad, mechanical stop
+CREEP = 0.1  # m/s; below this the tyres take no side force
+
+
+class LateralDynamics:
+    """Steering and sideways motion; `offset` (m) and `heading` (rad) are relative to the lane's middle."""
+
+    def __init__(self, car: CarParams, offset: float = 0.0) -> None:
+        self.offset = offset
+        self.heading = 0.0
+        self.steer_angle = 0.0  # rad at the steering wheel
+        self.steer_rate = 0.0  # rad/s
+        self.lateral_speed = 0.0  # m/s, of the centre of mass, in the car's frame
+        self.yaw_rate = 0.0  # rad/s
+        self._car = car
+        front, rear = car.center_to_front, car.wheelbase - car.center_to_front
+        c_front, c_rear, mass, inertia = (
+            car.tire_stiffness_front,
+            car.tire_stiffness_rear,
+            car.mass,
+            car.rotational_inertia,
+        )
+        self._sum = DT_CTRL * (c_front + c_rear) / mass
+        self._difference = DT_CTRL * (rear * c_rear - front * c_front)
+        self._moment = DT_CTRL * (front * front * c_front + rear * rear * c_rear) / inertia
+        self._push = DT_CTRL * c_front / mass
+        self._turn = DT_CTRL * front * c_front / inertia
+
+    def step(self, torque: float, speed: float, curvature: float) -> None:
+        """Advance 10 ms with `torque` (left positive, 1 is full) at `speed` on a road of `curvature`."""
+        self._turn_wheel(torque, speed)
+        self._move(speed)
+        heading, offset, v_lat = self.heading, self.offset, self.lateral_speed
+        along = (speed * cos(heading) - v_lat * sin(heading)) / (1.0 - curvature * offset)
+        self.offset = offset + DT_CTRL * (speed * sin(heading) + v_lat * cos(heading))
+        self.heading = heading + DT_CTRL * (self.yaw_rate - curvature * along)
+
+    def _turn_wheel(self, torque: float, speed: float) -> None:
+        ratio = self._car.steer_ratio
+        drive = FULL_TORQUE * torque - TRAIL * self._front_force(speed) / ratio
+        momentum = COLUMN_INERTIA * self.steer_rate + DT_CTRL * drive
+        self.steer_rate = momentum / (COLUMN_INERTIA + DT_CTRL * COLUMN_DAMPING)
+        angle = self.steer_angle + DT_CTRL * self.steer_rate
+        self.steer_angle = clip(angle, -LARGEST_ANGLE, LARGEST_ANGLE)
+
+    def _front_force(self, speed: float) -> float:
+        """Lateral force of the front axle (N), left positive."""
+        if speed < CREEP:
+            return 0.0
+        car = self._car
+        slip = self.steer_angle / car.steer_ratio
+        slip -= (self.lateral_speed + car.center_to_front * self.yaw_rate) / speed
+        return car.tire_stiffness_front * slip
+
+    def _move(self, v: float) -> None:
+        """Implicit Euler step of the bicycle model, both equations multiplied by the speed."""
+        car = self._car
+        wheel = self.steer_angle / car.steer_ratio
+        a11 = v + self._sum
+        a12 = DT_CTRL * v * v - self._difference / car.mass
+        a21 = -self._difference / car.rotational_inertia
+        a22 = v + self._moment
+        b1 = v * (self.lateral_speed + self._push * wheel)
+        b2 = v * (self.yaw_rate + self._turn * wheel)
+        determinant = a11 * a22 - a12 * a21
+        self.lateral_speed = (b1 * a22 - a12 * b2) / determinant
+        self.yaw_rate = (a11 * b2 - a21 * b1) / determinant

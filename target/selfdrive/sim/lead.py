@@ -1,0 +1,20 @@
+"""The vehicle ahead."""
+
+from collections.abc import Sequence
+
+from selfdrive.common.interp import interp
+from selfdrive.common.realtime import DT_CTRL
+
+
+class LeadVehicle:
+    """Drives in the middle of the lane; its speed follows a profile over time."""
+
+    def __init__(self, gap: float, times: Sequence[float], speeds: Sequence[float]) -> None:
+        self.position = gap  # m, of its rear bumper
+        self.speed = speeds[0]
+        self._times, self._speeds = times, speeds
+
+    def step(self, t: float) -> None:
+        """Advance 10 ms from time `t` (s) with the speed of that moment."""
+        self.speed = interp(t, self._times, self._speeds)
+        self.position += DT_CTRL * self.speed

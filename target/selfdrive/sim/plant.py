@@ -1,0 +1,56 @@
+"""The standard plant: openpilot's longitudinal PC simulation, with a car that really steers."""
+
+from math import cos, sin
+
+from selfdrive.car.params import CarParams
+from selfdrive.common.interp import interp
+from selfdrive.common.realtime import DT_CTRL
+from selfdrive.messages import Actuators
+from selfdrive.sim.lateral import LateralDynamics
+
+MASS = 1700.0  # kg, for the longitudinal motion
+GRAVITY = 9.81
+ROLLING_RESISTANCE = 0.01
+DRAG = 0.5 * 1.225 * 0.3  # N s^2/m^2
+PEAK_FORCE = 3.0 * MASS
+PEAK_POWER = 100_000.0  # W
+GAS_SLOPE = 3.33  # of the pedal's full travel
+BRAKE_FORCE = 10.0 * MASS
+BRAKE_SLOPE = 0.3
+BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s, above which power limits, not force
+CREEP_BP = (0.0, 1.5)  # m/s
+CREEP_V = (1.0, 0.0)  # m/s^2 that an idling automatic gearbox gives
+
+
+def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
+    """Longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
+    if speed < BASE_SPEED:
+        force = gas * PEAK_FORCE * GAS_SLOPE
+    else:
+        force = gas * PEAK_POWER / speed * GAS_SLOPE
+    force -= brake * BRAKE_FORCE * BRAKE_SLOPE
+    force -= ROLLING_RESISTANCE * MASS * GRAVITY + DRAG * speed * speed
+    force += (interp(speed, CREEP_BP, CREEP_V) - grade) * MASS
+    return force / MASS
+
+
+class Plant:
+    """The host car. `speed` never falls below 0; `position` is counted along the road."""
+
+    def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
+        self.speed = speed
+        self.acceleration = 0.0
+        self.position = 0.0
+        self.lateral = LateralDynamics(car, offset)
+
+    def step(self, actuators: Actuators, grade: float, curvature: float) -> None:
+        """Advance 10 ms by Euler's method: position with the old speed, then the new speed."""
+        old, lateral = self.speed, self.lateral
+        heading = lateral.heading
+        along = old * cos(heading) - lateral.lateral_speed * sin(heading)
+        self.position += DT_CTRL * along / (1.0 - curvature * lateral.offset)
+        lateral.step(actuators.steer, old, curvature)
+        self.acceleration = acceleration(old, actuators.gas, actuators.brake, grade)
+        self.speed = old + DT_CTRL * self.acceleration
+        if self.speed <= 0.0:
+            self.speed = self.acceleration = 0.0

@@ -1,0 +1,58 @@
+"""The forward radar: one track, 20 times a second, in the resolution and range of its CAN frames."""
+
+from math import isfinite, sin
+
+from selfdrive.can.dbc import load
+from selfdrive.can.packer import Packer
+from selfdrive.car.honda.values import RADAR_BUS, RADAR_DBC, RADAR_GOOD
+from selfdrive.common.interp import clip
+from selfdrive.messages import CanFrame
+from selfdrive.sim.road import Road
+from selfdrive.sim.truth import GroundTruth
+
+DISTANCE_COUNTS = 16.0  # per m
+SPEED_COUNTS = 32.0  # per m/s
+LATERAL_COUNTS = 16.0  # per m
+WIDEST = 31.0  # m to a side, what the lateral field holds
+
+
+class RadarSensor:
+    """Measures the vehicle ahead and reports it on the radar bus."""
+
+    def __init__(self, road: Road) -> None:
+        self._road = road
+        messages = load(RADAR_DBC)
+        self._state = Packer(messages["RADAR_DIAGNOSTIC"], ("RADAR_STATE",), RADAR_BUS)
+        self._track = messages["TRACK_15"]
+
+    def measure(self, truth: GroundTruth) -> list[CanFrame]:
+        """State and track frame of one cycle.
+
+        The counts are cut off towards zero and wrap around: a distance of 256 m reads 0. That is
+        the original's arithmetic, kept because an error of measurement can reach it.
+        """
+        d_rel = truth.d_rel
+        v_rel = truth.v_lead - truth.v_ego
+        y_rel = self._road.sideways(truth.position, truth.d_rel)
+        y_rel -= truth.lateral_offset + sin(truth.heading) * truth.d_rel
+        frames: list[CanFrame] = []
+        frames.extend(self._pack(max(d_rel, 0.0), v_rel, y_rel))
+        return frames
+
+    def _pack(self, d_rel: float, v_rel: float, y_rel: float) -> tuple[CanFrame, ...]:
+        counts = {
+            "LONG_DIST": _counts(d_rel, DISTANCE_COUNTS),
+            "REL_SPEED": _counts(v_rel, SPEED_COUNTS),
+            "LAT_DIST": _counts(clip(-y_rel, -WIDEST, WIDEST), LATERAL_COUNTS),
+        }
+        word = 0
+        for name, raw in counts.items():
+            field = self._track.fields[name]
+            word |= (raw & field.mask) << field.shift
+        track = CanFrame(self._track.address, word.to_bytes(self._track.size, "big"), RADAR_BUS)
+        return self._state.pack((RADAR_GOOD,)), track
+
+
+def _counts(value: float, per_unit: float) -> int:
+    """Cut off towards zero; what is not finite reads 0."""
+    return int(value * per_unit) if isfinite(value) else 0

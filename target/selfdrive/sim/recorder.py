@@ -1,0 +1,81 @@
+"""Keeps what happens in a run, one row of channels for each step, and the alerts."""
+
+from array import array
+
+import numpy as np
+
+from selfdrive.messages import Actuators, ControlsState, LeadData, Plan
+from selfdrive.sim.truth import GroundTruth
+
+# Alerts that count as the driver being warned, in the order of their bits in channel `alert`.
+COUNTED_ALERTS = ("steer_saturated", "fcw", "can_error", "radar_error", "model_error")
+PLAN_SOURCES = ("cruise", "mpc1", "mpc2")
+LONG_STATES = ("off", "pid", "stopping", "starting")
+
+# Ground truth and actuators, then what the controller perceives and wants. SI units, radians.
+CHANNELS = (
+    *("t", "v_ego", "a_ego", "d_rel", "v_rel", "v_lead", "hwt"),
+    *("gas", "brake", "steer_torque", "steer_angle", "lateral_offset", "heading"),
+    *("lead_status", "lead_d_rel", "lead_v_rel", "lead_v_lead_k", "lead_a_lead_k"),
+    *("v_ego_est", "a_ego_est", "v_cruise", "v_pid", "v_target", "a_target", "angle_desired"),
+    *("plan_source", "long_state", "engaged", "alert"),
+)
+INTEGER_CHANNELS = ("lead_status", "plan_source", "long_state", "engaged", "alert")
+
+_NO_LEAD = LeadData()
+
+
+class Recorder:
+    """Rows of `CHANNELS` and the alerts raised. Row k is the state after step k."""
+
+    def __init__(self) -> None:
+        self.alerts: list[tuple[str, float]] = []  # every time one is raised
+        self.engaged_from: float | None = None
+        self.engaged_to: float | None = None
+        self._rows = array("d")
+        self._shown: tuple[str, ...] = ()
+        self._alert_bits = 0
+
+    def append(
+        self,
+        truth: GroundTruth,
+        actuators: Actuators,
+        state: ControlsState,
+        plan: Plan,
+        lead: LeadData | None,
+    ) -> None:
+        """Add one row: the world, the commands it has felt, and the controller's newest messages."""
+        t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead
+        if state.alerts != self._shown:
+            self._note_alerts(state.alerts, t)
+        if state.enabled:
+            self.engaged_to = t
+            if self.engaged_from is None:
+                self.engaged_from = t
+        lead = lead or _NO_LEAD
+        self._rows.extend(
+            (
+                *(t, v_ego, truth.a_ego, d_rel, v_lead - v_ego, v_lead),
+                d_rel / v_ego if v_ego > 0.0 else float("inf"),
+                *(actuators.gas, actuators.brake, actuators.steer),
+                *(truth.steer_angle, truth.lateral_offset, truth.heading),
+                *(lead.status, lead.d_rel, lead.v_rel, lead.v_lead_k, lead.a_lead_k),
+                *(state.v_ego, state.a_ego, state.v_cruise, state.v_pid),
+                *(plan.v_target, plan.a_target, state.angle_desired),
+                *(PLAN_SOURCES.index(plan.source), LONG_STATES.index(state.long_state)),
+                *(state.enabled, self._alert_bits),
+            )
+        )
+
+    def trace(self) -> dict[str, np.ndarray]:
+        """Every channel's array."""
+        table = np.array(self._rows).reshape(-1, len(CHANNELS)).T
+        return {
+            name: column.astype(np.int32 if name in INTEGER_CHANNELS else np.float64)
+            for name, column in zip(CHANNELS, table, strict=True)
+        }
+
+    def _note_alerts(self, shown: tuple[str, ...], t: float) -> None:
+        self.alerts += [(name, t) for name in COUNTED_ALERTS if name in shown and name not in self._shown]
+        self._alert_bits = sum(1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in shown)
+        self._shown = shown

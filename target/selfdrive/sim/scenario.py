@@ -1,0 +1,198 @@
+"""Scenarios: what the host, the lead, the driver and the road do. Read from YAML, in SI units inside."""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from selfdrive.car.honda.values import CruiseButton
+from selfdrive.common.conversions import KPH_TO_MS, MPH_TO_MS
+from selfdrive.common.errors import ConfigError
+from selfdrive.common.realtime import DT_CTRL
+from selfdrive.sim.road import Table
+from selfdrive.sim.yaml_section import Section, read_yaml
+
+SCHEMA = "scenario/1"
+BUTTONS = {
+    "cancel": CruiseButton.CANCEL,
+    "decel_set": CruiseButton.DECEL_SET,
+    "res_accel": CruiseButton.RES_ACCEL,
+}
+SPEED_UNITS = {"mps": 1.0, "kph": KPH_TO_MS, "mph": MPH_TO_MS}
+
+_FASTEST = 400.0  # in any speed unit
+_LONGEST = 600.0  # s
+_FARTHEST = 1e5  # m
+
+_SPEED_KEYS = {f"speed_{unit}": f"a speed in {unit}" for unit in SPEED_UNITS}
+_KEYS = {
+    "schema": f"the format of this file, {SCHEMA}",
+    "name": "the scenario's short name",
+    "title": "one line on what happens",
+    "duration_s": "the length of the run in seconds, a whole number of 10 ms steps",
+    "host": "the controlled car at the start",
+    "lead": "the vehicle ahead; left out: a free road",
+    "buttons": "cruise buttons the driver presses",
+    "road": "grade and curvature; left out: flat and straight",
+}
+_HOST_KEYS = {**_SPEED_KEYS, "lateral_offset_m": "the distance from the lane's middle in m, left positive"}
+_LEAD_KEYS = {
+    "gap_m": "the distance to the lead's rear in m at the start",
+    **_SPEED_KEYS,
+    "at_s": "the times of the speeds in seconds",
+}
+_BUTTON_KEYS = {
+    "button": f"one of {', '.join(BUTTONS)}",
+    "press_s": "when it goes down, in seconds",
+    "release_s": "when it comes up, in seconds",
+}
+_ROAD_KEYS = {"grade": "slope over time", "curvature": "bends over distance"}
+_GRADE_KEYS = {
+    "at_s": "times in seconds",
+    "mps2": "what the slope takes from the acceleration, uphill positive",
+}
+_CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature in 1/m, left positive"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lead:
+    """The lead's gap (m) at the start, and its speeds (m/s) at times (s), linear in between."""
+
+    gap: float
+    times: tuple[float, ...]
+    speeds: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ButtonPress:
+    """A cruise button held down from step `press` until step `release`."""
+
+    code: int
+    press: int
+    release: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """A scenario in SI units. `lead` None is a free road; `digest` is the file's SHA-256."""
+
+    name: str
+    title: str
+    digest: str
+    steps: int
+    speed: float  # m/s, of the host
+    lateral_offset: float  # m
+    lead: Lead | None
+    buttons: tuple[ButtonPress, ...]
+    grade: Table | None
+    curvature: Table | None
+
+    def button(self, frame: int) -> int:
+        """The cruise button held down in step `frame`."""
+        for press in self.buttons:
+            if press.press <= frame < press.release:
+                return press.code
+        return CruiseButton.NONE
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario file. Raises ConfigError for anything a user can mend."""
+    try:
+        data = path.read_bytes()
+        text = data.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise ConfigError(
+            f"{reason}", where=str(path), expected="a readable scenario file", remedy="check the path"
+        ) from None
+    return parse_scenario(text, str(path), sha256(data).hexdigest())
+
+
+def parse_scenario(text: str, where: str, digest: str) -> Scenario:
+    """The scenario in `text`; `where` names its source in errors."""
+    root = read_yaml(text, where, _KEYS)
+    root.text("schema", (SCHEMA,))
+    duration = root.number("duration_s", DT_CTRL, _LONGEST)
+    root.check("duration_s", _is_whole(duration), "a multiple of 0.01", "a step is 10 ms")
+    host = root.section("host", _HOST_KEYS)
+    grade, curvature = _road(root)
+    return Scenario(
+        name=root.text("name"),
+        title=root.text("title"),
+        digest=digest,
+        steps=_frame(duration),
+        speed=_host_speed(host),
+        lateral_offset=host.number("lateral_offset_m", -10.0, 10.0, default=0.0),
+        lead=_lead(root.section("lead", _LEAD_KEYS)) if "lead" in root else None,
+        buttons=_buttons(root) if "buttons" in root else (),
+        grade=grade,
+        curvature=curvature,
+    )
+
+
+def _host_speed(section: Section) -> float:
+    key = section.quantity("speed", tuple(SPEED_UNITS))
+    return section.number(key, 0.0, _FASTEST) * SPEED_UNITS[key.removeprefix("speed_")]
+
+
+def _lead(section: Section) -> Lead:
+    key = section.quantity("speed", tuple(SPEED_UNITS))
+    factor = SPEED_UNITS[key.removeprefix("speed_")]
+    if section.is_list(key):
+        speeds = section.numbers(key, 0.0, _FASTEST)
+        times = section.ascending("at_s", 0.0, _LONGEST)
+        section.check(
+            "at_s", len(times) == len(speeds), f"{len(speeds)} times, one a speed", "make them equal"
+        )
+    else:
+        speeds, times = (section.number(key, 0.0, _FASTEST),), (0.0,)
+        if "at_s" in section:
+            section.check("at_s", False, "no times for a single speed", "remove it, or give a list of speeds")
+    gap = section.number("gap_m", 0.0, _FARTHEST)
+    return Lead(gap=gap, times=times, speeds=tuple(speed * factor for speed in speeds))
+
+
+def _buttons(root: Section) -> tuple[ButtonPress, ...]:
+    presses: list[ButtonPress] = []
+    for section in root.sections("buttons", _BUTTON_KEYS):
+        press = _frame(section.number("press_s", 0.0, _LONGEST))
+        release = _frame(section.number("release_s", 0.0, _LONGEST))
+        section.check("release_s", release > press, "a time after press_s", "let go after pressing")
+        if presses:
+            ready = press >= presses[-1].release
+            section.check("press_s", ready, "a time after the last release", "one button at a time, in order")
+        presses.append(
+            ButtonPress(code=BUTTONS[section.text("button", tuple(BUTTONS))], press=press, release=release)
+        )
+    return tuple(presses)
+
+
+def _road(root: Section) -> tuple[Table | None, Table | None]:
+    if "road" not in root:
+        return None, None
+    road = root.section("road", _ROAD_KEYS)
+    grade = curvature = None
+    if "grade" in road:
+        section = road.section("grade", _GRADE_KEYS)
+        grade = _table(
+            section, "at_s", section.ascending("at_s", 0.0, _LONGEST), section.numbers("mps2", -5.0, 5.0)
+        )
+    if "curvature" in road:
+        section = road.section("curvature", _CURVATURE_KEYS)
+        places = section.ascending("at_m", 0.0, _FARTHEST)
+        curvature = _table(section, "at_m", places, section.numbers("per_m", -0.05, 0.05))
+    return grade, curvature
+
+
+def _table(section: Section, key: str, at: tuple[float, ...], values: tuple[float, ...]) -> Table:
+    section.check(
+        key, len(at) == len(values), f"{len(values)} numbers, one a value", "make the lists equally long"
+    )
+    return at, values
+
+
+def _frame(t: float) -> int:
+    return round(t / DT_CTRL)
+
+
+def _is_whole(t: float) -> bool:
+    return abs(t / DT_CTRL - _frame(t)) < 1e-6

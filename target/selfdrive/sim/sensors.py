@@ -1,0 +1,72 @@
+"""The car's own sensors and switches: what its control units put on the car bus."""
+
+from selfdrive.can.dbc import load
+from selfdrive.can.packer import Packer
+from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, GEAR_CODES
+from selfdrive.common.conversions import MS_TO_KPH, RAD_TO_DEG
+from selfdrive.messages import CanFrame
+from selfdrive.sim.truth import GroundTruth
+
+STANDSTILL_SPEED = 0.3  # m/s; below it the sensors read 0
+
+# Signals with a constant value, by period in steps: a closed, belted car in drive, its main switch on.
+_CONSTANT = {
+    1: {
+        "STEER_STATUS": {"STEER_TORQUE_SENSOR": 0, "STEER_STATUS": 0},
+        "POWERTRAIN_DATA": {"PEDAL_GAS": 0, "BRAKE_SWITCH": 0, "BRAKE_PRESSED": 0},
+    },
+    2: {
+        "GEARBOX": {"GEAR_SHIFTER": GEAR_CODES["drive"]},
+        "VSA_STATUS": {"ESP_DISABLED": 0, "BRAKE_HOLD_ACTIVE": 0},
+    },
+    10: {
+        "EPB_STATUS": {"EPB_STATE": 0},
+        "SCM_FEEDBACK": {"MAIN_ON": 1, "LEFT_BLINKER": 0, "RIGHT_BLINKER": 0},
+        "SEATBELT_STATUS": {"SEATBELT_DRIVER_LAMP": 0, "SEATBELT_DRIVER_LATCHED": 1},
+        "CRUISE": {"CRUISE_SPEED_PCM": 0},
+        "DOORS_STATUS": {"DOOR_OPEN_FL": 0, "DOOR_OPEN_FR": 0, "DOOR_OPEN_RL": 0, "DOOR_OPEN_RR": 0},
+    },
+}
+_COUNTERS = 4  # a two-bit counter makes a constant message one of four frames
+_BRAKES_EVERY = 2  # steps
+
+
+class CarSensors:
+    """Makes the car's frames of each 10 ms step, with running counters."""
+
+    def __init__(self) -> None:
+        messages = load(CAR_DBC)
+        self._gearbox_speed = Packer(messages["ENGINE_DATA"], ("XMISSION_SPEED",), CAR_BUS)
+        wheels = [f"WHEEL_SPEED_{corner}" for corner in ("FL", "FR", "RL", "RR")]
+        self._wheel_speeds = Packer(messages["WHEEL_SPEEDS"], wheels, CAR_BUS)
+        self._steering = Packer(messages["STEERING_SENSORS"], ("STEER_ANGLE", "STEER_ANGLE_RATE"), CAR_BUS)
+        self._standstill = Packer(messages["STANDSTILL"], ("WHEELS_MOVING",), CAR_BUS)
+        self._buttons = Packer(messages["SCM_BUTTONS"], ("CRUISE_BUTTONS",), CAR_BUS)
+        self._constant = [(period, _constant_frames(names)) for period, names in _CONSTANT.items()]
+
+    def measure(self, truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
+        """All frames of step `frame`; `button` is the cruise button held down (CruiseButton)."""
+        speed = truth.v_ego if truth.v_ego >= STANDSTILL_SPEED else 0.0
+        speed_kph = speed * MS_TO_KPH
+        steer_angle = truth.steer_angle
+        steer_angle_deg = steer_angle * RAD_TO_DEG
+        steer_rate_deg = truth.steer_rate * RAD_TO_DEG
+        frames = [
+            self._gearbox_speed.pack((speed_kph,), frame),
+            self._wheel_speeds.pack((speed_kph, speed_kph, speed_kph, speed_kph)),
+            self._steering.pack((steer_angle_deg, steer_rate_deg), frame),
+            self._buttons.pack((button,), frame),
+        ]
+        if frame % _BRAKES_EVERY == 0:
+            frames.append(self._standstill.pack((speed > 0.0,), frame // _BRAKES_EVERY))
+        for period, by_counter in self._constant:
+            if frame % period == 0:
+                frames += by_counter[frame // period % _COUNTERS]
+        return frames
+
+
+def _constant_frames(values: dict[str, dict[str, int]]) -> list[list[CanFrame]]:
+    """The frames of constant messages for each value of the counter."""
+    messages = load(CAR_DBC)
+    packers = [(Packer(messages[name], tuple(v), CAR_BUS), tuple(v.values())) for name, v in values.items()]
+    return [[packer.pack(v, counter) for packer, v in packers] for counter in range(_COUNTERS)]

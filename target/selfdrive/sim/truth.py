@@ -1,0 +1,19 @@
+"""What is true in the simulated world, whatever the sensors say."""
+
+from typing import NamedTuple
+
+
+class GroundTruth(NamedTuple):
+    """The world after the plant's step that began at `t`. SI units, radians, left positive."""
+
+    t: float  # s
+    d_rel: float  # m, bumper to bumper; 200 on a free road
+    v_ego: float  # m/s
+    v_lead: float  # m/s; the host's own on a free road
+    a_ego: float  # m/s^2
+    lateral_offset: float  # m from the middle of the lane
+    heading: float  # rad relative to the road
+    steer_angle: float  # rad at the steering wheel
+    steer_rate: float  # rad/s
+    position: float  # m along the road
+    free_road: bool  # no lead vehicle

@@ -1,0 +1,144 @@
+"""Strict reading of YAML: every key known and given once, every number in range, errors with their line."""
+
+from difflib import get_close_matches
+from math import isfinite
+from typing import NoReturn
+
+import yaml
+
+from selfdrive.common.errors import ConfigError
+
+_NUMBERS = {"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"}
+
+
+def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
+    """The mapping a document consists of. Raises ConfigError if it is not YAML, or not one mapping."""
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        raise ConfigError(
+            f"{getattr(error, 'problem', None) or 'unreadable text'}",
+            where=where,
+            line=None if mark is None else mark.line + 1,
+            expected="valid YAML",
+            remedy="mend the syntax",
+        ) from None
+    if node is None:
+        raise ConfigError(
+            "an empty file", where=where, line=1, expected="a mapping", remedy="write the keys of a scenario"
+        )
+    return Section(node, where, keys)
+
+
+class Section:
+    """One mapping of the document. `keys` names what may stand in it, each with what it means."""
+
+    def __init__(self, node: yaml.Node, where: str, keys: dict[str, str]) -> None:
+        self._where = where
+        self._keys = keys
+        self._nodes: dict[str, yaml.Node] = {}
+        self.line = node.start_mark.line + 1
+        if not isinstance(node, yaml.MappingNode):
+            self._fail(node, _shown(node), "a mapping", f"give the keys {', '.join(keys)}")
+        for key, value in node.value:
+            name = key.value if isinstance(key, yaml.ScalarNode) else _shown(key)
+            if name not in keys:
+                near = get_close_matches(name, keys, n=1)
+                remedy = f"did you mean {near[0]!r}?" if near else "remove it"
+                self._fail(key, f"unknown key {name!r}", f"one of {', '.join(keys)}", remedy)
+            if name in self._nodes:
+                self._fail(key, f"key {name!r} a second time", "each key once", "remove one of them")
+            self._nodes[name] = value
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._nodes
+
+    def text(self, key: str, allowed: tuple[str, ...] = ()) -> str:
+        """A string, one of `allowed` if that is not empty."""
+        node = self._node(key)
+        good = isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:str" and node.value
+        if not good or (allowed and node.value not in allowed):
+            expected = f"one of {', '.join(allowed)}" if allowed else "a text"
+            self._fail(node, f"{key}: {_shown(node)}", expected, f"{key} is {self._keys[key]}")
+        return node.value
+
+    def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
+        """A finite number in `low`..`high`."""
+        if default is not None and key not in self:
+            return default
+        return self._number(self._node(key), key, low, high)
+
+    def numbers(self, key: str, low: float, high: float) -> tuple[float, ...]:
+        """A list of finite numbers in `low`..`high`, at least one."""
+        return tuple(self._number(item, key, low, high) for item in self._items(key))
+
+    def ascending(self, key: str, low: float, high: float) -> tuple[float, ...]:
+        """As `numbers`, each greater than the one before."""
+        values = self.numbers(key, low, high)
+        for item, before, value in zip(self._items(key)[1:], values, values[1:], strict=False):
+            if value <= before:
+                self._fail(
+                    item, f"{key}: {value:g} after {before:g}", "ascending numbers", "put them in order"
+                )
+        return values
+
+    def quantity(self, name: str, units: tuple[str, ...]) -> str:
+        """The key that gives `name` in one of `units`; exactly one of them must be there."""
+        found = [key for unit in units if (key := f"{name}_{unit}") in self]
+        if len(found) != 1:
+            names = [f"{name}_{unit}" for unit in units]
+            got = " and ".join(found) if found else f"no {name}"
+            self.fail(got, f"exactly one of {', '.join(names)}", "the unit stands in the key's name")
+        return found[0]
+
+    def is_list(self, key: str) -> bool:
+        """Whether the key's value is a list."""
+        return isinstance(self._node(key), yaml.SequenceNode)
+
+    def section(self, key: str, keys: dict[str, str]) -> "Section":
+        """The mapping under `key`."""
+        return Section(self._node(key), self._where, keys)
+
+    def sections(self, key: str, keys: dict[str, str]) -> list["Section"]:
+        """The list of mappings under `key`."""
+        return [Section(item, self._where, keys) for item in self._items(key)]
+
+    def check(self, key: str, good: bool, expected: str, remedy: str) -> None:
+        """Refuse the value of `key` unless it is `good`."""
+        if not good:
+            node = self._node(key)
+            self._fail(node, f"{key}: {_shown(node)}", expected, remedy)
+
+    def fail(self, got: str, expected: str, remedy: str) -> NoReturn:
+        """Raise ConfigError at the section's own line."""
+        raise ConfigError(got, where=self._where, line=self.line, expected=expected, remedy=remedy)
+
+    def _node(self, key: str) -> yaml.Node:
+        if key not in self._nodes:
+            self.fail(f"no {key!r}", f"the key {key!r}", f"add it: {self._keys[key]}")
+        return self._nodes[key]
+
+    def _items(self, key: str) -> list[yaml.Node]:
+        node = self._node(key)
+        if not isinstance(node, yaml.SequenceNode) or not node.value:
+            self._fail(node, f"{key}: {_shown(node)}", "a list", "write it as [a, b, ...]")
+        return node.value
+
+    def _number(self, node: yaml.Node, key: str, low: float, high: float) -> float:
+        value = yaml.SafeLoader("").construct_object(node) if node.tag in _NUMBERS else None
+        if value is None or not isfinite(value) or not low <= value <= high:
+            expected = f"a number from {low:g} to {high:g}"
+            self._fail(node, f"{key}: {_shown(node)}", expected, f"{key} is {self._keys[key]}")
+        return float(value)
+
+    def _fail(self, node: yaml.Node, got: str, expected: str, remedy: str) -> NoReturn:
+        line = node.start_mark.line + 1
+        raise ConfigError(got, where=self._where, line=line, expected=expected, remedy=remedy)
+
+
+def _shown(node: yaml.Node) -> str:
+    """The node's value for a message, shortened."""
+    if isinstance(node, yaml.ScalarNode):
+        return repr(node.value)[:60]
+    return "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
