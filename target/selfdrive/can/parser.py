@@ -92,7 +92,7 @@ class CanParser:
                 self.values[state.name] = decode(state.fields, word)
                 updated.append(state.name)
         self.updated = updated
-        self.valid = all([t - state.seen <= state.timeout for state in states.values()])
+        self.valid = all(t - state.seen <= state.timeout for state in states.values())
 
 
 def decode(fields: Sequence[Field], word: int) -> tuple[float, ...]:

@@ -24,10 +24,7 @@ CREEP_V = (1.0, 0.0)  # m/s^2 that an idling automatic gearbox gives
 
 def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
     """Longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
-    if speed < BASE_SPEED:
-        force = gas * PEAK_FORCE * GAS_SLOPE
-    else:
-        force = gas * PEAK_POWER / speed * GAS_SLOPE
+    force = gas * GAS_SLOPE * (PEAK_FORCE if speed < BASE_SPEED else PEAK_POWER / speed)
     force -= brake * BRAKE_FORCE * BRAKE_SLOPE
     force -= ROLLING_RESISTANCE * MASS * GRAVITY + DRAG * speed * speed
     force += (interp(speed, CREEP_BP, CREEP_V) - grade) * MASS

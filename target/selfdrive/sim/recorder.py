@@ -4,7 +4,8 @@ from array import array
 
 import numpy as np
 
-from selfdrive.messages import Actuators, ControlsState, LeadData, Plan
+from selfdrive.manager import Manager
+from selfdrive.messages import Actuators, LeadData
 from selfdrive.sim.truth import GroundTruth
 
 # Alerts that count as the driver being warned, in the order of their bits in channel `alert`.
@@ -36,15 +37,10 @@ class Recorder:
         self._shown: tuple[str, ...] = ()
         self._alert_bits = 0
 
-    def append(
-        self,
-        truth: GroundTruth,
-        actuators: Actuators,
-        state: ControlsState,
-        plan: Plan,
-        lead: LeadData | None,
-    ) -> None:
+    def append(self, truth: GroundTruth, actuators: Actuators, manager: Manager) -> None:
         """Add one row: the world, the commands it has felt, and the controller's newest messages."""
+        state, plan, radar_state = manager.controlsd.state, manager.controlsd.plan, manager.radar_state
+        lead = radar_state.lead_one if radar_state else _NO_LEAD
         t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead
         if state.alerts != self._shown:
             self._note_alerts(state.alerts, t)
@@ -52,7 +48,6 @@ class Recorder:
             self.engaged_to = t
             if self.engaged_from is None:
                 self.engaged_from = t
-        lead = lead or _NO_LEAD
         self._rows.extend(
             (
                 *(t, v_ego, truth.a_ego, d_rel, v_lead - v_ego, v_lead),

@@ -8,7 +8,7 @@ Table = tuple[Sequence[float], Sequence[float]]
 
 
 class Road:
-    """Grade in m/s^2 (uphill positive) as a table over time, curvature in 1/m (left positive) over distance."""
+    """Grade (m/s^2, uphill positive) as a table over time, curvature (1/m, left positive) over distance."""
 
     def __init__(self, grade: Table | None, curvature: Table | None) -> None:
         self._grade, self._curvature = grade, curvature

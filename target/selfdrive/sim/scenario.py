@@ -48,7 +48,7 @@ _BUTTON_KEYS = {
 _ROAD_KEYS = {"grade": "slope over time", "curvature": "bends over distance"}
 _GRADE_KEYS = {
     "at_s": "times in seconds",
-    "mps2": "what the slope takes from the acceleration, uphill positive",
+    "mps2": "deceleration by the slope, uphill positive",
 }
 _CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature in 1/m, left positive"}
 
@@ -140,9 +140,7 @@ def _lead(section: Section) -> Lead:
     if section.is_list(key):
         speeds = section.numbers(key, 0.0, _FASTEST)
         times = section.ascending("at_s", 0.0, _LONGEST)
-        section.check(
-            "at_s", len(times) == len(speeds), f"{len(speeds)} times, one a speed", "make them equal"
-        )
+        section.check("at_s", len(times) == len(speeds), f"{len(speeds)} times", "give one for each speed")
     else:
         speeds, times = (section.number(key, 0.0, _FASTEST),), (0.0,)
         if "at_s" in section:
@@ -184,9 +182,7 @@ def _road(root: Section) -> tuple[Table | None, Table | None]:
 
 
 def _table(section: Section, key: str, at: tuple[float, ...], values: tuple[float, ...]) -> Table:
-    section.check(
-        key, len(at) == len(values), f"{len(values)} numbers, one a value", "make the lists equally long"
-    )
+    section.check(key, len(at) == len(values), f"{len(values)} numbers", "give one for each value")
     return at, values
 
 

@@ -75,7 +75,7 @@ class Simulator:
         frames: list[CanFrame] = []
         frames.extend(measured)
         sent = self.manager.step(t, frames, view)
-        self._record(truth)
+        self.recorder.append(truth, self._actuators, self.manager)
         self._actuators = self._receiver.update(sent, t)
         self.frame += 1
 
@@ -122,8 +122,3 @@ class Simulator:
             position=plant.position,
             free_road=lead is None,
         )
-
-    def _record(self, truth: GroundTruth) -> None:
-        controlsd, radar_state = self.manager.controlsd, self.manager.radar_state
-        lead = radar_state.lead_one if radar_state else None
-        self.recorder.append(truth, self._actuators, controlsd.state, controlsd.plan, lead)

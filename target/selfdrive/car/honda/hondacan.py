@@ -30,11 +30,11 @@ class CommandPacker:
         return self._steering.pack((torque, active), counter)
 
     def brake(
-        self, counts: int, override: bool, cancel: bool, fcw: bool, chime: bool, counter: int
+        self, counts: int, override: bool, cancel: bool, warning: bool, chime: bool, counter: int
     ) -> CanFrame:
         """Brake in counts of 1/256. `override` keeps the car's own cruise control off the pedals."""
         braking = counts > 0
-        values = (counts / BRAKE_COUNTS, braking, braking, braking, override, cancel, 2 if fcw else 0, chime)
+        values = (counts / BRAKE_COUNTS, braking, braking, braking, override, cancel, 2 * warning, chime)
         return self._brake.pack(values, counter)
 
     def gas(self, counts: int, counter: int) -> CanFrame:
