@@ -1,0 +1,36 @@
+"""Filters against numbers measured on the original."""
+
+import pytest
+from selfdrive.common.kalman import DistanceFilter, SteadyKalman
+
+
+def test_speed_estimate_starts_as_the_original() -> None:
+    """Started at 0 with the car at 26.797 m/s, steps 3 and 4 give what the original gives."""
+    speed = SteadyKalman(0.0, 0.0, dt=0.01, gains=(0.12287673, 0.29666309))
+    values = []
+    for _ in range(4):
+        speed.update(26.797)
+        values.append(speed.value)
+    assert values[2:] == pytest.approx([8.9334, 11.338], abs=1e-3)
+    assert speed.rate == pytest.approx(26.314, abs=1e-2)
+
+
+def test_distance_filter_learns_the_rate() -> None:
+    """A distance that shrinks by 10 m/s is followed with that rate after a few seconds."""
+    lead = DistanceFilter(variance=1e2, q_distance=0.5, q_rate=1.0)
+    lead.restart(80.0, 0.01, 1e2)
+    for k in range(100):
+        lead.update(80.0 - 0.5 * k, 0.01)
+        lead.predict(0.05)
+    assert lead.rate == pytest.approx(-10.0, abs=0.05)
+    assert lead.value == pytest.approx(30.0, abs=0.1)
+
+
+def test_distance_filter_restart_forgets_the_rate() -> None:
+    """After a restart the filter is at the given distance with no rate."""
+    lead = DistanceFilter(variance=1e2, q_distance=0.5, q_rate=1.0)
+    lead.update(50.0, 1.0)
+    lead.predict(0.05)
+    lead.update(49.0, 1.0)
+    lead.restart(30.0, 0.01, 1e2)
+    assert (lead.value, lead.rate, lead.p01) == (30.0, 0.0, 0.0)

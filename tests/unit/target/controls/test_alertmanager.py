@@ -1,0 +1,83 @@
+"""Priorities and durations of alerts."""
+
+import pytest
+from selfdrive.controls.lib.alertmanager import AlertManager
+from selfdrive.controls.lib.alerts import ALERTS, HIGH, LOW, LOWEST, MID
+
+
+def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
+    """As measured: the start-up text shows for 15 s, but not during the 0.2 s of engaging at 1.31."""
+    alerts = AlertManager()
+    alerts.add("startup", 0.12)
+    shown = {}
+    for k in range(12, 1520):
+        t = k * 0.01
+        if k == 131:
+            alerts.add("enable", t)
+        alerts.process(t)
+        shown[k] = alerts.text1 != ""
+    assert shown[130] and not shown[131] and not shown[150] and shown[152]
+    assert shown[1511] and not shown[1513]
+
+
+def test_higher_priority_is_shown_and_all_are_listed() -> None:
+    """The most urgent alert is shown; the list has all, most urgent first."""
+    alerts = AlertManager()
+    alerts.add("steer_saturated", 1.0)
+    alerts.add("fcw", 1.0)
+    alerts.process(1.0)
+    assert alerts.active == ("fcw", "steer_saturated")
+    assert (alerts.visual, alerts.audible) == ("fcw", "chime_repeated")
+    alerts.process(3.0)
+    assert alerts.active == ("steer_saturated",)
+
+
+def test_sound_picture_and_text_end_one_after_the_other() -> None:
+    """Steer saturated: sound for 1 s, picture for 2 s, text for 3 s."""
+    alerts = AlertManager()
+    alerts.add("steer_saturated", 0.0)
+    alerts.process(0.5)
+    assert alerts.audible == "chime_single"
+    alerts.process(1.5)
+    assert (alerts.audible, alerts.visual) == ("none", "steer_required")
+    alerts.process(2.5)
+    assert (alerts.visual, alerts.text1) == ("none", ALERTS["steer_saturated"].text1)
+    alerts.process(3.0)
+    assert (alerts.active, alerts.text1) == ((), "")
+
+
+def test_raising_again_prolongs() -> None:
+    """An alert that is raised every cycle lasts its duration from the last time."""
+    alerts = AlertManager()
+    for k in range(100):
+        alerts.add("steer_saturated", k * 0.01)
+        alerts.process(k * 0.01)
+    alerts.process(3.5)
+    assert alerts.active == ("steer_saturated",)
+
+
+def test_unknown_alert_is_an_error() -> None:
+    """A name without an alert is refused when it is raised."""
+    with pytest.raises(KeyError, match="no alert is named 'nonsense'"):
+        AlertManager().add("nonsense", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "priority", "duration"),
+    [
+        ("startup", LOWEST, 15.0),
+        ("enable", MID, 0.2),
+        ("fcw", HIGH, 2.0),
+        ("steer_saturated", LOW, 3.0),
+        ("can_error", HIGH, 4.0),
+        ("radar_error", HIGH, 4.0),
+        ("model_error", HIGH, 4.0),
+        ("wrong_gear", MID, 3.0),
+        ("can_error_no_entry", LOW, 3.0),
+        ("steer_unavailable_permanent", LOWEST, 0.2),
+        ("driver_distracted", MID, 0.1),
+    ],
+)
+def test_priority_and_duration(name: str, priority: int, duration: float) -> None:
+    """Priorities and durations are the original's."""
+    assert (ALERTS[name].priority, ALERTS[name].duration) == (priority, duration)

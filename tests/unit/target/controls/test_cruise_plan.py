@@ -1,0 +1,54 @@
+"""Limits of cruising."""
+
+import pytest
+from selfdrive.controls.lib.cruise_plan import cruise_limits, is_following
+from selfdrive.messages import LeadData
+
+
+@pytest.mark.parametrize(
+    ("v_ego", "following", "a_min", "a_max"),
+    [
+        (0.0, False, -1.0, 1.0),
+        (5.0, False, -0.8, 1.0),
+        (20.0, False, -0.5, 0.5),
+        (30.0, False, -0.4, 0.4),
+        (0.0, True, -1.0, 1.5),
+        (10.0, True, -0.67, 1.2),
+        (40.0, True, -0.3, 0.3),
+    ],
+)
+def test_limits_over_speed(v_ego: float, following: bool, a_min: float, a_max: float) -> None:
+    """Acceleration limits follow the tables, jerk limits equal them."""
+    limits = cruise_limits(v_ego, following, 0.0, slow_down=False)
+    assert limits == pytest.approx((a_min, a_max, a_min, a_max))
+
+
+def test_turns_leave_less_to_speed_up() -> None:
+    """At 20 m/s 1.9 m/s^2 are shared between sideways and lengthwise; jerk limits stay."""
+    limits = cruise_limits(20.0, False, 1.88, slow_down=False)
+    assert limits.a_max == pytest.approx((1.9**2 - 1.88**2) ** 0.5)
+    assert limits.j_max == pytest.approx(0.5)
+    assert cruise_limits(20.0, False, 5.0, slow_down=False).a_max == 0.0
+
+
+def test_absent_driver_slows_the_car() -> None:
+    """Without a driver no more than -0.2 m/s^2 is allowed."""
+    assert cruise_limits(20.0, True, 0.0, slow_down=True)[:2] == (-0.5, -0.2)
+
+
+LEAD = {"status": True, "d_rel": 40.0, "v_lead_k": 21.0, "a_lead_k": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({}, True),
+        ({"status": False}, False),
+        ({"d_rel": 45.0}, False),
+        ({"v_lead_k": 20.0}, False),
+        ({"a_lead_k": 0.0}, False),
+    ],
+)
+def test_following(change: dict, expected: bool) -> None:
+    """Following is a lead nearer than 45 m that is faster and gains speed."""
+    assert is_following(20.0, LeadData(**(LEAD | change))) is expected

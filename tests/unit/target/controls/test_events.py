@@ -1,0 +1,16 @@
+"""Events and their kinds."""
+
+from selfdrive.controls.lib.events import NO_ENTRY, SOFT_DISABLE, WARNING, Event, has_kind, names_of_kind
+
+EVENTS = (Event("door_open", (NO_ENTRY, SOFT_DISABLE)), Event("busy", (NO_ENTRY, WARNING)))
+
+
+def test_has_kind() -> None:
+    """A kind is found in any event, and not where none asks for it."""
+    assert has_kind(EVENTS, WARNING)
+    assert not has_kind(EVENTS[:1], WARNING)
+
+
+def test_names_of_kind_keep_their_order() -> None:
+    """Names come in order of occurrence, each event once."""
+    assert names_of_kind(EVENTS, NO_ENTRY, SOFT_DISABLE) == ["door_open", "busy"]

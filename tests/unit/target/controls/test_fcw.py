@@ -1,0 +1,87 @@
+"""Forward collision warning and its counters."""
+
+from dataclasses import replace
+
+import pytest
+from selfdrive.controls.lib.fcw import FcwChecker, time_to_collision
+from selfdrive.messages import CarState, LeadData
+
+CAR = CarState(v_ego=20.0, a_ego=0.0)
+LEAD = LeadData(status=True, d_rel=20.0, v_rel=-10.0, v_lead=10.0, v_lead_k=10.0, fcw=True)
+BRAKING = (0.0, -1.0, -2.0, -3.1, -3.1, -3.1, -3.1, -3.1, -3.1, -1.0, 0.0)
+
+
+def warnings(
+    car: CarState = CAR, lead: LeadData = LEAD, a_plan: tuple[float, ...] = BRAKING, cycles: int = 80
+) -> list[float]:
+    checker = FcwChecker()
+    return [k * 0.05 for k in range(cycles) if checker.update(k * 0.05, car, lead, a_plan)]
+
+
+def test_time_to_collision() -> None:
+    """Gap over closing speed; a braking lead shortens it; opening gaps give the maximum of 5 s."""
+    assert time_to_collision(20.0, 0.0, LEAD) == pytest.approx(2.0)
+    assert time_to_collision(20.0, 0.0, replace(LEAD, a_lead_k=-2.0)) == pytest.approx(1.7082, abs=1e-3)
+    assert time_to_collision(5.0, 0.0, LEAD) == 5.0
+
+
+def test_braking_of_a_slow_lead_counts_little() -> None:
+    """No lead is taken to stop in less than 2 s: at 1 m/s its braking counts 0.5 m/s^2 at the most."""
+    slow = replace(LEAD, v_lead=1.0)
+    assert time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-9.0)) == pytest.approx(
+        time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-0.5))
+    )
+
+
+def test_warns_when_all_counters_are_full() -> None:
+    """The counter of blinkers, three seconds, is the last to fill."""
+    assert warnings() == [pytest.approx(3.0)]
+
+
+@pytest.mark.parametrize(
+    ("car", "lead"),
+    [
+        ({"v_ego": 5.0}, {}),
+        ({"left_blinker": True}, {}),
+        ({"right_blinker": True}, {}),
+        ({"v_ego": 18.0}, {}),  # 2.5 s to collision
+        ({"v_ego": 10.0}, {"d_rel": 1.0}),
+        ({}, {"v_lead": 2.4, "d_rel": 30.0}),
+        ({}, {"y_rel": -1.0}),
+        ({}, {"v_lat": 0.4}),
+        ({}, {"fcw": False}),
+    ],
+)
+def test_each_condition_prevents_the_warning(car: dict, lead: dict) -> None:
+    """Every single condition is needed."""
+    assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == []
+
+
+@pytest.mark.parametrize(
+    ("a_plan", "a_ego", "expected"),
+    [
+        ((-2.0,) * 21, 0.0, 0),  # the threshold at 10 m/s is -2.67
+        ((-2.7,) * 21, 0.0, 1),
+        ((-2.7,) * 21, -0.5, 0),  # what the car does already does not count
+        ((0.0,) * 9 + (-2.9,) * 12, 0.0, 0),  # late
+        ((0.0,) * 9 + (-3.1,) * 12, 0.0, 1),  # late but hard
+    ],
+)
+def test_planned_braking(a_plan: tuple[float, ...], a_ego: float, expected: int) -> None:
+    """The plan must brake hard, or much harder than the car does now within 2.8 s."""
+    assert len(warnings(replace(CAR, a_ego=a_ego), a_plan=a_plan)) == expected
+
+
+def test_five_seconds_between_warnings() -> None:
+    """A warning is not repeated before 5 s have passed."""
+    times = warnings(cycles=300)
+    assert len(times) == 3 and times[1] - times[0] == pytest.approx(5.05)
+
+
+def test_a_new_lead_counts_anew() -> None:
+    """After a reset the counters start from zero."""
+    checker = FcwChecker()
+    for k in range(59):
+        assert not checker.update(k * 0.05, CAR, LEAD, BRAKING)
+    checker.reset()
+    assert not checker.update(2.95, CAR, LEAD, BRAKING)

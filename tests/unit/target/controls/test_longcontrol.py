@@ -1,0 +1,118 @@
+"""Gas and brake around all states of longitudinal control."""
+
+import pytest
+from selfdrive.car.params import CarParams
+from selfdrive.controls.lib.longcontrol import OFF, PID, STARTING, STOPPING, LongControl
+from selfdrive.messages import CarState, Plan
+
+
+def plan(v: float, a: float = 0.0, future: float | None = None) -> Plan:
+    return Plan(v_target=v, a_target=a, v_target_future=v if future is None else future)
+
+
+def at(v: float, **state) -> CarState:
+    return CarState(v_ego=v, **state)
+
+
+def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tuple[float, float]:
+    for _ in range(cycles):
+        output = control.update(True, car, p)
+    return output
+
+
+def test_off_gives_nothing_and_follows_the_car(params: CarParams) -> None:
+    """Not in control there is no gas and no brake, and the target is the car's speed, 0.3 at the least."""
+    control = LongControl(params)
+    assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)
+    assert (control.state, control.v_pid) == (OFF, 20.0)
+    control.update(False, at(0.0), plan(30.0))
+    assert control.v_pid == 0.3
+
+
+@pytest.mark.parametrize(
+    ("v_ego", "v_target", "a_target", "gas", "brake"),
+    [
+        (20.0, 20.0, 0.48, 0.1, 0.0),
+        (20.0, 20.0, -0.96, 0.0, 0.2),
+        (20.0, 21.0, 0.0, (1.95 + 0.0043714) / 4.8, 0.0),
+        (20.0, 50.0, 0.0, 0.6, 0.0),
+        (20.0, 0.0, 0.0, 0.0, 0.8),
+        (4.0, 0.0, 0.0, 0.0, 1.0),
+        (1.15, 1.15, 0.0, 0.0, 0.075),
+    ],
+)
+def test_output_of_the_loop(
+    params: CarParams, v_ego: float, v_target: float, a_target: float, gas: float, brake: float
+) -> None:
+    """Acceleration / 4.8 with the limits of speed, and brake against creeping below 2.3 m/s."""
+    assert follow(LongControl(params), at(v_ego), plan(v_target, a_target)) == pytest.approx(
+        (gas, brake), abs=1e-5
+    )
+
+
+def stopped(params: CarParams) -> LongControl:
+    """A control that has braked the car to rest and holds it."""
+    control = LongControl(params)
+    follow(control, at(0.4), plan(0.2))
+    follow(control, at(0.0, standstill=True), plan(0.2), 400)
+    return control
+
+
+def test_stopping_needs_low_speed_target_and_future(params: CarParams) -> None:
+    """Open-loop braking begins below 0.5 m/s with target and planned end below 0.31, not before."""
+    for car, p in ((at(0.6), plan(0.2)), (at(0.4), plan(0.4)), (at(0.4), plan(0.2, future=0.4))):
+        control = LongControl(params)
+        follow(control, car, p, 2)
+        assert control.state == PID
+    control = LongControl(params)
+    follow(control, at(0.4), plan(0.2), 2)
+    assert control.state == STOPPING
+
+
+def test_foot_on_the_brake_stops_too(params: CarParams) -> None:
+    """Below 0.5 m/s the driver's brake makes the control brake along."""
+    control = LongControl(params)
+    follow(control, at(0.4, brake_pressed=True), plan(5.0), 2)
+    assert control.state == STOPPING
+
+
+def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
+    """At rest the brake rises by 0.2 a second to 0.5 and stays; while rolling it goes on rising."""
+    control = LongControl(params)
+    follow(control, at(0.3), plan(0.2))
+    start = control.output
+    follow(control, at(0.3), plan(0.2), 101)
+    assert control.output == pytest.approx(start - 0.2, abs=0.003)
+    assert follow(stopped(params), at(0.0, standstill=True), plan(0.0)) == pytest.approx(
+        (0.0, 0.5), abs=0.003
+    )
+
+
+def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
+    """The brake is released by 0.8 a second to 0.2, then the loop takes over."""
+    control = stopped(params)
+    follow(control, at(0.0, standstill=True), plan(0.3, future=1.0))
+    assert control.state == STARTING
+    cycles = 0
+    while control.state == STARTING:
+        follow(control, at(0.0, standstill=True), plan(0.3, future=1.0))
+        cycles += 1
+    assert control.state == PID
+    assert cycles == pytest.approx(0.3 / 0.8 * 100, abs=2)
+
+
+def test_moving_off_may_be_given_up(params: CarParams) -> None:
+    """A lead that stops again while the brake is released stops the car again."""
+    control = stopped(params)
+    follow(control, at(0.0, standstill=True), plan(0.3, future=1.0), 3)
+    follow(control, at(0.0, standstill=True), plan(0.0))
+    assert control.state == STOPPING
+
+
+def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
+    """After a pause the loop starts without an integral."""
+    control = LongControl(params)
+    follow(control, at(20.0), plan(20.5), 300)
+    control.reset(20.0)
+    control.update(False, at(20.0), plan(20.0))
+    assert follow(control, at(20.0), plan(20.0)) == (0.0, 0.0)

@@ -1,0 +1,97 @@
+"""PI control."""
+
+import pytest
+from selfdrive.controls.lib.pid import PIController
+
+
+def make(kp: float = 1.0, ki: float = 1.0, **options) -> PIController:
+    return PIController(((0.0,), (kp,)), ((0.0,), (ki,)), **options)
+
+
+def test_terms_add_up() -> None:
+    """Control is gain times error, plus its integral, plus feedforward."""
+    pid = make(kp=0.2, ki=0.5)
+    assert pid.update(1.0, 0.0, speed=0.0, feedforward=0.1) == pytest.approx(0.2 + 0.005 + 0.1)
+
+
+def test_gains_follow_speed() -> None:
+    """Gains are taken from their tables at the speed."""
+    pid = PIController(((0.0, 10.0), (1.0, 0.5)), ((0.0,), (0.0,)))
+    assert pid.update(0.4, 0.0, speed=5.0) == pytest.approx(0.3)
+
+
+def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
+    """Against a limit nothing is integrated; an error the other way is, from the first cycle."""
+    pid = make()
+    for _ in range(500):
+        pid.update(3.0, 0.0, speed=0.0)
+    assert pid.i == 0.0
+    pid.update(-0.5, 0.0, speed=0.0)
+    assert pid.i == pytest.approx(-0.005)
+
+
+def test_integrator_may_return_from_beyond() -> None:
+    """An integral of the other sign is worked off even while control is beyond the limit."""
+    pid = make()
+    pid.i = -0.5
+    pid.update(3.0, 0.0, speed=0.0)
+    assert pid.i == pytest.approx(-0.47)
+
+
+def test_limits_apply_after_conversion() -> None:
+    """The converted control is limited, and anti-windup looks at the converted one."""
+    pid = make(convert=lambda control, speed: control / 10.0)
+    assert pid.update(5.0, 0.0, speed=0.0) == pytest.approx(0.505)
+    assert pid.i > 0.0
+    assert pid.update(50.0, 0.0, speed=0.0) == 1.0
+
+
+def test_override_unwinds() -> None:
+    """While the driver overrides, the integrator goes to zero at 0.3 per second."""
+    pid = make()
+    pid.i = -0.3
+    for _ in range(50):
+        pid.update(1.0, 0.0, speed=0.0, override=True)
+    assert pid.i == pytest.approx(-0.15)
+
+
+def saturate(cycles: int, error: float = 2.0, **options) -> PIController:
+    pid = make(kp=1.0, ki=0.0)
+    if error < 1.0:
+        pid.pos_limit = error / 2.0
+    for _ in range(cycles):
+        pid.update(error, 0.0, speed=0.0, **options)
+    return pid
+
+
+def test_saturation_is_told_after_more_than_800_ms() -> None:
+    """Eighty cycles beyond a limit are borne, the eighty-first is told."""
+    assert not saturate(79).saturated
+    assert saturate(82).saturated
+
+
+def test_saturation_needs_error_hands_off_and_check() -> None:
+    """A small error, an overriding driver or a low speed does not count as saturation."""
+    assert not saturate(200, error=0.09).saturated
+    assert saturate(200, error=0.11).saturated
+    assert not saturate(200, override=True).saturated
+    assert not saturate(200, check_saturation=False).saturated
+
+
+def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
+    """The count, at most 1 s, runs down within limits at the rate it ran up."""
+    pid = saturate(300)
+    for _ in range(10):
+        pid.update(0.0, 0.0, speed=0.0)
+    assert pid.saturated
+    for _ in range(15):
+        pid.update(0.0, 0.0, speed=0.0)
+    assert not pid.saturated
+
+
+def test_reset_forgets() -> None:
+    """After a reset neither integral nor saturation is left."""
+    pid = saturate(200)
+    pid.i = 1.0
+    pid.reset()
+    assert (pid.i, pid.saturated) == (0.0, False)

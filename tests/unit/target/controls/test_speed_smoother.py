@@ -1,0 +1,56 @@
+"""Profiles towards a speed under acceleration and jerk limits."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from selfdrive.controls.lib.speed_smoother import Limits, smooth_speed
+
+LIMITS = Limits(a_min=-1.0, a_max=1.0, j_min=-1.0, j_max=1.0)
+
+
+def drive(v: float, a: float, target: float, steps: int, limits: Limits = LIMITS, dt: float = 0.05) -> list:
+    path = []
+    for _ in range(steps):
+        v, a = smooth_speed(v, a, target, limits, dt)
+        path.append((v, a))
+    return path
+
+
+def test_first_step_from_rest_in_acceleration() -> None:
+    """From a constant speed acceleration rises with the jerk limit."""
+    assert smooth_speed(20.0, 0.0, 25.0, LIMITS, 0.2) == pytest.approx((20.02, 0.2))
+    assert smooth_speed(20.0, 0.0, 15.0, LIMITS, 0.2) == pytest.approx((19.98, -0.2))
+
+
+def test_wrong_way_is_left_three_times_as_fast() -> None:
+    """Accelerating away from the target is ended with three times the jerk."""
+    _, a = smooth_speed(20.0, -0.5, 25.0, LIMITS, 0.1)
+    assert a == pytest.approx(-0.2)
+
+
+def test_beyond_the_limit_comes_back_with_jerk() -> None:
+    """An acceleration above its limit falls to it with the jerk limit, then holds."""
+    assert smooth_speed(20.0, 1.5, 40.0, LIMITS, 0.2)[1] == pytest.approx(1.3)
+    assert smooth_speed(20.0, 1.1, 40.0, LIMITS, 0.5)[1] == pytest.approx(1.0)
+
+
+@given(
+    v=st.floats(0.0, 40.0),
+    a=st.floats(-1.0, 1.0),
+    target=st.floats(0.0, 40.0),
+)
+def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: float) -> None:
+    """From any state acceleration and jerk stay in their limits and the target is reached."""
+    before, path = a, drive(v, a, target, 1200)
+    for _, now in path:
+        assert -1.0 - 1e-6 <= now <= 1.0 + 1e-6
+        assert abs(now - before) <= 3.0 * 0.05 + 1e-6
+        before = now
+    assert path[-1][0] == pytest.approx(target, abs=1e-3)
+    assert path[-1][1] == pytest.approx(0.0, abs=1e-2)
+
+
+def test_a_ceiling_below_zero_slows_down_towards_a_higher_target() -> None:
+    """With an upper limit of -0.2 the car slows down though the target is higher."""
+    v, a = drive(20.0, 0.0, 30.0, 100, Limits(-0.5, -0.2, -0.5, 0.5))[-1]
+    assert a == pytest.approx(-0.2) and v == pytest.approx(19.02, abs=0.05)

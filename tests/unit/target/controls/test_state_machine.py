@@ -1,0 +1,120 @@
+"""Control states and the events that move them."""
+
+import pytest
+from selfdrive.controls.lib import events as ev
+from selfdrive.controls.lib.alertmanager import AlertManager
+from selfdrive.controls.lib.events import Event
+from selfdrive.controls.lib.state_machine import SOFT_DISABLE_CYCLES, StateMachine
+
+ENGAGE = Event("button_enable", (ev.ENABLE,))
+GAS = Event("pedal_pressed", (ev.PRE_ENABLE,))
+BRAKE = Event("pedal_pressed", (ev.NO_ENTRY, ev.USER_DISABLE))
+DOOR = Event("door_open", (ev.NO_ENTRY, ev.SOFT_DISABLE))
+CAN = Event("can_error", (ev.NO_ENTRY, ev.IMMEDIATE_DISABLE))
+
+
+class Drive:
+    """A state machine with its alerts, moved by events."""
+
+    def __init__(self, *steps: tuple[Event, ...]) -> None:
+        self.machine = StateMachine()
+        self.alerts = AlertManager()
+        self.t = 0.0
+        for events in steps:
+            self.step(*events)
+
+    def step(self, *events: Event) -> bool:
+        self.t += 0.01
+        engaged = self.machine.update(events, self.alerts, self.t)
+        self.alerts.process(self.t)
+        return engaged
+
+    @property
+    def state(self) -> str:
+        return self.machine.state
+
+
+@pytest.mark.parametrize(
+    ("events", "state"),
+    [
+        ((), "disabled"),
+        ((ENGAGE,), "enabled"),
+        ((ENGAGE, GAS), "pre_enabled"),
+        ((ENGAGE, BRAKE), "disabled"),
+        ((ENGAGE, DOOR), "disabled"),
+        ((ENGAGE, CAN), "disabled"),
+        ((GAS,), "disabled"),
+    ],
+)
+def test_engaging(events: tuple[Event, ...], state: str) -> None:
+    """A button engages unless something refuses entry; with the foot on the gas it waits."""
+    drive = Drive()
+    assert drive.step(*events) == (state != "disabled")
+    assert drive.state == state
+
+
+def test_refusal_says_why() -> None:
+    """Each reason that refuses entry is told."""
+    assert Drive((ENGAGE, DOOR, CAN)).alerts.active == ("door_open_no_entry", "can_error_no_entry")
+
+
+@pytest.mark.parametrize(
+    ("first", "event", "state", "alert"),
+    [
+        ((ENGAGE,), BRAKE, "disabled", "disable"),
+        ((ENGAGE,), CAN, "disabled", "can_error"),
+        ((ENGAGE,), DOOR, "soft_disabling", "door_open"),
+        ((ENGAGE, GAS), BRAKE, "disabled", "disable"),
+        ((ENGAGE, GAS), CAN, "disabled", "can_error"),
+        ((ENGAGE, GAS), DOOR, "disabled", "door_open"),
+    ],
+)
+def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
+    """Driver and faults disengage at once, soft reasons with notice; the reason is told."""
+    drive = Drive(first, (event,))
+    assert drive.state == state
+    assert alert in drive.alerts.active
+
+
+def test_pre_enabled_ends_with_the_gas_pedal() -> None:
+    """Actuators are taken over only once the gas pedal is released."""
+    drive = Drive((ENGAGE, GAS), (GAS,))
+    assert drive.machine.enabled and not drive.machine.active
+    drive.step()
+    assert drive.machine.active
+
+
+def test_driver_beats_fault() -> None:
+    """When the driver takes over in the cycle of a fault, it is the driver's doing."""
+    assert Drive((ENGAGE,), (CAN, BRAKE)).alerts.active[0] == "disable"
+
+
+def test_soft_disabling_is_active_for_300_cycles() -> None:
+    """The car is still controlled for 3 s, then no more."""
+    drive = Drive((ENGAGE,))
+    cycles = 0
+    while drive.machine.active or cycles == 0:
+        drive.step(DOOR)
+        cycles += 1
+    assert cycles == SOFT_DISABLE_CYCLES + 1  # the cycle that starts it does not count down
+
+
+def test_soft_disabling_ends_with_its_reason() -> None:
+    """Once the reason is gone the car is controlled on, and a next time has its full 3 s."""
+    drive = Drive((ENGAGE,), (DOOR,), (DOOR,), ())
+    assert drive.state == "enabled"
+    for _ in range(SOFT_DISABLE_CYCLES):
+        drive.step(DOOR)
+    assert drive.state == "soft_disabling"
+
+
+def test_a_fault_ends_soft_disabling() -> None:
+    """Immediate reasons do not wait for the 3 s."""
+    assert Drive((ENGAGE,), (DOOR,), (DOOR, CAN)).state == "disabled"
+
+
+def test_no_re_engaging_by_itself() -> None:
+    """After a fault the car stays disengaged until a button is released."""
+    drive = Drive((ENGAGE,), (CAN,), (), ())
+    assert drive.state == "disabled"
+    assert drive.step(ENGAGE) and drive.state == "enabled"
