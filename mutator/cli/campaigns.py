@@ -1,0 +1,238 @@
+"""`plan`, `run`, `report` and `clean`: campaigns and their run folders."""
+
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mutator.cli.console import Terminal
+from mutator.cli.options import Exclude, Json, Limit, Only, OutRun, Place, Reading, Seed, with_place
+from mutator.cli.progress import duration
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator.campaign_run import Summary
+    from mutator.plan import Cost
+
+CampaignName = Annotated[
+    str, typer.Argument(metavar="CAMPAIGN", help="A campaign of the library, or a campaign file.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verbs to the command line."""
+    app.command("plan", epilog=PLAN_EXAMPLES)(plan)
+    app.command("run", epilog=RUN_EXAMPLES)(run)
+    app.command("report", epilog=REPORT_EXAMPLES)(report)
+    app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
+
+
+PLAN_EXAMPLES = """\b
+Examples:
+  mutator plan quickstart --out runs/first
+  mutator plan quickstart --out runs/chaff --only 'fault_type == "chaff"' -n 4
+"""
+
+
+@with_place
+def plan(
+    campaign: CampaignName,
+    out: OutRun,
+    workers: Annotated[int, typer.Option("-n", "--workers", min=1, help="Expect a run with so many.")] = 2,
+    only: Only = None,
+    exclude: Exclude = None,
+    limit: Limit = None,
+    seed: Seed = None,
+    reading: Reading = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Freeze a campaign's experiments without running any.
+
+    Also says the expected time and disk. `run` with the same folder then runs exactly these.
+    """
+    from mutator.plan import freeze, make_plan
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    made = make_plan(workspace, campaign, seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    folder = freeze(made, out, workspace)
+    cost = made.cost(workers)
+    groups = Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in made.experiments)
+    if as_json:
+        faults = [
+            {"module": m, "fault_type": f, "method": how, "experiments": n}
+            for (m, f, how), n in sorted(groups.items())
+        ]
+        facts = {"run": str(folder.path), "digest": made.digest, "seed": made.seed, "reading": made.reading}
+        terminal.emit(facts | {"experiments": len(made.experiments), "groups": faults, "cost": cost})
+    rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in sorted(groups.items())]
+    terminal.table(
+        ["fault type", "method", "experiments"],
+        [*rows, ("total", "", len(made.experiments))],
+        right=(2,),
+        total=True,
+    )
+    terminal.say(f"expected: {_cost_line(cost)}")
+    terminal.say(f"plan: {folder.path / 'plan.csv'} (digest {made.digest[:16]})")
+    terminal.say(f"run it: mutator run {campaign} --out {out} -n {workers}")
+
+
+def _cost_line(cost: "Cost") -> str:
+    source = "measured in this folder" if cost.measured else "from a default rate, nothing measured yet"
+    time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
+    return (
+        f"{time} with {cost.workers} workers ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
+    )
+
+
+RUN_EXAMPLES = """\b
+Examples:
+  mutator run quickstart --out runs/first -n 2
+  mutator run my_campaign.yaml --out runs/mine --limit 20
+  mutator run quickstart --out runs/s1 --only 'scenario == "S1" and method == "guided"'
+
+Interrupted or killed, the same command goes on where it stopped.
+"""
+
+
+@with_place
+def run(
+    campaign: CampaignName,
+    out: OutRun,
+    workers: Annotated[
+        int, typer.Option("-n", "--workers", min=0, help="Worker processes; 0: this process alone.")
+    ] = 0,
+    only: Only = None,
+    exclude: Exclude = None,
+    limit: Limit = None,
+    seed: Seed = None,
+    reading: Reading = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Run or resume a campaign; ends with its table and report."""
+    from mutator import campaign_run
+    from mutator.cli.progress import campaign_progress
+    from mutator.plan import Choices
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    with campaign_progress(terminal) as notify:
+        summary = campaign_run.run(workspace, campaign, out, workers=workers, choices=chosen, notify=notify)
+    _tell(terminal, out, summary)
+    if summary.exit_code:
+        raise typer.Exit(summary.exit_code)
+
+
+def _tell(terminal: Terminal, out: Path, summary: "Summary") -> None:
+    """The end of a run: table, report, and what is left to do."""
+    from mutator import report as reports
+
+    written = reports.write(out) if summary.results else None
+    if terminal.as_json:
+        counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
+        paths = {"run": str(out), "report": str(written.markdown) if written else None}
+        errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
+        terminal.emit(counts | paths | {"outcomes": summary.outcomes, "harness_errors": errors})
+    if written:
+        show_counts(terminal, out)
+    terminal.say(
+        f"{summary.done} of {summary.planned} experiments done, "
+        f"{summary.ran} now in {duration(summary.elapsed_s)}"
+    )
+    if written:
+        terminal.say(f"report: {written.markdown} and {written.page}")
+    if summary.harness_errors:
+        terminal.say(
+            f"{len(summary.harness_errors)} harness errors, in no count; the same command tries them again:"
+        )
+        for name, detail in summary.harness_errors[:5]:
+            terminal.say(f"  {name}: {detail}", style="red")
+    if summary.problem:
+        terminal.err.print(f"error: {summary.problem}", style="bold red", markup=False)
+    if summary.interrupted or summary.done < summary.planned:
+        terminal.say(f"go on: {resume_command()}", style="bold")
+
+
+def resume_command() -> str:
+    """The command line that goes on: the same one."""
+    import shlex
+
+    return shlex.join(["mutator", *sys.argv[1:]])
+
+
+def show_counts(terminal: Terminal, run: Path) -> None:
+    """The table of results by fault type, and how the experiments ended."""
+    from mutator import tables
+
+    rows = tables.read_results(run / "results.csv")
+    hazards = tables.hazard_names(rows)
+    heads, lines = tables.count_table(tables.counts_by(rows, tables.by_fault_type), "fault type", hazards)
+    terminal.table(heads, lines, right=range(1, len(heads)), total=True)
+    endings = ", ".join(f"{name} {n}" for name, n in tables.outcome_counts(rows).items())
+    terminal.say(f"outcomes: {endings}")
+
+
+REPORT_EXAMPLES = """\b
+Examples:
+  mutator report runs/first
+"""
+
+
+@with_place
+def report(
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")],
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Write the report of a run and print its path.
+
+    An unfinished run gets a report of what it has so far.
+    """
+    from mutator import report as reports
+    from mutator import results
+    from mutator.runfolder import RunFolder
+
+    terminal = Terminal(as_json)
+    folder = RunFolder.open(run)
+    results.build(folder.path)
+    written = reports.write(folder.path)
+    if as_json:
+        terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
+    show_counts(terminal, run)
+    terminal.say(f"report: {written.markdown} and {written.page}")
+
+
+CLEAN_EXAMPLES = """\b
+Examples:
+  mutator clean runs/first
+  mutator clean runs/* --yes
+"""
+
+
+def clean(
+    runs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Run folders.")],
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+) -> None:
+    """Delete run folders.
+
+    Anything that is no run folder, and a run under way, is left alone.
+    """
+    from mutator import runfolder
+
+    terminal = Terminal()
+    folders = [runfolder.RunFolder.open(path).path for path in runs]
+    if not yes:
+        if not sys.stdin.isatty():
+            raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
+        typer.confirm(f"delete {', '.join(map(str, folders))}?", abort=True)
+    for folder in folders:
+        runfolder.clean(folder)
+        terminal.say(f"deleted {folder}")

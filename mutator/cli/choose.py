@@ -1,0 +1,119 @@
+"""From what is typed to a fault, a trigger, a run folder: the choices that several verbs share."""
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator.fault_models import FaultModels
+    from mutator.manifest import TargetManifest
+    from mutator.model import Fault, Trigger
+    from mutator.spec import FaultSpec, Variant
+    from mutator.workspace import Workspace
+
+ARMED_AFTER_S = 1.5  # the controller is engaged at 1.3 s; contexts count from 0.2 s later
+RUNS = Path("runs")
+HEAD = "run.json"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FaultChoice:
+    """Which faults of one spec are meant. `value` replaces the drawn ones."""
+
+    spec: str
+    variant: str | None = None
+    value: float | None = None
+    seed: int | None = None
+    reading: str | None = None
+
+    def faults(
+        self, workspace: "Workspace", manifest: "TargetManifest", models: "FaultModels"
+    ) -> tuple["Fault", ...]:
+        """The chosen faults in the spec's order; never none."""
+        from mutator.expand import expand
+        from mutator.spec import AS_DESCRIBED
+
+        spec = self._narrowed(workspace.spec(_spec_name(self.spec)))
+        reading = self.reading or AS_DESCRIBED
+        return expand(spec, self.seed or 0, reading, models=models, manifest=manifest)
+
+    def _narrowed(self, spec: "FaultSpec") -> "FaultSpec":
+        variants = tuple(v for v in spec if self.variant in (None, v.name))
+        if not variants:
+            names = ", ".join(v.name for v in spec)
+            raise MutatorError(f"no variant {self.variant!r}", where=spec.path, expected=f"one of {names}")
+        if self.value is not None:
+            variants = tuple(_with_value(spec, v, self.value) for v in variants)
+        return dataclasses.replace(spec, variants=variants)
+
+
+def one_of_each_variant(faults: "tuple[Fault, ...]") -> "tuple[tuple[Fault, int], ...]":
+    """The middle fault of each variant, and how many the variant has: they differ in their value alone."""
+    groups: dict[str, list[Fault]] = {}
+    for fault in faults:
+        groups.setdefault(fault.spec, []).append(fault)
+    return tuple((group[len(group) // 2], len(group)) for group in groups.values())
+
+
+def find_trigger(workspace: "Workspace", text: str, armed_after_s: float = ARMED_AFTER_S) -> "Trigger":
+    """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
+    from mutator.model import Trigger
+    from mutator.trigger import always, at_time, check_condition
+
+    if text == "always":
+        return always(armed_after_s=armed_after_s)
+    for table in workspace.context_tables():
+        if text in (row.id for row in table.rows):
+            return table.triggers(armed_after_s=armed_after_s, rows=(text,))[0]
+    try:
+        return at_time(float(text))
+    except ValueError:
+        pass
+    try:
+        condition = check_condition(text)
+    except MutatorError as e:
+        contexts = ", ".join(row.id for table in workspace.context_tables() for row in table.rows)
+        raise MutatorError(
+            e.got,
+            where="--trigger",
+            expected=f"a context ({contexts}), a time in s, `always`, or a condition, e.g. 'hwt <= 2'",
+            remedy=e.remedy,
+        ) from e
+    return Trigger(name="condition", condition=condition, armed_after_s=armed_after_s)
+
+
+def find_run(given: Path | None, root: Path) -> Path:
+    """The run folder that was named, else the newest one in runs/ here or under `root`."""
+    if given is not None:
+        return given
+    here = {base.resolve() for base in (RUNS, root / RUNS)}
+    heads = [head for base in here for head in base.glob(f"*/{HEAD}")]
+    if not heads:
+        raise MutatorError(
+            "no run folder in runs/",
+            remedy="name one: --run DIR, or make one: `mutator run quickstart --out runs/first`",
+        )
+    newest = max(heads, key=lambda head: (head.stat().st_mtime_ns, str(head)))
+    return _from_here(newest.parent)
+
+
+def _from_here(path: Path) -> Path:
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+def _spec_name(text: str) -> str | Path:
+    path = Path(text)
+    return path if path.suffix in (".yaml", ".yml") or path.is_file() else text
+
+
+def _with_value(spec: "FaultSpec", variant: "Variant", value: float) -> "Variant":
+    if variant.draw is None:
+        raise MutatorError(
+            f"variant {variant.name!r} takes no value", where=spec.path, remedy="leave --value out"
+        )
+    exact = int(value) if value.is_integer() else value
+    draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact,))
+    return dataclasses.replace(variant, draw=draw)

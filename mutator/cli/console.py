@@ -1,0 +1,200 @@
+"""How the command line speaks: Rich in a terminal, plain text in a pipe, JSON where a program reads.
+
+Rich is imported when the first line is printed, so `--help` and shell completion do not pay for it.
+"""
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mutator.errors import MutatorError
+from mutator.ids import plain
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PIPE_WIDTH = 240  # a table in a pipe is cut by nobody's window
+
+STYLES = {
+    "ok": "green",
+    "hazard": "bold red",
+    "sdc": "yellow",
+    "masked": "cyan",
+    "not_activated": "dim",
+    "crashed": "magenta",
+    "timeout": "magenta",
+    "invalid_mutant": "bold magenta",
+    "harness_error": "bold white on red",
+}
+
+
+@dataclass
+class Terminal:
+    """Standard output and standard error of one command. With `as_json` only `emit` writes to the output."""
+
+    as_json: bool = False
+
+    @cached_property
+    def out(self) -> "Console":
+        return _console(sys.stdout.isatty(), stderr=False)
+
+    @cached_property
+    def err(self) -> "Console":
+        return _console(sys.stderr.isatty(), stderr=True)
+
+    def say(self, text: str = "", style: str | None = None) -> None:
+        """One line or paragraph as it is: no markup, no wrapping at a pipe's invented width."""
+        if not self.as_json:
+            self.out.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+    def note(self, text: str) -> None:
+        """A remark beside the result: to standard error, so that a pipe gets the result alone."""
+        self.err.print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
+
+    def emit(self, data: Any) -> None:
+        """The result as one JSON document; numbers JSON does not know (infinity, nan) become null."""
+        json.dump(_jsonable(data), sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
+        sys.stdout.write("\n")
+
+    def table(
+        self,
+        heads: Sequence[str],
+        rows: Iterable[Sequence[object]],
+        *,
+        title: str | None = None,
+        right: Sequence[int] = (),
+        total: bool = False,
+    ) -> None:
+        """A table; columns in `right` are numbers; with `total` the last row is set apart."""
+        if self.as_json:
+            return
+        from rich import box
+        from rich.table import Table
+        from rich.text import Text
+
+        tty = self.out.is_terminal
+        table = Table(
+            title=title,
+            title_justify="left",
+            box=box.SIMPLE_HEAD if tty else None,
+            pad_edge=False,
+            header_style="bold",
+            show_edge=False,
+        )
+        for i, head in enumerate(heads):
+            table.add_column(Text(head), justify="right" if i in right else "left", overflow="fold")
+        all_rows = [list(row) for row in rows]
+        for i, row in enumerate(all_rows):
+            last = total and i == len(all_rows) - 1
+            if last and tty:
+                table.add_section()
+            cells = [Text(_cell(c), style=STYLES.get(str(c), "bold" if last else "")) for c in row]
+            table.add_row(*cells)
+        self.out.print(table)
+
+    def diff(self, patch: str) -> None:
+        """A unified diff, coloured in a terminal, byte for byte as text elsewhere."""
+        if self.as_json:
+            return
+        from rich.text import Text
+
+        text = Text()
+        for line in patch.splitlines():
+            text.append(line + "\n", style=diff_style(line))
+        self.out.print(text, soft_wrap=True, end="")
+
+    @contextmanager
+    def wait(self, text: str) -> Iterator[None]:
+        """Tell that something takes a moment, and for how long by now."""
+        if self.as_json or not self.err.is_terminal:
+            yield
+            return
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        with Progress(*columns, console=self.err, transient=True) as progress:
+            progress.add_task(text, total=None)
+            yield
+
+    @contextmanager
+    def count(self, total: int, what: str) -> Iterator[Callable[[], None]]:
+        """A progress bar over `total` equal steps; yields what to call after each."""
+        if self.as_json or not self.err.is_terminal:
+            yield lambda: None
+            return
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(compact=True),
+        )
+        with Progress(*columns, console=self.err, transient=True) as progress:
+            task = progress.add_task(what, total=total)
+            yield lambda: progress.advance(task)
+
+
+def diff_style(line: str) -> str:
+    """Rich style of one line of a unified diff."""
+    if line.startswith(("+++", "---", "diff ", "index ", "new file")):
+        return "bold"
+    if line.startswith("@@"):
+        return "cyan"
+    if line.startswith("+"):
+        return "green"
+    return "red" if line.startswith("-") else ""
+
+
+def show_error(error: MutatorError) -> None:
+    """An error of the user's, in one piece: place, what was got, expected, what to do."""
+    terminal = Terminal()
+    place = f"{_short(error.where)}:{error.line}" if error.line is not None else _short(error.where)
+    terminal.err.print(f"error: {place + ': ' if place else ''}{error.got}", style="bold red", **_AS_IS)
+    if error.expected:
+        terminal.err.print(f"  expected: {error.expected}", **_AS_IS)
+    if error.remedy:
+        terminal.err.print(f"  to do: {error.remedy}", **_AS_IS)
+
+
+_AS_IS: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
+
+
+def _short(where: str | None) -> str:
+    """A path as the user would type it: relative when it lies below the current folder."""
+    if not where:
+        return ""
+    path = Path(where)
+    try:
+        return str(path.relative_to(Path.cwd())) if path.is_absolute() else where
+    except ValueError:
+        return where
+
+
+def _console(tty: bool, *, stderr: bool) -> "Console":
+    from rich.console import Console
+
+    return Console(stderr=stderr, width=None if tty else PIPE_WIDTH, highlight=False)
+
+
+def _cell(value: object) -> str:
+    return "" if value is None else str(value)
+
+
+def _jsonable(value: Any) -> Any:
+    value = plain(value)
+    if isinstance(value, dict):
+        return {k: _jsonable(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_jsonable(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Path):
+        return str(value)
+    return value

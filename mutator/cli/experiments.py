@@ -1,0 +1,140 @@
+"""`show` and `rerun`: one experiment of a run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mutator.cli.console import Terminal
+from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
+from mutator.errors import EXIT_CHECK_FAILED
+
+if TYPE_CHECKING:
+    from mutator.cli.experiment_view import Found
+    from mutator.workspace import Workspace
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verbs to the command line."""
+    app.command("show", epilog=SHOW_EXAMPLES)(show)
+    app.command("rerun", epilog=RERUN_EXAMPLES)(rerun)
+
+
+SHOW_EXAMPLES = """\b
+Examples:
+  mutator show 3f9a                          of the newest run in runs/
+  mutator show 3f9a --run runs/first --no-plot
+"""
+
+
+@with_place
+def show(
+    experiment: ExperimentId,
+    run: Run = None,
+    plot: Annotated[
+        bool, typer.Option(help="Draw golden against faulty (drives it again if no trace was kept).")
+    ] = True,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Show diff, times, verdict, plot of golden against faulty."""
+    from mutator.cli import experiment_view as view
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    found = view.find_experiment(workspace, run, experiment)
+    patch = view.experiment_patch(workspace, found)
+    drawn = _plot(terminal, workspace, found) if plot and found.record else None
+    if as_json:
+        outcome = view.verdict(found.record) if found.record else {"status": None}
+        facts = {**view.describe(found.experiment), **outcome, "patch": patch}
+        terminal.emit(facts | {"run": str(found.folder.path), "plot": str(drawn) if drawn else None})
+        return
+    view.print_experiment(terminal, found.experiment, patch)
+    if found.record is None:
+        terminal.say(str(view.not_run(found)))
+        return
+    view.print_verdict(terminal, found.record)
+    if drawn:
+        terminal.say(f"plot: {drawn}")
+
+
+def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | None:
+    """The experiment's plot, drawn from its kept trace, or from one made now."""
+    from mutator.cli import experiment_view as view
+    from mutator.single import rerun as run_again
+
+    plot = plot_path(found.folder.path, found.experiment.id)
+    if plot.exists():
+        return plot
+    with terminal.wait("no trace was kept: driving it again"):
+        single, same = run_again(workspace, found.folder.path, found.experiment.id)
+    if not same:
+        terminal.note("the new run differs from the campaign's record: see `mutator rerun`")
+    return view.draw(workspace.manifest(found.plan.campaign.target), single, plot)
+
+
+def plot_path(run: Path, experiment_id: str) -> Path:
+    """Where the plot of an experiment is kept in a run folder."""
+    return run / "plots" / f"{experiment_id}.svg"
+
+
+RERUN_EXAMPLES = """\b
+Examples:
+  mutator rerun 3f9a                    is the result the same again?
+  mutator rerun 3f9a --trace            the same, and keep its trace and plot
+"""
+
+
+@with_place
+def rerun(
+    experiment: ExperimentId,
+    trace: Annotated[bool, typer.Option("--trace", help="Keep trace and plot in the run folder.")] = False,
+    run: Run = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Drive one experiment again; is the result the same?
+
+    Exit code 1 if the new record differs from the campaign's.
+    """
+    import shutil
+
+    from mutator.cli import experiment_view as view
+    from mutator.single import rerun as run_again
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    found = view.find_experiment(workspace, run, experiment)
+    with terminal.wait(f"driving {found.experiment.scenario} again"):
+        single, same = run_again(workspace, found.folder.path, found.experiment.id)
+    plot = None
+    if trace:
+        manifest = workspace.manifest(found.plan.campaign.target)
+        plot = view.draw(manifest, single, plot_path(found.folder.path, found.experiment.id))
+    else:
+        shutil.rmtree(single.faulty.parent)
+    recorded = found.record is not None
+    if as_json:
+        facts = {**view.describe(found.experiment), **view.verdict(single.record)}
+        facts |= {"same_as_record": same if recorded else None}
+        terminal.emit(
+            facts | {"traces": str(single.faulty) if trace else None, "plot": str(plot) if plot else None}
+        )
+    view.print_verdict(terminal, single.record)
+    terminal.say(_comparison(recorded, same), style=None if same else "bold red")
+    if trace:
+        terminal.say(f"trace: {single.faulty}")
+        terminal.say(f"plot: {plot}")
+    if not same:
+        raise typer.Exit(EXIT_CHECK_FAILED)
+
+
+def _comparison(recorded: bool, same: bool) -> str:
+    if not recorded:
+        return "no record to compare with: the campaign has not run it yet"
+    return (
+        "the same as the campaign's record, byte for byte" if same else "DIFFERS from the campaign's record"
+    )

@@ -1,0 +1,213 @@
+"""`try`, `diff` and `generate`: faults without a campaign."""
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mutator.cli import choose
+from mutator.cli.console import Terminal
+from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
+
+if TYPE_CHECKING:
+    from mutator.model import Experiment
+    from mutator.workspace import Workspace
+
+EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
+
+SpecName = Annotated[str, typer.Argument(metavar="SPEC", help="A spec of the library, or a spec file.")]
+TriggerText = Annotated[
+    str,
+    typer.Option(
+        "--trigger",
+        metavar="WHEN",
+        help="A context (C1), a time in s (10), always, or a condition ('hwt <= 2 and rs > 0').",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verbs to the command line."""
+    app.command("try", epilog=TRY_EXAMPLES)(try_fault)
+    app.command("diff", epilog=DIFF_EXAMPLES)(diff)
+    app.command("generate", epilog=GENERATE_EXAMPLES)(generate)
+
+
+TRY_EXAMPLES = """\b
+Examples:
+  mutator try radar/chaff --scenario S1 --trigger C1
+  mutator try radar/chaff --value 40 --trigger 10      exactly 40 m, from 10 s on
+  mutator try my_fault.yaml --scenario S5              a spec of one's own
+"""
+
+
+@with_place
+def try_fault(
+    spec: SpecName,
+    scenario: Annotated[str, typer.Option("--scenario", "-s", help="Name or file of a driving scenario.")],
+    trigger: TriggerText = "always",
+    variant: Variant = None,
+    value: Value = None,
+    seed: Seed = None,
+    reading: Reading = None,
+    armed_after: Annotated[
+        float, typer.Option(min=0, metavar="SECONDS", help="Contexts and `always` count from then on.")
+    ] = choose.ARMED_AFTER_S,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where diff, traces and plot go.")] = Path(
+        "runs/try"
+    ),
+    manifest: Manifest = "openpilot",
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Put one fault in, drive once: diff, verdict, plot.
+
+    The spec need not be in the library: a file will do.
+    """
+    from mutator.cli.experiment_view import show_single
+    from mutator.single import run_single
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    target = workspace.manifest(manifest)
+    choice = choose.FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
+    faults = choice.faults(workspace, target, workspace.fault_models())
+    fault, of = choose.one_of_each_variant(faults)[0]
+    if len(faults) > 1:
+        terminal.note(f"{fault.spec}: {fault.value} {fault.unit}, one of {of} (choose by --variant, --value)")
+    when = choose.find_trigger(workspace, trigger, armed_after)
+    experiment = _experiment(workspace, fault, scenario, when, seed or 0)
+    folder = out / experiment.id
+    with terminal.wait(f"driving {scenario}, fault-free and faulty"):
+        single = run_single(workspace, target, experiment, folder)
+    show_single(terminal, target, single, plot=folder / "plot.svg")
+
+
+def _experiment(workspace: "Workspace", fault: Any, scenario: str, trigger: Any, seed: int) -> "Experiment":
+    from mutator.ids import digest
+    from mutator.model import Experiment, Method
+
+    file = workspace.scenario(scenario)
+    return Experiment(
+        fault=fault,
+        scenario=scenario,
+        scenario_digest=digest(file.read_bytes()),
+        method=Method.GUIDED,
+        trigger=trigger,
+        seed=seed,
+    )
+
+
+DIFF_EXAMPLES = """\b
+Examples:
+  mutator diff radar/chaff                   what the spec does to the source, one diff a variant
+  mutator diff my_fault.yaml --trigger C2
+  mutator diff 3f9a                          of an experiment of the newest run
+"""
+
+
+@with_place
+def diff(
+    what: Annotated[
+        str, typer.Argument(metavar="SPEC|EXPERIMENT", help="A spec, a spec file, or an experiment.")
+    ],
+    trigger: TriggerText = "always",
+    variant: Variant = None,
+    value: Value = None,
+    seed: Seed = None,
+    reading: Reading = None,
+    run: Run = None,
+    manifest: Manifest = "openpilot",
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Show what a fault changes in the source.
+
+    What is printed can be given to `patch -p1` at the target's root.
+    """
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    if EXPERIMENT_ID.fullmatch(what) and not Path(what).exists():
+        from mutator.cli.experiment_view import experiment_patch, find_experiment
+
+        found = find_experiment(workspace, run, what)
+        _print_diffs(
+            terminal, [(found.experiment.fault.spec, found.experiment.id, experiment_patch(workspace, found))]
+        )
+        return
+    from mutator.mutant import build
+
+    target, models = workspace.manifest(manifest), workspace.fault_models()
+    choice = choose.FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
+    when = choose.find_trigger(workspace, trigger)
+    diffs = []
+    for fault, of in choose.one_of_each_variant(choice.faults(workspace, target, models)):
+        mutant = build(target, models, fault, when)
+        many = f", one of {of}" if of > 1 else ""
+        diffs.append((f"{fault.spec}: {fault.value} {fault.unit}{many}", mutant.id, mutant.patch))
+    _print_diffs(terminal, diffs)
+
+
+def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]]) -> None:
+    if terminal.as_json:
+        terminal.emit([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
+    for fault, _, patch in diffs:
+        # `patch` skips what stands before a diff, so the heading may stay in a pipe.
+        terminal.say(f"# {fault}", style="bold")
+        terminal.diff(patch)
+
+
+GENERATE_EXAMPLES = """\b
+Examples:
+  mutator generate radar/chaff --out mutants                     patches under every context
+  mutator generate 'radar/*' --out mutants --trees --trigger C1  whole trees too
+  mutator generate --campaign quickstart --out mutants           the mutants of a campaign
+"""
+
+
+@with_place
+def generate(
+    specs: Annotated[
+        list[str] | None, typer.Argument(metavar="[SPEC]...", help="Specs, globs over them, or spec files.")
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new or empty folder.")] = ...,  # type: ignore[assignment]
+    campaign: Annotated[
+        str | None, typer.Option(help="The mutants of this campaign instead of specs.")
+    ] = None,
+    trees: Annotated[bool, typer.Option("--trees", help="Write each mutated source tree too.")] = False,
+    triggers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--trigger", metavar="WHEN", help="As for `try`; may be given again. Default: every context."
+        ),
+    ] = None,
+    seed: Seed = None,
+    reading: Reading = None,
+    manifest: Manifest = "openpilot",
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Write mutants as patches or trees, with an index."""
+    from mutator.cli.generate import Request, write_mutants
+
+    terminal = Terminal(as_json)
+    request = Request(
+        specs=tuple(specs or ()),
+        campaign=campaign,
+        triggers=tuple(triggers or ()),
+        seed=seed,
+        reading=reading,
+        manifest=manifest,
+        trees=trees,
+    )
+    index = write_mutants(place.workspace(), request, out, terminal)
+    if as_json:
+        terminal.emit(index)
+    terminal.say(f"{len(index)} mutants in {out}; the list of them is {out / 'index.csv'}")
+    terminal.say(
+        f"apply one at the target's root: patch -p1 < {out / 'patches'}/{index[0]['mutant_id']}.patch"
+    )

@@ -1,0 +1,159 @@
+"""`list` and `check`: what the library holds, and whether all of it can be used."""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mutator.cli.console import Terminal
+from mutator.cli.options import Json, Manifest, Place, with_place
+from mutator.errors import EXIT_CHECK_FAILED
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
+
+
+class Kind(StrEnum):
+    """What `list` can list."""
+
+    SPECS = "specs"
+    SCENARIOS = "scenarios"
+    CAMPAIGNS = "campaigns"
+    MODELS = "models"
+    TRIGGERS = "triggers"
+    TARGETS = "targets"
+
+
+Table = tuple[list[str], list[dict[str, Any]]]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verbs to the command line."""
+    app.command("list", epilog=LIST_EXAMPLES)(list_library)
+    app.command("check", epilog=CHECK_EXAMPLES)(check)
+
+
+LIST_EXAMPLES = """\b
+Examples:
+  mutator list              everything
+  mutator list specs        the fault specs and how many faults each makes
+  mutator list --json       the same for a program
+"""
+
+
+@with_place
+def list_library(
+    kind: Annotated[Kind | None, typer.Argument(help="Only this kind; default: all.")] = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """List specs, scenarios, campaigns, models, triggers, targets."""
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    tables = {k.value: LISTS[k](workspace) for k in ([kind] if kind else list(Kind))}
+    if as_json:
+        terminal.emit({name: rows for name, (_, rows) in tables.items()})
+    for name, (columns, rows) in tables.items():
+        numbers = [i for i, c in enumerate(columns) if all(isinstance(r[c], int) for r in rows)]
+        terminal.say(f"{name} ({len(rows)})", style="bold")
+        terminal.table(columns, [[r[c] for c in columns] for r in rows], right=numbers)
+        terminal.say()
+
+
+def _specs(workspace: "Workspace") -> Table:
+    rows = [{"name": s.name, "faults": s.count, "about": _line(s.about)} for s in workspace.specs()]
+    return ["name", "faults", "about"], rows
+
+
+def _scenarios(workspace: "Workspace") -> Table:
+    rows = [{"name": n, "file": str(workspace.scenario(n))} for n in workspace.scenario_names()]
+    return ["name", "file"], rows
+
+
+def _campaigns(workspace: "Workspace") -> Table:
+    rows = [{"name": n, "file": str(workspace.campaign(n))} for n in workspace.campaign_names()]
+    return ["name", "file"], rows
+
+
+def _models(workspace: "Workspace") -> Table:
+    rows = [
+        {
+            "name": m.name,
+            "kind": m.kind.value,
+            "parameters": ", ".join(p.name + ("?" if p.optional else "") for p in m.params),
+            "about": _line(m.summary),
+        }
+        for m in workspace.fault_models()
+    ]
+    return ["name", "kind", "parameters", "about"], rows
+
+
+def _triggers(workspace: "Workspace") -> Table:
+    rows = [
+        {"table": table.name, "name": row.id, "condition": row.condition, "about": _line(row.about)}
+        for table in workspace.context_tables()
+        for row in table.rows
+    ]
+    return ["table", "name", "condition", "about"], rows
+
+
+def _targets(workspace: "Workspace") -> Table:
+    rows = []
+    for name in workspace.target_names():
+        manifest = workspace.manifest(name)
+        row = {"name": name, "root": str(manifest.root), "package": manifest.package}
+        rows.append(row | {"files": len(manifest.tree.files)})
+    return ["name", "root", "package", "files"], rows
+
+
+LISTS: dict[Kind, Callable[["Workspace"], Table]] = {
+    Kind.SPECS: _specs,
+    Kind.SCENARIOS: _scenarios,
+    Kind.CAMPAIGNS: _campaigns,
+    Kind.MODELS: _models,
+    Kind.TRIGGERS: _triggers,
+    Kind.TARGETS: _targets,
+}
+
+CHECK_EXAMPLES = """\b
+Examples:
+  mutator check                             library and templates against the target
+  mutator --target ~/openpilot check        the same library against another tree
+"""
+
+
+@with_place
+def check(
+    manifest: Manifest = "openpilot",
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Check library, templates and anchors against the target.
+
+    Exit code 1 if anything is wrong; each problem is told with its file and line.
+    """
+    from mutator.library_check import check_library
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    with terminal.wait("checking every spec in both readings"):
+        problems = check_library(workspace, manifest)
+    if as_json:
+        terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
+    for problem in problems:
+        terminal.say(str(problem), style="red")
+    if problems:
+        terminal.say(f"{len(problems)} problem(s)", style="bold red")
+        raise typer.Exit(EXIT_CHECK_FAILED)
+    faults = sum(spec.count for spec in workspace.specs())
+    terminal.say(
+        f"all well: {len(workspace.spec_files())} specs, {faults} faults, in both readings", style="green"
+    )
+
+
+def _line(text: str) -> str:
+    """The first sentence's worth of a description, on one line."""
+    return " ".join(text.split())

@@ -1,0 +1,136 @@
+"""`mutator`: the verbs put together, and what becomes of an error.
+
+Exit codes: 0 fine, 1 a check failed, 2 wrong input, 3 harness errors present (also a defect of mutator
+itself), 130 interrupted.
+"""
+
+import errno
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from mutator import __version__
+from mutator.cli import campaigns, experiments, faults, library, machine
+from mutator.cli.console import show_error
+from mutator.cli.options import Library, Place, Root, Target, Templates
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
+
+EXIT_INTERRUPTED = 130
+THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
+
+GROUPS = (
+    ("Look around", ("list", "check", "doctor")),
+    ("One fault", ("try", "diff", "generate")),
+    ("Campaigns", ("plan", "run", "report", "clean")),
+    ("One experiment", ("show", "rerun")),
+)
+EXAMPLES = """\b
+Examples:
+  mutator list                                    what the library holds
+  mutator try radar/chaff --scenario S1           one fault: diff, verdict, plot
+  mutator run quickstart --out runs/first -n 2    a campaign, resumed by the same command
+  mutator show 3f9a                               one of its experiments, by the start of its id
+"""
+
+
+class Verbs(TyperGroup):
+    """The group of verbs, listed by what one does with them."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """One section of the help for each group of verbs."""
+        for title, names in GROUPS:
+            rows = [(name, self.commands[name].get_short_help_str(90)) for name in names]
+            with formatter.section(title):
+                formatter.write_dl(rows, col_max=12)
+
+
+app = typer.Typer(
+    cls=Verbs,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    epilog=EXAMPLES,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"mutator {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def start(
+    ctx: typer.Context,
+    root: Root = None,
+    library: Library = None,
+    templates: Templates = None,
+    target: Target = None,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Put faults into a driving controller, drive it, and see what they did."""
+    ctx.obj = Place(root=root, library=library, templates=templates, target=target)
+
+
+for module in (library, faults, campaigns, experiments, machine):
+    module.register(app)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
+    try:
+        code = get_command(app).main(args=argv, prog_name="mutator", standalone_mode=False)
+        return code if isinstance(code, int) else EXIT_OK
+    except MutatorError as e:
+        show_error(e)
+        return e.exit_code
+    except typer.TyperException as e:
+        return _usage(e)
+    except (typer.Abort, KeyboardInterrupt) as e:
+        _say(str(e) or "interrupted")
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_OK
+    except OSError as e:
+        if e.errno not in THE_MACHINE_SAYS_NO:
+            return _defect()
+        show_error(
+            MutatorError(str(e.strerror), where=e.filename, remedy="make room or choose another folder")
+        )
+        return EXIT_WRONG_INPUT
+    except Exception:
+        return _defect()
+
+
+def _usage(error: typer.TyperException) -> int:
+    ctx = getattr(error, "ctx", None)
+    remedy = f"see `{ctx.command_path} --help`" if ctx else "see `mutator --help`"
+    message = error.format_message().rstrip(".")
+    if message:
+        show_error(MutatorError(message, remedy=remedy))
+    return EXIT_WRONG_INPUT
+
+
+def _defect() -> int:
+    traceback.print_exc()
+    _say("this is a defect of mutator, not of your input; please report it with the lines above")
+    return EXIT_HARNESS_ERRORS
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

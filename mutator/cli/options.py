@@ -1,0 +1,101 @@
+"""Options that several verbs share, and the place (library, templates, target) they name."""
+
+import dataclasses
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
+Manifest = Annotated[str, typer.Option(help="Name or file of the target's manifest.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of drawn values and times.")]
+Reading = Annotated[
+    str | None,
+    typer.Option(help="as_described: units as the text means them; as_coded: as the code had them."),
+]
+Variant = Annotated[str | None, typer.Option(help="Only this variant of the spec.")]
+Value = Annotated[float | None, typer.Option(help="This value (in the spec's unit) instead of drawn ones.")]
+Run = Annotated[
+    Path | None, typer.Option("--run", metavar="DIR", help="The run folder; default: the newest in runs/.")
+]
+ExperimentId = Annotated[
+    str, typer.Argument(metavar="EXPERIMENT", help="Id of an experiment, or the start of one.")
+]
+Only = Annotated[
+    str | None,
+    typer.Option(metavar="EXPR", help="Only experiments for which this holds, e.g. 'value > 100'."),
+]
+Exclude = Annotated[
+    str | None, typer.Option(metavar="EXPR", help="Leave out experiments for which this holds.")
+]
+Limit = Annotated[int | None, typer.Option(min=1, help="At most so many experiments, spread over the plan.")]
+OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where library, templates and target are, as far as options say; the environment says the rest."""
+
+    root: Path | None = None
+    library: Path | None = None
+    templates: Path | None = None
+    target: Path | None = None
+
+    def workspace(self) -> "Workspace":
+        """The workspace found from here; MutatorError that tells how to name one."""
+        from mutator.workspace import Workspace
+
+        return Workspace.find(self.root, self.library, self.templates, self.target)
+
+    def over(self, other: "Place") -> "Place":
+        """This place, its gaps filled from `other`."""
+        mine = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return dataclasses.replace(other, **{k: v for k, v in mine.items() if v is not None})
+
+
+Root = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Folder that holds fault_library/ and templates/ [env: MUTATOR_ROOT]."),
+]
+Library = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="The fault library [env: MUTATOR_LIBRARY].")
+]
+Templates = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="The fault models [env: MUTATOR_TEMPLATES].")
+]
+Target = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="The controller's source root, if not the manifest's [env: MUTATOR_TARGET]."
+    ),
+]
+PLACE_OPTIONS = {"root": Root, "library": Library, "templates": Templates, "target": Target}
+
+
+def with_place(verb: Callable[..., None]) -> Callable[..., None]:
+    """Give a verb that takes `place` the four options that name one, before or after the verb's name."""
+    signature = inspect.signature(verb, eval_str=True)
+    own = [p for p in signature.parameters.values() if p.name != "place"]
+    context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
+    extra = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+        for name, annotation in PLACE_OPTIONS.items()
+    ]
+
+    @functools.wraps(verb)
+    def run(*, ctx: typer.Context, **given: Any) -> None:
+        place = Place(**{name: given.pop(name) for name in PLACE_OPTIONS})
+        verb(place=place.over(ctx.obj or Place()), **given)
+
+    own = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in own]
+    parameters = [context, *own, *extra]
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run

@@ -1,0 +1,150 @@
+"""Can this machine run campaigns? One finding for each thing a campaign needs."""
+
+import importlib.metadata
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
+
+OLDEST_PYTHON = (3, 11)
+LITTLE_DISK = 200e6  # bytes: about a hundred experiments with traces
+LITTLE_MEMORY = 1e9  # bytes: two controllers with their solvers, and the runner
+
+
+class Level(StrEnum):
+    """How a finding bears on campaigns."""
+
+    OK = "ok"
+    WARN = "warning"
+    FAIL = "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing looked at: what was found, and what to do if it is not well."""
+
+    name: str
+    level: Level
+    found: str
+    remedy: str = ""
+
+
+def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
+    """Look at interpreter, packages, machine, temporary folder, child processes, library and target.
+
+    `workspace` may be the error that finding one gave: that is a finding too.
+    """
+    findings = [_python(), *_packages(), _cores(), _memory(), *_disk(), _temporary(), _child()]
+    if isinstance(workspace, MutatorError):
+        remedy = workspace.remedy or ""
+        findings.append(Finding(name="library", level=Level.FAIL, found=workspace.got, remedy=remedy))
+    else:
+        findings += _library(workspace)
+    return findings
+
+
+def _python() -> Finding:
+    found = f"{sys.version.split()[0]} at {sys.executable}"
+    if sys.version_info >= OLDEST_PYTHON:
+        return Finding(name="python", level=Level.OK, found=found)
+    return Finding(name="python", level=Level.FAIL, found=found, remedy="use Python 3.11 or newer")
+
+
+def _packages() -> Iterator[Finding]:
+    """Each package mutator itself requires (not its extras), present and of a version it may have."""
+    from packaging.requirements import Requirement  # comes with pytest
+
+    for line in importlib.metadata.requires("mutator") or ():
+        wanted = Requirement(line)
+        if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
+            continue
+        remedy = f"pip install '{wanted.name}{wanted.specifier}'"
+        try:
+            version = importlib.metadata.version(wanted.name)
+        except importlib.metadata.PackageNotFoundError:
+            yield Finding(name=wanted.name, level=Level.FAIL, found="not installed", remedy=remedy)
+            continue
+        if wanted.specifier.contains(version, prereleases=True):
+            yield Finding(name=wanted.name, level=Level.OK, found=version)
+        else:
+            found = f"{version}, wanted {wanted.specifier}"
+            yield Finding(name=wanted.name, level=Level.WARN, found=found, remedy=remedy)
+
+
+def _cores() -> Finding:
+    usable = len(os.sched_getaffinity(0))
+    return Finding(name="cores", level=Level.OK, found=f"{usable} usable: `mutator run ... -n {usable}`")
+
+
+def _memory() -> Finding:
+    free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    level = Level.OK if free > LITTLE_MEMORY else Level.WARN
+    remedy = "" if level is Level.OK else "run fewer experiments side by side (-n 1)"
+    return Finding(name="memory", level=level, found=f"{free / 1e9:.1f} GB free", remedy=remedy)
+
+
+def _disk() -> Iterator[Finding]:
+    for name, folder in (("disk here", Path.cwd()), ("disk for trees", Path(tempfile.gettempdir()))):
+        free = shutil.disk_usage(folder).free
+        level = Level.OK if free > LITTLE_DISK else Level.WARN
+        remedy = "" if level is Level.OK else "make room, or set TMPDIR or --out to a folder with more"
+        yield Finding(name=name, level=level, found=f"{free / 1e9:.1f} GB free in {folder}", remedy=remedy)
+
+
+def _temporary() -> Finding:
+    """Mutated trees are written here for the time of a run; locks on files must work too."""
+    import fcntl
+
+    try:
+        with tempfile.TemporaryFile() as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as e:
+        remedy = "set TMPDIR to a folder that can be written and locked"
+        return Finding(name="temporary folder", level=Level.FAIL, found=str(e), remedy=remedy)
+    found = f"{tempfile.gettempdir()} can be written and locked"
+    return Finding(name="temporary folder", level=Level.OK, found=found)
+
+
+def _child() -> Finding:
+    """An experiment is a fresh, isolated interpreter with limits: start one."""
+    command = [sys.executable, "-P", "-s", "-c", "import numpy; print(numpy.__version__)"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    except (OSError, subprocess.TimeoutExpired) as e:
+        return Finding(name="child process", level=Level.FAIL, found=str(e), remedy="see the message")
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return Finding(name="child process", level=Level.FAIL, found=last, remedy="mend the installation")
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    memory = "" if limit == resource.RLIM_INFINITY else f", address space limited to {limit / 1e9:.1f} GB"
+    return Finding(name="child process", level=Level.OK, found=f"starts and finds its packages{memory}")
+
+
+def _library(workspace: "Workspace") -> Iterator[Finding]:
+    found = f"{workspace.library}: {len(workspace.spec_files())} specs"
+    yield Finding(name="library", level=Level.OK, found=found)
+    try:
+        models = sum(1 for _ in workspace.fault_models())
+        found = f"{workspace.templates}: {models} fault models"
+        yield Finding(name="templates", level=Level.OK, found=found)
+    except MutatorError as e:
+        yield Finding(name="templates", level=Level.FAIL, found=str(e), remedy=e.remedy or "")
+    for name in workspace.target_names():
+        try:
+            manifest = workspace.manifest(name)
+            found = f"{manifest.root}: {len(manifest.tree.files)} files"
+            yield Finding(name=f"target {name}", level=Level.OK, found=found)
+        except MutatorError as e:
+            yield Finding(name=f"target {name}", level=Level.FAIL, found=str(e), remedy=e.remedy or "")

@@ -1,0 +1,137 @@
+"""The report of a run: REPORT.md, and one HTML page that needs nothing but itself, its patches and plots.
+
+Written from results.csv and the run folder alone, so it can be made again at any time, the same each time.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator import tables
+from mutator.model import Status
+from mutator.runfolder import RunFolder
+from mutator.tables import Count, Row
+
+FOLDER = "report"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """Where a report was written, and of how many experiments it tells."""
+
+    markdown: Path
+    page: Path
+    rows: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table of counts, ready to be printed."""
+
+    title: str
+    heads: list[str]
+    lines: list[list[str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One experiment in the page: its row, and where its diff and plot are seen from the report."""
+
+    row: Row
+    patch: str | None
+    plot: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """What both forms of the report say."""
+
+    name: str
+    facts: list[tuple[str, str]]
+    outcomes: dict[str, int]
+    tables: list[Table]
+    failed: list[Row]  # runs that did not end well, harness errors first
+    experiments: list[Line]
+
+
+def write(run: Path) -> Report:
+    """Write the report of a run folder whose results.csv is up to date."""
+    from mutator.report_page import markdown, page
+
+    folder = RunFolder.open(run)
+    rows = tables.read_results(run / "results.csv")
+    content = _content(folder, rows)
+    out = run / FOLDER
+    out.mkdir(exist_ok=True)
+    report = Report(markdown=out / "REPORT.md", page=out / "index.html", rows=len(rows))
+    _replace(report.markdown, markdown(content))
+    _replace(report.page, page(content))
+    return report
+
+
+def _content(folder: RunFolder, rows: Sequence[Row]) -> Content:
+    failed = [r for r in rows if r.status is not Status.OK]
+    return Content(
+        name=str(folder.head.get("campaign", folder.path.name)),
+        facts=_facts(folder, rows),
+        outcomes=tables.outcome_counts(rows),
+        tables=_tables(rows),
+        failed=sorted(
+            failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
+        ),
+        experiments=[_line(folder, row) for row in sorted(rows, key=_reading_order)],
+    )
+
+
+def _facts(folder: RunFolder, rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Provenance, flattened: one line a fact."""
+    facts = [("experiments in the table", str(len(rows)))]
+    facts += _flat("", folder.head)
+    return facts
+
+
+def _flat(prefix: str, data: Any) -> list[tuple[str, str]]:
+    if isinstance(data, dict):
+        return [fact for key, value in data.items() for fact in _flat(f"{prefix} {key}".strip(), value)]
+    if isinstance(data, list) and len(data) > 8:
+        return []
+    text = ", ".join(map(str, data)) if isinstance(data, list) else str(data)
+    return [] if data is None or text == "" else [(prefix, text)]
+
+
+def _tables(rows: Sequence[Row]) -> list[Table]:
+    keys = (
+        ("By fault type", "fault type", tables.by_fault_type),
+        ("By scenario", "scenario", tables.by_scenario),
+        ("By method", "method", tables.by_method),
+    )
+    hazards = tables.hazard_names(rows)
+    made = []
+    for title, head, key in keys:
+        counts: tuple[Count, ...] = tables.counts_by(rows, key)
+        heads, lines = tables.count_table(counts, head, hazards)
+        made.append(Table(title=title, heads=heads, lines=lines))
+    return made
+
+
+def _reading_order(row: Row) -> tuple[str, ...]:
+    return (row.module, row.fault_type, row.scenario, row.method, row.trigger, row.experiment_id)
+
+
+def _line(folder: RunFolder, row: Row) -> Line:
+    out = folder.path / FOLDER
+    plot = folder.path / "plots" / f"{row.experiment_id}.svg"
+    return Line(row=row, patch=_link(folder.patch(row.experiment_id), out), plot=_link(plot, out))
+
+
+def _link(file: Path, seen_from: Path) -> str | None:
+    return Path(os.path.relpath(file, seen_from)).as_posix() if file.exists() else None
+
+
+def _replace(path: Path, text: str) -> None:
+    """Whole or not at all: a reader never meets half a report."""
+    temporary = path.with_name(path.name + ".tmp")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)

@@ -1,0 +1,150 @@
+"""The two forms of a report: Markdown for reading anywhere, one HTML page without outside help."""
+
+from typing import TYPE_CHECKING
+
+from mutator.tables import Row
+
+if TYPE_CHECKING:
+    from mutator.report import Content
+
+LISTED = 30  # failed runs that the Markdown lists; the page lists all
+
+NOTES = """\
+*Injected* counts the experiments that say something about their fault; a harness error, or a mutant that could
+not be made, is counted apart. *Activated*: an injected statement ran while triggered. *Manifested*: an actuator
+output then differed from the fault-free run. *Hazard, no alert*: no counted alert in the whole run."""
+
+
+def markdown(content: "Content") -> str:
+    """The report as Markdown."""
+    parts = [f"# {content.name}", _outcome_text(content), NOTES.replace("\n", " ")]
+    for table in content.tables:
+        parts += [f"## {table.title}", _markdown_table(table.heads, table.lines)]
+    if content.failed:
+        parts += ["## Runs that did not end well", _failed_text(content)]
+    parts += [
+        "## Where this comes from",
+        _markdown_table(["what", "value"], [list(f) for f in content.facts]),
+    ]
+    parts.append("The table of all experiments is `results.csv`; `index.html` lists them with their diffs.")
+    return "\n\n".join(parts) + "\n"
+
+
+def _outcome_text(content: "Content") -> str:
+    total = sum(content.outcomes.values())
+    return f"{total} experiments: " + ", ".join(f"{n} {name}" for name, n in content.outcomes.items()) + "."
+
+
+def _failed_text(content: "Content") -> str:
+    lines = [
+        [r.status.value, r.experiment_id, r.fault, r.scenario, r.detail] for r in content.failed[:LISTED]
+    ]
+    table = _markdown_table(["status", "experiment", "fault", "scenario", "what was said"], lines)
+    more = len(content.failed) - LISTED
+    return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
+
+
+def _markdown_table(heads: list[str], lines: list[list[str]]) -> str:
+    def row(cells: list[str]) -> str:
+        return "| " + " | ".join(c.replace("|", "\\|").replace("\n", " ") for c in cells) + " |"
+
+    rule = "| " + " | ".join("---" for _ in heads) + " |"
+    return "\n".join([row(heads), rule, *(row(line) for line in lines)])
+
+
+def page(content: "Content") -> str:
+    """The report as one HTML page; every text in it is escaped."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["seconds"] = _seconds
+    template = environment.from_string(PAGE)
+    return template.render(content=content, notes=NOTES.replace("*", ""), hazards=_hazards)
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
+
+
+def _hazards(row: Row) -> str:
+    return ", ".join(f"{name} {t:.2f}" for name, t in row.hazards)
+
+
+PAGE = """\
+<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{{ content.name }} - fault injection report</title>
+<style>
+:root { color-scheme: light dark; --line: #8886; --shade: #8881; }
+body { font: 15px/1.45 system-ui, sans-serif; margin: 1.5rem auto; max-width: 78rem; padding: 0 1rem; }
+h1, h2 { line-height: 1.2; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
+th { background: var(--shade); }
+.counts td:not(:first-child), .counts th:not(:first-child), .number { text-align: right; }
+.counts tr:last-child td { font-weight: 600; border-top: 2px solid var(--line); }
+.hazard { color: #c62828; font-weight: 600; }
+.harness_error, .invalid_mutant { background: #c62828; color: #fff; }
+.crashed, .timeout { color: #8e24aa; font-weight: 600; }
+code { font-size: .9em; }
+.chips span { display: inline-block; margin: 0 .5rem .3rem 0; padding: .1rem .6rem;
+  border: 1px solid var(--line); border-radius: 1rem; }
+@media print { body { max-width: none; font-size: 10pt; } }
+</style>
+<h1>{{ content.name }}</h1>
+<p class="chips">{% for name, n in content.outcomes.items() %}
+<span class="{{ name }}">{{ n }} {{ name }}</span>
+{% endfor %}</p>
+<p>{{ notes }}</p>
+{% for table in content.tables %}
+<h2>{{ table.title }}</h2>
+<div class="scroll"><table class="counts">
+<tr>{% for head in table.heads %}<th>{{ head }}</th>{% endfor %}</tr>
+{% for line in table.lines %}
+<tr>{% for cell in line %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}
+</table></div>
+{% endfor %}
+{% if content.failed %}
+<h2>Runs that did not end well</h2>
+<div class="scroll"><table>
+<tr><th>status</th><th>experiment</th><th>fault</th><th>scenario</th><th>what was said</th></tr>
+{% for row in content.failed %}
+<tr><td class="{{ row.status.value }}">{{ row.status.value }}</td>
+<td><code>{{ row.experiment_id }}</code></td>
+<td>{{ row.fault }}</td><td>{{ row.scenario }}</td><td>{{ row.detail }}</td></tr>
+{% endfor %}
+</table></div>
+{% endif %}
+<h2>Experiments</h2>
+<p>Times are seconds of simulation. A plot is made by <code>mutator show EXPERIMENT</code>.</p>
+<div class="scroll"><table>
+<tr><th>experiment</th><th>fault</th><th>scenario</th><th>method</th><th>trigger</th><th>outcome</th>
+<th>activated</th><th>manifested</th><th>hazards</th><th>alerts</th><th>first alert</th><th>reaction</th>
+<th>see</th></tr>
+{% for line in content.experiments %}
+{% set row = line.row %}
+{% set ending = row.ending %}
+<tr id="{{ row.experiment_id }}"><td><code>{{ row.experiment_id }}</code></td><td>{{ row.fault }}</td>
+<td>{{ row.scenario }}</td><td>{{ row.method }}</td><td>{{ row.trigger }}</td>
+<td class="{{ ending }}">{{ ending }}</td>
+<td class="number">{{ row.t_activation | seconds }}</td><td class="number">{{ row.t_manifest | seconds }}</td>
+<td>{{ hazards(row) }}</td><td>{{ row.alerts | join(", ") }}</td>
+<td class="number">{{ row.t_alert | seconds }}</td><td class="number">{{ row.reaction_time | seconds }}</td>
+<td>{% if line.patch %}<a href="{{ line.patch }}">diff</a>{% endif %}
+{% if line.plot %}<a href="{{ line.plot }}">plot</a>{% endif %}</td></tr>
+{% endfor %}
+</table></div>
+<h2>Where this comes from</h2>
+<div class="scroll"><table>
+{% for name, value in content.facts %}
+<tr><td>{{ name }}</td><td>{{ value }}</td></tr>
+{% endfor %}
+</table></div>
+</html>
+"""
