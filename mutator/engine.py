@@ -1,11 +1,32 @@
 """Engines run jobs: a tree, a scenario, a seed. The reference engine: a fresh interpreter for each."""
 
+import json
+import os
+import re
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from mutator import bytecode
+from mutator.campaign import Limits
+from mutator.ids import digest
+from mutator.jsonio import disk_full, full_disk_told
+from mutator.manifest import TargetManifest
 from mutator.model import Status
+
+_CHILD = Path(__file__).with_name("child.py")
+_LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
+_LOG_TAIL = 4000
+_LEAST_FREE = 1 << 20  # a failed run on a disk with less room than this is not the target's failure
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+_OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,3 +62,227 @@ class Engine(Protocol):
     """Runs jobs and yields each with what came of it, in any order; `out` is valid until the next one."""
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Ended:
+    """How a child process ended: wait status, its CPU and wall time, and whether this engine killed it."""
+
+    code: int
+    cpu_s: float
+    wall_s: float
+    out_of_wall: bool
+
+
+class ReferenceEngine:
+    """A fresh interpreter per job, on a tree of its own, with nothing else of the package to import.
+
+    `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
+    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go).
+    """
+
+    def __init__(
+        self, manifest: TargetManifest, base: Path, work: Path, limits: Limits, parent: int | None = None
+    ) -> None:
+        self.manifest = manifest
+        self.base = base.resolve()
+        self.work = work.resolve()
+        self.limits = limits
+        self._pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
+        self._parent = parent
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+        for job in jobs:
+            folder = self.work / f"{os.getpid()}-{job.name}"
+            try:
+                yield job, self.execute(job, folder)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def execute(self, job: Job, folder: Path) -> Execution:
+        """Run one job in the new scratch folder `folder`, which is left to the caller."""
+        with full_disk_told(self.work):
+            request = self._prepare(job, folder)
+        ended = self._spawn(request, folder, job.hash_seed)
+        log = _tail(folder / "log")
+        report = _read_report(folder / "report.json")
+        status, detail = self._judge(job, ended, report)
+        if status is not Status.OK and _is_full(self.work, report):
+            raise disk_full(self.work)
+        return Execution(
+            status=status,
+            detail=_steady(detail, folder),
+            out=folder / "out",
+            probe=report.get("probe") if report else None,
+            cpu_s=ended.cpu_s,
+            wall_s=ended.wall_s,
+            log=log,
+        )
+
+    def _prepare(self, job: Job, folder: Path) -> Path:
+        """Write tree and request of a job; returns the request's file."""
+        tree, out = folder / "tree", folder / "out"
+        shutil.copytree(self.base, tree, copy_function=shutil.copyfile)
+        bytecode.put(job.files, tree)
+        out.mkdir()
+        arguments = self.manifest.arguments(
+            scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.changes
+        )
+        request = {
+            "parent": os.getpid(),
+            "tree": str(tree),
+            "package": self.manifest.package,
+            "module": self.manifest.entry_module,
+            "args": list(arguments),
+            "probe": f"{self.manifest.package}._fi" if job.mutant is not None else None,
+            "out": str(out),
+            "report": str(folder / "report.json"),
+            "cpu_s": self.limits.cpu_s,
+            "memory_mb": self.limits.memory_mb,
+            "steps": self.limits.steps,
+        }
+        path = folder / "job.json"
+        path.write_text(json.dumps(request), encoding="utf-8")
+        return path
+
+    def _spawn(self, request: Path, folder: Path, hash_seed: int) -> _Ended:
+        began = time.monotonic()
+        with (folder / "log").open("wb") as log:
+            child = subprocess.Popen(
+                [sys.executable, "-P", "-s", str(_CHILD), str(request)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=_environment(hash_seed, folder),
+                start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
+            )
+        try:
+            out_of_wall = not self._wait(child.pid, began + self.limits.wall_s)
+        finally:
+            _kill_group(child.pid)
+            _, code, usage = os.wait4(child.pid, 0)
+            child.returncode = os.waitstatus_to_exitcode(code)
+        return _Ended(
+            code=child.returncode,
+            cpu_s=usage.ru_utime + usage.ru_stime,
+            wall_s=time.monotonic() - began,
+            out_of_wall=out_of_wall,
+        )
+
+    def _wait(self, pid: int, deadline: float) -> bool:
+        """Wait until the process ended (true) or the deadline passed; leave if our own parent is gone."""
+        while (left := deadline - time.monotonic()) > 0:
+            if _ended_within(pid, min(left, _LOOK_UP_S)):
+                return True
+            if self._parent is not None and os.getppid() != self._parent:
+                raise SystemExit("the process that started this one is gone")
+        return False
+
+    def _judge(self, job: Job, ended: _Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
+        limits = self.limits
+        if report is not None:
+            return self._judge_report(job, report)
+        if ended.out_of_wall:
+            return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
+        if ended.code == -signal.SIGXCPU or (ended.code == -signal.SIGKILL and ended.cpu_s >= limits.cpu_s):
+            return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
+        if ended.code < 0 and -ended.code in _OUTSIDE_SIGNALS:
+            return Status.HARNESS_ERROR, f"killed from outside by {signal.Signals(-ended.code).name}"
+        if ended.code < 0:
+            return Status.CRASHED, f"killed by {signal.Signals(-ended.code).name}"
+        return Status.CRASHED, f"left with status {ended.code} without a report"
+
+    def _judge_report(self, job: Job, report: dict[str, Any]) -> tuple[Status, str]:
+        if problem := self._wrong_tree(job, report):
+            return Status.HARNESS_ERROR, problem
+        if report["ended"] == "steps":
+            return Status.TIMEOUT, f"limit of {self.limits.steps} simulation steps"
+        if report["ended"] == "error":
+            return Status.CRASHED, report["error"]
+        return Status.OK, ""
+
+    def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
+        """What is wrong with the tree that ran; empty if it was the job's."""
+        if report["outside"]:
+            return f"the package was also imported from {', '.join(report['outside'])}"
+        for path, found in report["files"].items():
+            expected = digest(job.files[path]) if path in job.files else self._pristine.get(path)
+            if found != expected:
+                return f"{path} in the tree that ran is not the one of this job"
+        if job.mutant is not None and (report["probe"] or {}).get("mutant") != job.mutant:
+            return "the probe that ran is not the one of this mutant"
+        return ""
+
+
+def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
+    """The pristine tree with its bytecode in the folder `dest`, made there unless it is already whole."""
+    if not dest.is_dir():
+        half = dest.with_name(f"{dest.name}.{os.getpid()}")
+        with full_disk_told(dest):
+            shutil.rmtree(half, ignore_errors=True)
+            bytecode.write_compiled(manifest.tree.files, half)
+            half.rename(dest)
+    return dest
+
+
+def _environment(hash_seed: int, folder: Path) -> dict[str, str]:
+    """The whole environment of a run: nothing of the user's but what starting Python needs."""
+    kept = {name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH", "HOME") if name in os.environ}
+    return kept | {
+        "LC_ALL": "C.UTF-8",
+        "PYTHONUTF8": "1",
+        "PYTHONHASHSEED": str(hash_seed),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "TMPDIR": str(folder),
+        **dict.fromkeys(_THREADS, "1"),
+    }
+
+
+def _ended_within(pid: int, seconds: float) -> bool:
+    """Whether the child ended within that time; it is not reaped."""
+    if not hasattr(os, "pidfd_open"):
+        time.sleep(min(seconds, 0.02))
+        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+    handle = os.pidfd_open(pid)
+    try:
+        poll = select.poll()
+        poll.register(handle, select.POLLIN)
+        return bool(poll.poll(seconds * 1000))
+    finally:
+        os.close(handle)
+
+
+def _kill_group(pid: int) -> None:
+    """Kill the child and whatever it started; nothing happens when all are gone."""
+    try:
+        os.killpg(pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        return
+
+
+def _tail(path: Path) -> str:
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _LOG_TAIL))
+        return file.read().decode("utf-8", "replace")
+
+
+def _read_report(path: Path) -> dict[str, Any] | None:
+    """The child's report; None when it did not come to write one, or only a part of it."""
+    try:
+        report: dict[str, Any] = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return None
+    return report
+
+
+def _is_full(work: Path, report: dict[str, Any] | None) -> bool:
+    if report is not None and report["disk_full"]:
+        return True
+    state = os.statvfs(work)
+    return state.f_bavail * state.f_frsize < _LEAST_FREE
+
+
+def _steady(detail: str, folder: Path) -> str:
+    """The text without what differs from run to run: scratch paths, addresses; kept short."""
+    text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
+    return re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]

@@ -1,13 +1,148 @@
-"""Filter expressions over table columns (`--only`, `--exclude`): parsed, never evaluated as code."""
+"""Filter expressions over table columns (`--only`, `--exclude`): parsed, never evaluated as code.
 
+fault_type == "chaff" and scenario in ("S1", "S2") and value > 100
+match(fault_type, "ghost*") and not method == "random"
+"""
+
+import ast
+import operator
 from collections.abc import Callable, Collection, Mapping
+from fnmatch import fnmatchcase
+
+from mutator.errors import MutatorError
+
+Row = Mapping[str, object]
+Predicate = Callable[[Row], bool]
+Getter = Callable[[Row], object]
+
+_ORDER: dict[type[ast.cmpop], Callable[[object, object], bool]] = {
+    ast.Lt: operator.lt,  # type: ignore[dict-item]
+    ast.LtE: operator.le,  # type: ignore[dict-item]
+    ast.Gt: operator.gt,  # type: ignore[dict-item]
+    ast.GtE: operator.ge,  # type: ignore[dict-item]
+}
+_LONGEST = 2000
+_ALLOWED = (
+    'columns, numbers, "strings", ==, !=, <, <=, >, >=, in, not in, and, or, not, match(column, "glob*")'
+)
 
 
-def compile_filter(text: str, columns: Collection[str]) -> Callable[[Mapping[str, object]], bool]:
-    """A predicate over rows, e.g. `fault_type == "chaff" and scenario in ("S1", "S2") and value > 100`.
+def compile_filter(text: str, columns: Collection[str]) -> Predicate:
+    """A predicate over rows.
 
     Allowed: the columns, numbers, strings, tuples and lists of them, comparisons, `in`, `not in`, and/or/not,
-    parentheses; `~` as infix is not known, use `match(column, "glob*")`. A comparison with an empty cell is
-    false. MutatorError shows the text, the place and the known columns.
+    parentheses, `match(column, "glob*")`. An empty cell is equal to nothing but `None`, and neither less nor
+    greater than anything. MutatorError shows the text, what is wrong with it and the known columns.
     """
-    raise NotImplementedError
+    if len(text) > _LONGEST:
+        raise _error(text[:60] + "...", f"a filter of {len(text)} characters", f"at most {_LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as err:
+        raise _error(text, f"not an expression ({getattr(err, 'msg', err)})", _ALLOWED) from None
+    return _Compiler(text, columns).predicate(tree.body)
+
+
+def _error(text: str, got: str, expected: str) -> MutatorError:
+    return MutatorError(f"{got} in the filter `{text}`", expected=expected)
+
+
+class _Compiler:
+    """Turns the nodes of one expression into closures."""
+
+    def __init__(self, text: str, columns: Collection[str]) -> None:
+        self.text = text
+        self.columns = columns
+
+    def predicate(self, node: ast.expr) -> Predicate:
+        if isinstance(node, ast.BoolOp):
+            parts = [self.predicate(v) for v in node.values]
+            if isinstance(node.op, ast.And):
+                return lambda row: all(part(row) for part in parts)
+            return lambda row: any(part(row) for part in parts)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            inner = self.predicate(node.operand)
+            return lambda row: not inner(row)
+        if isinstance(node, ast.Compare):
+            return self.comparison(node)
+        if isinstance(node, ast.Call):
+            return self.match(node)
+        if isinstance(node, ast.Name):
+            get = self.operand(node)
+            return lambda row: bool(get(row))
+        raise self.refuse(node)
+
+    def comparison(self, node: ast.Compare) -> Predicate:
+        operands = [self.operand(side) for side in (node.left, *node.comparators)]
+        links = [self.link(op) for op in node.ops]
+
+        def holds(row: Row) -> bool:
+            values = [get(row) for get in operands]
+            return all(link(values[i], values[i + 1]) for i, link in enumerate(links))
+
+        return holds
+
+    def link(self, op: ast.cmpop) -> Callable[[object, object], bool]:
+        if isinstance(op, ast.Eq):
+            return operator.eq
+        if isinstance(op, ast.NotEq):
+            return operator.ne
+        if isinstance(op, ast.In):
+            return lambda a, b: self.contains(b, a)
+        if isinstance(op, ast.NotIn):
+            return lambda a, b: not self.contains(b, a)
+        if type(op) in _ORDER:
+            return lambda a, b: self.ordered(type(op), a, b)
+        raise _error(self.text, "`is`", "== or !=")
+
+    def contains(self, group: object, value: object) -> bool:
+        if not isinstance(group, tuple | str) or (isinstance(group, str) and not isinstance(value, str)):
+            raise _error(self.text, f"{group!r} on the right of `in`", "a tuple, or a text for a text")
+        return value in group
+
+    def ordered(self, op: type[ast.cmpop], a: object, b: object) -> bool:
+        if a is None or b is None:
+            return False
+        try:
+            return _ORDER[op](a, b)
+        except TypeError:
+            raise _error(
+                self.text, f"{a!r} compared with {b!r}", "numbers with numbers, texts with texts"
+            ) from None
+
+    def match(self, node: ast.Call) -> Predicate:
+        if not (isinstance(node.func, ast.Name) and node.func.id == "match" and len(node.args) == 2):
+            raise self.refuse(node)
+        pattern = node.args[1]
+        if node.keywords or not (isinstance(pattern, ast.Constant) and isinstance(pattern.value, str)):
+            raise self.refuse(node)
+        get, glob = self.operand(node.args[0]), pattern.value
+
+        def matches(row: Row) -> bool:
+            value = get(row)
+            return value is not None and fnmatchcase(str(value), glob)
+
+        return matches
+
+    def operand(self, node: ast.expr) -> Getter:
+        if isinstance(node, ast.Name):
+            name = node.id
+            if name not in self.columns:
+                raise _error(self.text, f"unknown column `{name}`", "one of " + ", ".join(self.columns))
+            return lambda row: row[name]
+        constant = self.constant(node)
+        return lambda row: constant
+
+    def constant(self, node: ast.expr) -> object:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float | str | bool | None):
+            return node.value
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            value = self.constant(node.operand)
+            if isinstance(value, int | float):
+                return -value
+        if isinstance(node, ast.Tuple | ast.List | ast.Set):
+            return tuple(self.constant(item) for item in node.elts)
+        raise self.refuse(node)
+
+    def refuse(self, node: ast.expr) -> MutatorError:
+        return _error(self.text, f"`{ast.unparse(node)}`", _ALLOWED)

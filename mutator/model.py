@@ -138,7 +138,9 @@ class Experiment:
 
     @cached_property
     def id(self) -> str:
-        return content_id(self)
+        # through the fault's id, not its whole content: a plan hashes each fault once, not once a run
+        parts = (self.scenario, self.scenario_digest, self.method, self.trigger, self.seed)
+        return content_id([self.fault.id, *parts])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,17 +1,44 @@
 """From what a run recorded to its verdict: pure functions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from mutator.model import Activation, Outcome
 
-
-def judge(
-    *, activation: Activation | None, t_manifest: float | None, hazards: Sequence[tuple[str, float]]
-) -> Outcome:
-    """The outcome of an experiment that ran: not_activated, hazard, sdc or masked, the first that applies."""
-    raise NotImplementedError
+Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
 
-def reaction_time(t_hazard: float | None, t_alert: float | None) -> float | None:
-    """First hazard minus first alert in s; None unless the alert came strictly before the hazard."""
-    raise NotImplementedError
+def first_events(events: Iterable[tuple[str, float]], activation: Activation | None) -> Events:
+    """The first event of each name at or after the activation, by time then name; none without activation.
+
+    What came before cannot be the fault's doing.
+    """
+    if activation is None:
+        return ()
+    first: dict[str, float] = {}
+    for name, time in events:
+        if time >= activation.first and time < first.get(name, float("inf")):
+            first[name] = time
+    return tuple(sorted(first.items(), key=lambda event: (event[1], event[0])))
+
+
+def judge(*, activation: Activation | None, t_manifest: float | None, hazards: Events) -> Outcome:
+    """The outcome of an experiment that ran: not_activated, hazard, sdc or masked, the first that applies.
+
+    `hazards` are those at or after the activation. A hazard counts even if no actuator output differed: the
+    fault may act on the world itself.
+    """
+    if activation is None:
+        return Outcome.NOT_ACTIVATED
+    if hazards:
+        return Outcome.HAZARD
+    return Outcome.MASKED if t_manifest is None else Outcome.SDC
+
+
+def reaction_time(hazards: Events, alerts: Events) -> float | None:
+    """First hazard minus first alert in s: the time a driver would have had.
+
+    None when either is missing and when the alert did not come strictly before the hazard.
+    """
+    if not hazards or not alerts or alerts[0][1] >= hazards[0][1]:
+        return None
+    return hazards[0][1] - alerts[0][1]

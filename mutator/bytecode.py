@@ -1,0 +1,38 @@
+"""Trees with bytecode that cannot be stale: each .pyc carries the hash of its source, checked on import.
+
+The usual .pyc is trusted when size and time of the source match, so a copied __pycache__ beside a changed
+file of equal size could run the pristine code.
+"""
+
+from collections.abc import Mapping
+from importlib.util import cache_from_source
+from pathlib import Path
+from py_compile import PycInvalidationMode, PyCompileError, compile
+
+
+def write_compiled(files: Mapping[str, bytes], dest: Path) -> None:
+    """Write a tree (path relative to `dest` -> content) with the bytecode of its Python files."""
+    for name, data in files.items():
+        path = dest / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+        if path.suffix == ".py":
+            _compile(path, name)
+
+
+def put(files: Mapping[str, bytes], tree: Path) -> None:
+    """Put changed and new files into a tree; their bytecode is dropped, to be made on import."""
+    for name, data in files.items():
+        path = tree / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+        if path.suffix == ".py":
+            Path(cache_from_source(str(path))).unlink(missing_ok=True)
+
+
+def _compile(path: Path, name: str) -> None:
+    """Compile one file; one that does not compile is left for its import to complain about."""
+    try:
+        compile(str(path), dfile=name, doraise=True, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
+    except PyCompileError:
+        return

@@ -1,0 +1,111 @@
+"""One run of a target in a fresh interpreter: `python -P -s child.py job.json`. Standard library only.
+
+Written to be read by nobody but this process: it imports nothing of the harness, so that no harness code can
+change what the target does. It limits itself, puts the tree first on sys.path, runs the entry module as
+`__main__`, and writes report.json: how the run ended, which files of the package were loaded (with digests),
+and what the probe counted.
+"""
+
+import ctypes
+import errno
+import hashlib
+import importlib
+import json
+import os
+import resource
+import runpy
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+_PR_SET_PDEATHSIG = 1
+_FILE_LIMIT = 1 << 28  # bytes that a run may write into one file
+_HARD_CPU_EXTRA_S = 5  # who ignores SIGXCPU is killed this much later
+
+
+def main(job_file: str) -> int:
+    job = json.loads(Path(job_file).read_text(encoding="utf-8"))
+    die_with_parent(job["parent"])
+    limit_resources(job)
+    os.chdir(job["out"])
+    sys.path.insert(0, job["tree"])
+    report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
+    probe = None
+    try:
+        if job["probe"]:
+            probe = importlib.import_module(job["probe"])
+            probe.limit(job["steps"])
+        run_module(job["module"], job["args"])
+    except BaseException as err:
+        report |= describe(err, job["tree"], probe)
+    report |= loaded_files(job["package"], job["tree"])
+    report["probe"] = probe.report() if probe else None
+    Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
+    return 0
+
+
+def die_with_parent(parent: int) -> None:
+    """Have the kernel kill this process when its parent dies (not on Linux: the CPU limit ends it)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def limit_resources(job: dict[str, Any]) -> None:
+    memory = job["memory_mb"] << 20
+    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + _HARD_CPU_EXTRA_S))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (_FILE_LIMIT, _FILE_LIMIT))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def run_module(module: str, args: list[str]) -> None:
+    """Run `module` as `python -m` would; leaving with status 0 is a good end."""
+    sys.argv = [module, *args]
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        if end.code not in (None, 0):
+            raise
+
+
+def describe(err: BaseException, tree: str, probe: Any) -> dict[str, Any]:
+    """How a run ended that did not end well, in words that are the same each time."""
+    if probe is not None and isinstance(err, probe.StepLimit):
+        return {"ended": "steps"}
+    where = place(err, tree)
+    text = f"exit status {err.code}" if isinstance(err, SystemExit) else f"{type(err).__name__}: {err}"
+    full = isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
+    return {"ended": "error", "error": text + where, "disk_full": full}
+
+
+def place(err: BaseException, tree: str) -> str:
+    """` (file:line)` of the innermost frame that is in the tree."""
+    found = ""
+    frame = err.__traceback__
+    while frame is not None:
+        file = frame.tb_frame.f_code.co_filename
+        if file.startswith(tree + os.sep):
+            found = f" ({os.path.relpath(file, tree)}:{frame.tb_lineno})"
+        frame = frame.tb_next
+    return found
+
+
+def loaded_files(package: str, tree: str) -> dict[str, Any]:
+    """Files of the package that were imported: digests of those in the tree, paths of any others."""
+    inside, outside = {}, []
+    for name, module in sorted(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if name.partition(".")[0] != package or file is None:
+            continue
+        if file.startswith(tree + os.sep):
+            inside[os.path.relpath(file, tree)] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        else:
+            outside.append(file)
+    return {"files": inside, "outside": outside}
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

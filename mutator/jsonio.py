@@ -1,0 +1,90 @@
+"""Files of the harness's own: schema versions checked on reading, whole or not at all on writing."""
+
+import errno
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
+
+
+class DiskFull(MutatorError):
+    """No space left: nothing that was finished is lost, and the same command goes on once there is room."""
+
+    exit_code = EXIT_HARNESS_ERRORS
+
+
+def is_disk_full(err: BaseException) -> bool:
+    """Whether the file system said that there is no room (or no quota) left."""
+    return isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def disk_full(where: Path) -> DiskFull:
+    return DiskFull(
+        "no space left on this disk",
+        where=where,
+        remedy="make room and give the same command again; finished experiments are kept and not repeated",
+    )
+
+
+@contextmanager
+def full_disk_told(where: Path) -> Iterator[None]:
+    """Turn the file system's ENOSPC into DiskFull."""
+    try:
+        yield
+    except OSError as err:
+        if is_disk_full(err):
+            raise disk_full(where) from err
+        raise
+
+
+def write_atomic(path: Path, data: bytes) -> None:
+    """Write the whole file or leave the old one; DiskFull when there is no room."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with full_disk_told(path):
+        try:
+            with temporary.open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+def write_json(path: Path, data: dict[str, Any]) -> None:
+    """Write `data` (which names its schema) for people and programs."""
+    write_atomic(path, (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode())
+
+
+def read_json(path: Path, schema: str) -> dict[str, Any]:
+    """Read a JSON object of `schema` (`name/version`) or an older version of it."""
+    try:
+        data = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        raise MutatorError("no such file", where=path) from None
+    except (ValueError, UnicodeDecodeError) as err:
+        raise MutatorError(f"not JSON ({err})", where=path, remedy="delete it if it is damaged") from None
+    if not isinstance(data, dict):
+        raise MutatorError(f"a {type(data).__name__}", where=path, expected="a JSON object")
+    check_schema(data.get("schema"), schema, path)
+    return data
+
+
+def check_schema(found: object, schema: str, where: Path) -> None:
+    """Refuse what is no `schema` (`name/version`), and every newer version of it."""
+    name, _, known = schema.partition("/")
+    found_name, _, version = str(found).partition("/")
+    if found_name != name or not version.isdigit():
+        raise MutatorError(f"schema {found!r}", where=where, expected=repr(schema))
+    if int(version) > int(known):
+        raise MutatorError(
+            f"schema {found!r} was written by a newer mutator",
+            where=where,
+            expected=f"{schema!r} or older",
+            remedy="update mutator, or use another folder",
+        )
