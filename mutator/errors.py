@@ -1,6 +1,7 @@
 """Errors a user can mend, and the exit codes of every command."""
 
 from pathlib import Path
+from typing import Any
 
 EXIT_OK = 0
 EXIT_CHECK_FAILED = 1
@@ -45,7 +46,7 @@ class MutatorError(Exception):
         text = "; ".join(parts)
         return f"{place}: {text}" if place else text
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[object, ...]:
         state = {
             "where": self.where,
             "line": self.line,
@@ -55,7 +56,7 @@ class MutatorError(Exception):
         return _rebuild, (type(self), self.got, state)
 
 
-def _rebuild(cls: type[MutatorError], got: str, state: dict) -> MutatorError:
+def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> MutatorError:
     return cls(got, **state)
 
 

@@ -1,9 +1,19 @@
 """From spec to faults: values drawn, units converted, parameters checked against their model."""
 
+import math
+from collections.abc import Iterator
+
+from mutator import units
+from mutator.draws import generator
+from mutator.errors import MutatorError
 from mutator.fault_models import FaultModels
+from mutator.injections import InjectionSpec
 from mutator.manifest import TargetManifest
-from mutator.model import Fault
-from mutator.spec import AS_DESCRIBED, FaultSpec
+from mutator.model import Fault, Injection
+from mutator.params import resolve
+from mutator.paths import check_location
+from mutator.spec import AS_DESCRIBED, READINGS, Draw, FaultSpec, Variant
+from mutator.yamlio import Keys
 
 
 def expand(
@@ -21,4 +31,104 @@ def expand(
     outside the target or in a forbidden place, a change the target does not offer. Anchors are resolved when
     a mutant is built.
     """
-    raise NotImplementedError
+    if reading not in READINGS:
+        raise MutatorError(f"reading '{reading}'", expected=f"one of {', '.join(READINGS)}")
+    expander = _Expander(spec, seed, reading, models, manifest)
+    return tuple(fault for variant in spec for fault in expander.faults(variant))
+
+
+def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
+    """The values of `draw` for `seed`, in its own unit: one from each range, or the list as it is.
+
+    Each is low + u * width for one uniform number u of the generator's stream, so it depends on nothing but
+    seed, key and range.
+    """
+    if draw.kind == "list":
+        return draw.values
+    stream = generator(seed, draw.key).random(len(draw.ranges))
+    values = []
+    for (low, high), u in zip(draw.ranges, map(float, stream), strict=True):
+        value: int | float
+        if draw.kind == "integers":
+            value = int(low) + math.floor(u * (int(high) - int(low) + 1))
+        else:
+            value = low + u * (high - low)
+            value = value if draw.decimals is None else round(value, draw.decimals)
+        values.append(value if draw.cap is None else type(value)(min(value, draw.cap)))
+    return tuple(values)
+
+
+class _Expander:
+    """Expands the variants of one spec in one reading."""
+
+    def __init__(
+        self, spec: FaultSpec, seed: int, reading: str, models: FaultModels, manifest: TargetManifest
+    ) -> None:
+        self.spec = spec
+        self.seed = seed
+        self.reading = reading
+        self.models = models
+        self.manifest = manifest
+
+    def faults(self, variant: Variant) -> Iterator[Fault]:
+        """One fault for each value of the variant's draw, or the one fault of a variant without."""
+        self._check(variant)
+        draw = variant.draw
+        unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"
+        values: tuple[int | float | None, ...] = draw_values(draw, self.seed) if draw else (None,)
+        for number, value in enumerate(values):
+            yield Fault(
+                spec=f"{self.spec.name}/{variant.name}",
+                module=self.spec.module,
+                fault_type=self.spec.fault_type,
+                reading=self.reading,
+                value=value,
+                unit=unit,
+                aim=variant.aim,
+                injections=self._injections(variant, value, number),
+                hold=variant.hold,
+                changes=variant.changes,
+            )
+
+    def _injections(self, variant: Variant, value: int | float | None, number: int) -> tuple[Injection, ...]:
+        return tuple(
+            resolve(
+                injection,
+                self.models.get(injection.model),
+                self.spec.source,
+                draw=variant.draw,
+                value=value,
+                seed=self.seed,
+                key=f"{self.spec.name}/{variant.name}/{number}/{i}",
+            )
+            for i, injection in enumerate(variant.injections(self.reading))
+        )
+
+    def _check(self, variant: Variant) -> None:
+        if variant.aim not in self.manifest.hazards:
+            raise self._wrong((*variant.keys, "aim"), f"aim '{variant.aim}'", self.manifest.hazards)
+        for i, change in enumerate(variant.changes):
+            if change not in self.manifest.changes:
+                keys = (*variant.keys, "changes", i)
+                raise self._wrong(keys, f"change '{change}'", tuple(self.manifest.changes))
+        for injection in variant.injections(self.reading):
+            self._check_injection(injection)
+
+    def _check_injection(self, injection: InjectionSpec) -> None:
+        keys: Keys = (*injection.keys, "model")
+        try:
+            self.models.get(injection.model)
+            keys = (*injection.keys, "at", "file")
+            check_location(self.manifest, injection.location)
+        except MutatorError as error:
+            raise self.spec.source.error(
+                keys, error.got, expected=error.expected, remedy=error.remedy
+            ) from None
+
+    def _wrong(self, keys: Keys, got: str, known: tuple[str, ...]) -> MutatorError:
+        return self.spec.source.error(
+            keys,
+            got,
+            expected=f"one of {', '.join(known) or 'none'}, as in {self.manifest.path.name}",
+            remedy="correct it",
+        )

@@ -1,7 +1,26 @@
 """Is everything in the library usable? What `mutator check` asks."""
 
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from mutator import splice
+from mutator.anchors import parse_file
 from mutator.errors import MutatorError
+from mutator.expand import expand
+from mutator.fault_models import Example, FaultModel, FaultModels
+from mutator.manifest import TargetManifest
+from mutator.model import Fault, Trigger
+from mutator.mutant import build, injection_edit, unsplice
+from mutator.params import resolve
+from mutator.spec import READINGS, FaultSpec
+from mutator.stpa import ContextTable
+from mutator.trigger import always
 from mutator.workspace import Workspace
+
+EXAMPLE_TAG = "example"
+T = TypeVar("T")
 
 
 def check_library(workspace: Workspace, target: str = "openpilot") -> list[MutatorError]:
@@ -11,4 +30,111 @@ def check_library(workspace: Workspace, target: str = "openpilot") -> list[Mutat
     that every spec expands in both readings; that every anchor is found in the target exactly once; and that
     one mutant of every shape compiles and un-splices.
     """
-    raise NotImplementedError
+    found = _Found()
+    manifest = found.tried(lambda: workspace.manifest(target))
+    models = found.tried(workspace.fault_models)
+    hazards = found.tried(workspace.hazards)
+    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_table_names()]
+    specs = [found.tried(partial(workspace.spec, path)) for path in workspace.spec_files()]
+    if models:
+        found.problems += check_examples(models)
+    if manifest and hazards:
+        found.problems += _unknown_hazards(manifest, tuple(hazards.hazards), [t for t in tables if t])
+    if manifest and models and found.tried(lambda: build(manifest, models, None, always())):
+        for spec in specs:
+            found.problems += check_spec(spec, models, manifest) if spec else ()
+    if not found.problems:
+        found.tried(workspace.specs)
+    return found.problems
+
+
+class _Found:
+    """Collects problems instead of stopping at the first."""
+
+    def __init__(self) -> None:
+        self.problems: list[MutatorError] = []
+
+    def tried(self, make: Callable[[], T]) -> T | None:
+        """What `make` returns; None, and a problem kept, when it fails."""
+        try:
+            return make()
+        except MutatorError as error:
+            self.problems.append(error)
+            return None
+
+
+def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
+    """Problems of one spec: expansion in both readings, anchors, and a mutant of each shape."""
+    for reading in READINGS:
+        try:
+            faults = expand(spec, 0, reading, models=models, manifest=manifest)
+        except MutatorError as error:
+            yield error
+            return
+        for variant in spec:
+            name = f"{spec.name}/{variant.name}"
+            fault = next(f for f in faults if f.spec == name)
+            problem = _build(fault, models, manifest, always())
+            if problem:
+                keys = (*variant.keys, reading) if reading in variant.readings else variant.keys
+                yield spec.source.error(
+                    keys, f"{name} ({reading}): {problem}", remedy="correct the spec or the target"
+                )
+
+
+def _build(
+    fault: Fault, models: FaultModels, manifest: TargetManifest, trigger: Trigger
+) -> MutatorError | None:
+    try:
+        build(manifest, models, fault, trigger)
+    except MutatorError as error:
+        return error
+    return None
+
+
+def _unknown_hazards(
+    manifest: TargetManifest, known: tuple[str, ...], tables: list[ContextTable]
+) -> Iterator[MutatorError]:
+    for name in manifest.hazards:
+        if name not in known:
+            yield MutatorError(f"hazard '{name}'", where=manifest.path, expected=f"one of {', '.join(known)}")
+    for table in tables:
+        for row in table.rows:
+            for action, verdicts in row.actions.items():
+                for hazard in (verdicts.provided, verdicts.not_provided):
+                    if hazard is not None and hazard not in known:
+                        yield MutatorError(
+                            f"hazard '{hazard}' of {action} in {row.id}",
+                            where=table.path,
+                            expected=f"one of {', '.join(known)}, or null",
+                        )
+
+
+def check_examples(models: FaultModels) -> Iterator[MutatorError]:
+    """Problems of the models' own examples."""
+    for model in models:
+        for example in model.examples:
+            try:
+                after = run_example(model, models, example)
+            except MutatorError as error:
+                yield MutatorError(f"the example fails: {error}", where=model.source.path, line=example.line)
+                continue
+            if after != example.after:
+                yield MutatorError(
+                    f"the example gives\n{after}",
+                    where=model.source.path,
+                    line=example.line,
+                    expected=f"\n{example.after}",
+                    remedy="correct the template or the example",
+                )
+
+
+def run_example(model: FaultModel, models: FaultModels, example: Example) -> str:
+    """The example's `before` with its injection spliced in (tag `example`); it must un-splice again."""
+    file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
+    injection = resolve(example.injection, model, model.source)
+    edit = injection_edit(file, models, injection, EXAMPLE_TAG)
+    after = splice.joined(splice.apply(file, [edit]))
+    if unsplice(after) != file.data:
+        raise MutatorError("the example does not un-splice to its `before`")
+    return after.decode()

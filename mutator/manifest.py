@@ -1,15 +1,21 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from pydantic import Field
+
+from mutator.errors import MutatorError
+from mutator.locations import AtModel, dotted_name
 from mutator.model import FaultLocation
+from mutator.paths import inside
+from mutator.sources import SourceTree, read_tree
+from mutator.yamlio import Source, StrictModel, read
 
-if TYPE_CHECKING:
-    from mutator.sources import SourceTree
+SCHEMA = "target/1"
+OBSERVED = ("t", "d_rel", "v_ego", "v_lead")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,12 +64,18 @@ class TargetManifest:
     observation: Observation
     hazards: tuple[str, ...]
     alerts: tuple[str, ...]  # alerts that count in experiments
-    lines: Mapping[str, int] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
-    def tree(self) -> "SourceTree":
+    def tree(self) -> SourceTree:
         """The target's files, read once."""
-        raise NotImplementedError
+        tree = read_tree(self.root, self.files)
+        if not any(path.startswith(f"{self.package}/") for path in tree.files):
+            raise MutatorError(
+                f"no file of package '{self.package}' under {self.root}",
+                where=self.path,
+                remedy="correct `root`, `package` or `files`",
+            )
+        return tree
 
     @property
     def probe_path(self) -> str:
@@ -74,9 +86,125 @@ class TargetManifest:
         self, *, scenario: Path, seed: int, out: Path, changes: tuple[str, ...] = ()
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
-        raise NotImplementedError
+        places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
+        extra: list[str] = []
+        for change in changes:
+            if change not in self.changes:
+                raise MutatorError(
+                    f"change '{change}'",
+                    where=self.path,
+                    expected=f"one of {', '.join(self.changes) or 'none'}",
+                    remedy="add it to the manifest's `changes`, or correct the spec",
+                )
+            extra += self.changes[change]
+        filled = [places.get(argument, argument) for argument in self.entry_args]
+        return (*filled, *extra)
+
+
+class _ChannelModel(StrictModel):
+    unit: str
+    tolerance: float = Field(0.0, ge=0.0, allow_inf_nan=False)
+
+
+class _EntryModel(StrictModel):
+    module: str
+    args: list[str]
+    changes: dict[str, list[str]] = Field(default_factory=dict)
+
+
+class _ObservationModel(StrictModel):
+    at: AtModel
+    t: str
+    d_rel: str
+    v_ego: str
+    v_lead: str
+
+
+class _ManifestModel(StrictModel):
+    name: str
+    about: str = ""
+    root: str
+    package: str
+    files: list[str]
+    forbid: list[str] = Field(default_factory=list)
+    step_s: float = Field(gt=0.0, allow_inf_nan=False)
+    entry: _EntryModel
+    trace_file: str
+    time_channel: str
+    record_file: str
+    compare: dict[str, _ChannelModel]
+    plot: dict[str, _ChannelModel] = Field(default_factory=dict)
+    observation: _ObservationModel
+    hazards: list[str]
+    alerts: list[str]
 
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
-    raise NotImplementedError
+    model, source = read(path, _ManifestModel, SCHEMA)
+    folder = (root or path.parent / model.root).resolve()
+    if not folder.is_dir():
+        raise source.error(
+            ("root",),
+            f"no folder {folder}",
+            expected="the target's source root, relative to this file",
+            remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
+        )
+    _check_names(model, source)
+    return TargetManifest(
+        name=model.name,
+        path=path,
+        root=folder,
+        package=model.package,
+        files=tuple(model.files),
+        forbid=tuple(model.forbid),
+        entry_module=model.entry.module,
+        entry_args=tuple(model.entry.args),
+        changes={name: tuple(args) for name, args in model.entry.changes.items()},
+        step_s=model.step_s,
+        trace_file=model.trace_file,
+        time_channel=model.time_channel,
+        compared=_channels(model.compare),
+        plotted=_channels(model.plot),
+        record_file=model.record_file,
+        observation=_observation(model.observation, source, folder),
+        hazards=tuple(model.hazards),
+        alerts=tuple(model.alerts),
+    )
+
+
+def _check_names(model: _ManifestModel, source: Source) -> None:
+    if not model.package.isidentifier():
+        raise source.error(("package",), f"'{model.package}'", expected="a Python package's name")
+    if not all(part.isidentifier() for part in model.entry.module.split(".")):
+        raise source.error(("entry", "module"), f"'{model.entry.module}'", expected="a dotted module name")
+    for key in ("trace_file", "record_file"):
+        name = getattr(model, key)
+        if Path(name).name != name:
+            raise source.error((key,), f"'{name}'", expected="a bare file name, made in {out}")
+
+
+def _channels(channels: Mapping[str, _ChannelModel]) -> tuple[Channel, ...]:
+    return tuple(Channel(name=n, unit=c.unit, tolerance=c.tolerance) for n, c in channels.items())
+
+
+def _observation(model: _ObservationModel, source: Source, root: Path) -> Observation:
+    location = model.at.location(source, ("observation", "at"))
+    try:
+        inside(root, location.path)
+    except MutatorError as error:
+        raise source.error(
+            ("observation", "at", "file"), error.got, expected=error.expected, remedy=error.remedy
+        ) from None
+    expressions = []
+    for name in OBSERVED:
+        text = getattr(model, name)
+        if not dotted_name(text):
+            raise source.error(
+                ("observation", name),
+                f"'{text}'",
+                expected="a dotted name",
+                remedy="name a local or attribute",
+            )
+        expressions.append((name, text))
+    return Observation(location=location, expressions=tuple(expressions))

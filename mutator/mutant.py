@@ -1,13 +1,24 @@
 """From a fault and a trigger to changed files: built, compiled, diffed, identified."""
 
+import shutil
+from collections.abc import ItemsView
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from mutator import patch, splice
+from mutator.anchors import ParsedFile
 from mutator.errors import MutatorError
-from mutator.fault_models import FaultModels
+from mutator.fault_models import FaultModels, SnippetKind
+from mutator.ids import content_id
 from mutator.manifest import TargetManifest
-from mutator.model import Fault, Trigger
+from mutator.model import Fault, Hold, Injection, Trigger
+from mutator.paths import check_location
+from mutator.render import render, snippet
+from mutator.sources import read_tree
+from mutator.trigger import check_condition, to_code
+
+_OBSERVE_TAG = "observe"
 
 
 class InvalidMutant(MutatorError):
@@ -39,24 +50,158 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     `fault.hold` goes before `trigger.hold`. MutatorError when an anchor is not found or ambiguous (candidates
     are listed), InvalidMutant when the result does not compile.
     """
-    raise NotImplementedError
+    injections = fault.injections if fault else ()
+    names = tuple(injection_id(i, injection) for i, injection in enumerate(injections))
+    hold = fault.hold if fault and fault.hold else trigger.hold
+    mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
+    edits: dict[str, list[splice.Edit]] = {}
+    _add(edits, manifest.observation.location.path, _observation(manifest))
+    for name, injection in zip(names, injections, strict=True):
+        check_location(manifest, injection.location)
+        _add(edits, injection.location.path, edit_for(manifest, models, injection, name))
+    probe = _probe(manifest, models, mutant_id, trigger, hold, names)
+    files = {manifest.probe_path: probe}
+    patches = {manifest.probe_path: patch.new_file(manifest.probe_path, probe.splitlines(keepends=True))}
+    for path, file_edits in edits.items():
+        file = manifest.tree.parsed(path)
+        pieces = splice.apply(file, [splice.probe_import(file, manifest.package), *file_edits])
+        files[path] = _checked(file, splice.joined(pieces))
+        patches[path] = patch.changed_file(path, pieces)
+    return Mutant(
+        id=mutant_id,
+        files=dict(sorted(files.items())),
+        patch="".join(text for _, text in sorted(patches.items())),
+        tree_digest=manifest.tree.digest_with(files),
+        injections=names,
+    )
+
+
+def injection_id(index: int, injection: Injection) -> str:
+    """The id in an injection's tags: its content and its place in the fault."""
+    return content_id([index, injection])[:8]
+
+
+def edit_for(manifest: TargetManifest, models: FaultModels, injection: Injection, name: str) -> splice.Edit:
+    """The edit of one injection, its anchor resolved and its snippet rendered."""
+    file = manifest.tree.parsed(injection.location.path)
+    return injection_edit(file, models, injection, name)
+
+
+def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> splice.Edit:
+    """As `edit_for`, in a file at hand."""
+    model = models.get(injection.model)
+    site = file.resolve(injection.location)
+    params = dict(injection.params)
+    for param in model.params:
+        value = params.get(param.name)
+        if param.type == "variable" and isinstance(value, str) and value.partition(".")[0] not in site.names:
+            raise MutatorError(
+                f"'{value}' is not known in {injection.location.function}",
+                where=file.where,
+                line=site.first + 1,
+                expected=f"a name used there: {', '.join(sorted(site.names))}",
+                remedy=f"correct `{param.name}`",
+            )
+    code = snippet(model, params, name)
+    make = splice.guard if model.kind is SnippetKind.GUARD else splice.insertion
+    return make(file, site, code, name)
+
+
+def _add(edits: dict[str, list[splice.Edit]], path: str, edit: splice.Edit) -> None:
+    edits.setdefault(path, []).append(edit)
+
+
+def _observation(manifest: TargetManifest) -> splice.Edit:
+    observation = manifest.observation
+    file = manifest.tree.parsed(observation.location.path)
+    arguments = ", ".join(f"{name}={text}" for name, text in observation.expressions)
+    return splice.insertion(
+        file, file.resolve(observation.location), [f"_fi.observe({arguments})"], _OBSERVE_TAG
+    )
+
+
+def _probe(
+    manifest: TargetManifest,
+    models: FaultModels,
+    mutant_id: str,
+    trigger: Trigger,
+    hold: Hold,
+    names: tuple[str, ...],
+) -> bytes:
+    if manifest.probe_path in manifest.tree.files:
+        raise MutatorError(
+            f"the target has a file {manifest.probe_path}",
+            where=manifest.root,
+            expected="that name free for the probe",
+            remedy="rename the target's file, or point the manifest at the original tree",
+        )
+    if hold is Hold.FOR and trigger.hold_s is None:
+        raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
+    values = {
+        "mutant": mutant_id,
+        "condition": to_code(check_condition(trigger.condition)),
+        "hold": hold.value,
+        "hold_s": float(trigger.hold_s or 0.0),
+        "armed_after_s": float(trigger.armed_after_s),
+        "injections": names,
+    }
+    text = render(models.probe, values, models.folder / "_fi.py.j2").encode()
+    _compile(text, models.folder / "_fi.py.j2")
+    return text
+
+
+def _checked(file: ParsedFile, data: bytes) -> bytes:
+    """The mutated bytes, once they compile and un-splice to the original."""
+    _compile(data, file.where)
+    if unsplice(data) != file.data:
+        raise InvalidMutant(
+            "the mutated file does not un-splice to the original",
+            where=file.where,
+            remedy="anchor at another statement",
+        )
+    return data
+
+
+def _compile(data: bytes, where: Path) -> None:
+    try:
+        compile(data, str(where), "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, RecursionError) as error:
+        line = error.lineno if isinstance(error, SyntaxError) else None
+        text = data.splitlines()[line - 1].decode("utf-8", "replace").strip() if line else ""
+        raise InvalidMutant(
+            f"the mutated file does not compile: {error.args[0]}" + (f" at `{text}`" if text else ""),
+            where=where,
+            remedy="correct the template, or anchor at another statement",
+        ) from None
 
 
 def unsplice(data: bytes) -> bytes:
     """The original bytes of a mutated file: tagged lines removed, a guarded statement put back."""
-    raise NotImplementedError
+    return splice.unsplice(data.splitlines(keepends=True))
 
 
 def copy_base(manifest: TargetManifest, dest: Path) -> None:
     """Write the manifest's pristine tree (its listed files only, so no bytecode) to the new folder `dest`."""
-    raise NotImplementedError
+    dest.mkdir(parents=True)
+    _write(manifest.tree.files.items(), dest)
 
 
 def write_tree(mutant: Mutant, base_tree: Path, dest: Path) -> None:
     """Copy `base_tree` (made by `copy_base`) to the new folder `dest` and put the mutant's files in."""
-    raise NotImplementedError
+    shutil.copytree(base_tree, dest, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
+    _write(mutant.files.items(), dest)
+
+
+def _write(files: ItemsView[str, bytes], dest: Path) -> None:
+    for path, data in files:
+        place = dest / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(data)
 
 
 def digest_folder(manifest: TargetManifest, root: Path) -> str:
-    """Tree digest of a tree on disk, comparable with `Mutant.tree_digest` and `manifest.tree.digest`."""
-    raise NotImplementedError
+    """Tree digest of a tree on disk, comparable with `Mutant.tree_digest` and `manifest.tree.digest`.
+
+    Counts the manifest's files and the probe.
+    """
+    return read_tree(root, (*manifest.files, manifest.probe_path)).digest

@@ -1,8 +1,17 @@
-"""A target's files in memory: read once, digested once, parsed once."""
+"""A target's files in memory: read once, digested once, each file parsed once."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator import ids
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator.anchors import ParsedFile
 
 
 @dataclass(frozen=True)
@@ -12,3 +21,58 @@ class SourceTree:
     root: Path
     files: Mapping[str, bytes]
     digest: str
+    _digests: Mapping[str, str] = field(repr=False)
+    _parsed: dict[str, "ParsedFile"] = field(default_factory=dict, repr=False, compare=False)
+
+    def parsed(self, path: str) -> "ParsedFile":
+        """The file at `path`, parsed; MutatorError when it is not a Python file of the target."""
+        if path not in self._parsed:
+            from mutator.anchors import parse_file  # anchors needs the tree's types
+
+            if path not in self.files:
+                raise MutatorError(
+                    f"no file '{path}' in the target",
+                    where=self.root,
+                    expected="a path relative to the target's root, among the manifest's files",
+                    remedy="correct the path, or add the file to the manifest's `files`",
+                )
+            self._parsed[path] = parse_file(path, self.files[path], self.root)
+        return self._parsed[path]
+
+    def digest_with(self, changed: Mapping[str, bytes]) -> str:
+        """Digest of the tree with `changed` put in."""
+        return _digest({**self._digests, **{path: ids.digest(data) for path, data in changed.items()}})
+
+
+def _digest(digests: Mapping[str, str]) -> str:
+    """As `ids.tree_digest`, from the files' own digests."""
+    return ids.digest([[path, digest] for path, digest in sorted(digests.items())])
+
+
+def read_tree(root: Path, globs: Iterable[str]) -> SourceTree:
+    """Read the files of `root` that match; bytecode is never part of a tree."""
+    patterns = tuple(globs)
+    files = {}
+    for path in sorted(root.rglob("*")):
+        name = path.relative_to(root).as_posix()
+        if (
+            path.suffix != ".pyc"
+            and "__pycache__" not in path.parts
+            and path.is_file()
+            and matches(name, patterns)
+        ):
+            files[name] = path.read_bytes()
+    digests = {name: ids.digest(data) for name, data in files.items()}
+    return SourceTree(root=root, files=files, digest=_digest(digests), _digests=digests)
+
+
+def matches(path: str, globs: Iterable[str]) -> bool:
+    """Whether a relative path matches one of the globs; `**` spans folders, `*` does not."""
+    return any(_pattern(glob).match(path) for glob in globs)
+
+
+@lru_cache(maxsize=1024)
+def _pattern(glob: str) -> re.Pattern[str]:
+    parts = re.split(r"(\*\*/|\*\*|\*|\?)", glob)
+    special = {"**/": r"(?:.*/)?", "**": r".*", "*": r"[^/]*", "?": r"[^/]"}
+    return re.compile("".join(special.get(part, re.escape(part)) for part in parts) + r"\Z")

@@ -1,10 +1,18 @@
 """STPA as data: hazards and context tables, from which the guided triggers come."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
+from mutator.trigger import VARIABLES, check_condition
+from mutator.yamlio import Source, StrictModel, read
+
+CONTEXT_SCHEMA = "context_table/1"
+HAZARDS_SCHEMA = "hazards/1"
+_CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +47,16 @@ class ContextTable:
         self, *, hold: Hold = Hold.WHILE, armed_after_s: float = 0.0, rows: tuple[str, ...] | None = None
     ) -> tuple[Trigger, ...]:
         """One trigger per row (or row named in `rows`), named as the row; MutatorError for an unknown row."""
-        raise NotImplementedError
+        by_id = {row.id: row for row in self.rows}
+        unknown = [name for name in rows or () if name not in by_id]
+        if unknown:
+            raise MutatorError(
+                f"context '{unknown[0]}'", where=self.path, expected=f"one of {', '.join(by_id)}"
+            )
+        return tuple(
+            Trigger(name=name, condition=by_id[name].condition, hold=hold, armed_after_s=armed_after_s)
+            for name in (by_id if rows is None else rows)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +69,81 @@ class HazardList:
     leads_to: Mapping[str, tuple[str, ...]]
 
 
+class _VerdictsModel(StrictModel):
+    provided: str | None
+    not_provided: str | None
+
+
+class _RowModel(StrictModel):
+    when: str
+    about: str
+    actions: dict[str, _VerdictsModel]
+
+
+class _TableModel(StrictModel):
+    name: str
+    about: str = ""
+    constants: dict[str, float]
+    contexts: dict[str, _RowModel]
+
+
+class _HazardModel(StrictModel):
+    about: str
+    leads_to: list[str]
+
+
+class _HazardsModel(StrictModel):
+    accidents: dict[str, str]
+    hazards: dict[str, _HazardModel]
+
+
 def load_context_table(path: Path) -> ContextTable:
     """Read a context table; every condition is checked as a trigger condition."""
-    raise NotImplementedError
+    model, source = read(path, _TableModel, CONTEXT_SCHEMA)
+    for name in model.constants:
+        if not _CONSTANT.match(name) or name in VARIABLES:
+            raise source.error(
+                ("constants", name), f"constant '{name}'", expected="a name of its own in small letters"
+            )
+    rows = tuple(
+        ContextRow(
+            id=name,
+            condition=_condition(row.when, model.constants, source, name),
+            about=row.about,
+            actions={
+                action: Verdicts(provided=v.provided, not_provided=v.not_provided)
+                for action, v in row.actions.items()
+            },
+        )
+        for name, row in model.contexts.items()
+    )
+    return ContextTable(name=model.name, path=path, constants=dict(model.constants), rows=rows)
+
+
+def _condition(text: str, constants: Mapping[str, float], source: Source, row: str) -> str:
+    try:
+        return check_condition(text, constants)
+    except MutatorError as error:
+        raise source.error(
+            ("contexts", row, "when"), error.got, expected=error.expected, remedy=error.remedy
+        ) from None
 
 
 def load_hazards(path: Path) -> HazardList:
     """Read the accidents and hazards; a hazard that leads to an unknown accident is an error."""
-    raise NotImplementedError
+    model, source = read(path, _HazardsModel, HAZARDS_SCHEMA)
+    for name, hazard in model.hazards.items():
+        for i, accident in enumerate(hazard.leads_to):
+            if accident not in model.accidents:
+                raise source.error(
+                    ("hazards", name, "leads_to", i),
+                    f"accident '{accident}'",
+                    expected=f"one of {', '.join(model.accidents)}",
+                    remedy="correct it or describe the accident",
+                )
+    return HazardList(
+        path=path,
+        accidents=dict(model.accidents),
+        hazards={name: hazard.about for name, hazard in model.hazards.items()},
+        leads_to={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},
+    )

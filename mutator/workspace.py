@@ -1,12 +1,18 @@
 """Where library, templates and targets are found."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.fault_models import FaultModels
-from mutator.manifest import TargetManifest
-from mutator.spec import FaultSpec
-from mutator.stpa import ContextTable, HazardList
+from mutator.errors import MutatorError
+from mutator.fault_models import FaultModels, load_fault_models
+from mutator.manifest import TargetManifest, load_manifest
+from mutator.shape_errors import suggestion
+from mutator.spec import FaultSpec, load_spec
+from mutator.stpa import ContextTable, HazardList, load_context_table, load_hazards
+
+_LIBRARY = "fault_library"
+_TEMPLATES = "templates"
 
 
 @dataclass(frozen=True)
@@ -27,48 +33,121 @@ class Workspace:
     ) -> "Workspace":
         """Options first, then MUTATOR_LIBRARY, MUTATOR_TEMPLATES, MUTATOR_TARGET, then `root`, MUTATOR_ROOT,
         or the nearest folder from the current one upward that holds fault_library/; else a MutatorError."""
-        raise NotImplementedError
+        library = library or _environment("MUTATOR_LIBRARY")
+        templates = templates or _environment("MUTATOR_TEMPLATES")
+        target = target or _environment("MUTATOR_TARGET")
+        base = root or _environment("MUTATOR_ROOT")
+        if base is None and (library is None or templates is None):
+            base = _upward(Path.cwd())
+        library = library or (base / _LIBRARY if base else None)
+        templates = templates or (base / _TEMPLATES if base else None)
+        return cls(
+            library=_folder(library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
+            templates=_folder(templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
+            target=_folder(target, "target", "--target or MUTATOR_TARGET") if target else None,
+        )
 
     def manifest(self, name: str = "openpilot") -> TargetManifest:
         """The target `name`, or the manifest file of that path."""
-        raise NotImplementedError
+        return load_manifest(self._file("targets", name, "target"), self.target)
 
     def target_names(self) -> tuple[str, ...]:
-        raise NotImplementedError
+        """Names of the manifests in the library."""
+        return self._names("targets")
 
     def fault_models(self) -> FaultModels:
-        raise NotImplementedError
+        """The fault models of the templates folder."""
+        return load_fault_models(self.templates)
 
     def spec_files(self) -> tuple[Path, ...]:
         """Every fault spec of the library, sorted."""
-        raise NotImplementedError
+        return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
         """The spec `<module>/<fault_type>`, or the spec file of that path."""
-        raise NotImplementedError
+        return load_spec(self._file("faults", name, "fault spec"))
 
     def specs(self) -> tuple[FaultSpec, ...]:
-        """All specs of the library, in the order of `spec_files`."""
-        raise NotImplementedError
+        """All specs of the library, in the order of `spec_files`; each is at `<module>/<fault_type>.yaml`."""
+        specs = tuple(load_spec(path) for path in self.spec_files())
+        for spec in specs:
+            expected = self.library / "faults" / f"{spec.name}.yaml"
+            if spec.path != expected:
+                raise spec.source.error(
+                    ("module",),
+                    f"module '{spec.module}', fault_type '{spec.fault_type}'",
+                    expected=f"the file at {expected}",
+                    remedy="move the file or correct the names",
+                )
+        return specs
 
     def scenario_names(self) -> tuple[str, ...]:
-        raise NotImplementedError
+        """Names of the scenarios in the library."""
+        return self._names("scenarios")
 
-    def scenario(self, name: str) -> Path:
+    def scenario(self, name: str | Path) -> Path:
         """File of the scenario `name`, or the scenario file of that path."""
-        raise NotImplementedError
+        return self._file("scenarios", name, "scenario")
+
+    def campaign_names(self) -> tuple[str, ...]:
+        """Names of the campaigns in the library."""
+        return self._names("campaigns")
 
     def campaign(self, name: str | Path) -> Path:
         """File of the campaign `name`, or the campaign file of that path."""
-        raise NotImplementedError
+        return self._file("campaigns", name, "campaign")
 
-    def campaign_names(self) -> tuple[str, ...]:
-        raise NotImplementedError
+    def context_table_names(self) -> tuple[str, ...]:
+        """Names of the context tables in the library."""
+        return self._names("stpa/contexts")
 
-    def context_table(self, name: str) -> ContextTable:
-        """The context table `name` of fault_library/stpa."""
-        raise NotImplementedError
+    def context_table(self, name: str | Path) -> ContextTable:
+        """The context table `name`, or the table of that path."""
+        return load_context_table(self._file("stpa/contexts", name, "context table"))
 
     def hazards(self) -> HazardList:
         """Accidents and hazards of fault_library/stpa/hazards.yaml."""
-        raise NotImplementedError
+        return load_hazards(self.library / "stpa" / "hazards.yaml")
+
+    def _names(self, folder: str) -> tuple[str, ...]:
+        base = self.library / folder
+        return tuple(sorted(p.relative_to(base).with_suffix("").as_posix() for p in base.rglob("*.yaml")))
+
+    def _file(self, folder: str, name: str | Path, what: str) -> Path:
+        """A file of the library by name, or the file at a path that ends in .yaml."""
+        if str(name).endswith((".yaml", ".yml")) and Path(name).is_file():
+            return Path(name)
+        known = self._names(folder)
+        if str(name) in known:
+            return self.library / folder / f"{name}.yaml"
+        raise MutatorError(
+            f"no {what} '{name}'",
+            where=self.library / folder,
+            expected=f"one of {', '.join(known) or 'none'}, or the path of a YAML file",
+            remedy="correct the name" + suggestion(str(name), list(known)),
+        )
+
+
+def _environment(name: str) -> Path | None:
+    value = os.environ.get(name)
+    return Path(value) if value else None
+
+
+def _upward(start: Path) -> Path | None:
+    return next((p for p in (start, *start.parents) if (p / _LIBRARY).is_dir()), None)
+
+
+def _folder(path: Path | None, what: str, option: str) -> Path:
+    if path is None:
+        raise MutatorError(
+            f"no folder {what}/ here or in any folder above",
+            where=Path.cwd(),
+            remedy=f"run inside a clone, or give --root or MUTATOR_ROOT, or {option}",
+        )
+    if not path.is_dir():
+        raise MutatorError(
+            f"no folder {path}",
+            expected=f"the {what} folder",
+            remedy=f"correct {option}, --root or MUTATOR_ROOT",
+        )
+    return path.resolve()

@@ -1,0 +1,11 @@
+"""Seeded draws: one generator for each (seed, key), so that no draw depends on how many came before it."""
+
+import hashlib
+
+import numpy as np
+
+
+def generator(seed: int, key: str) -> np.random.Generator:
+    """A generator of its own for (seed, key), the same on every machine."""
+    words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype=">u4")
+    return np.random.Generator(np.random.PCG64([seed, *map(int, words)]))

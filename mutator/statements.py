@@ -1,0 +1,251 @@
+"""What a function's statements assign, call and return, and on which lines they stand."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import libcst as cst
+from libcst.metadata import CodeRange
+
+Positions = Mapping[cst.CSTNode, CodeRange]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statement:
+    """One small statement, or (with a `reason`) something that binds or calls without being one.
+
+    Lines are counted from 0, `last` is exclusive. Names are dotted, as written; `returns` holds the empty
+    name too, which stands for any return.
+    """
+
+    first: int
+    last: int
+    assigns: tuple[str, ...] = ()
+    calls: tuple[str, ...] = ()
+    returns: tuple[str, ...] = ()
+    first_in_line: bool = True
+    last_in_line: bool = True
+    one_line_suite: bool = False
+    spanning_string: bool = False
+    reason: str | None = None
+
+    def names(self, verb: str) -> tuple[str, ...]:
+        """What it does by `verb`: assign, call or return."""
+        return {"assign": self.assigns, "call": self.calls, "return": self.returns}[verb]
+
+    @property
+    def alone(self) -> bool:
+        """Whether it has its lines for itself."""
+        return self.first_in_line and self.last_in_line and not self.one_line_suite
+
+    @property
+    def is_return(self) -> bool:
+        return bool(self.returns)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Function:
+    """A function: its line, its own statements (none of functions and classes inside it), the names in it.
+
+    `entry` is (line index to insert at, line index whose indentation to take), None for a one-line body.
+    """
+
+    line: int
+    statements: tuple[Statement, ...]
+    names: frozenset[str]
+    entry: tuple[int, int] | None
+
+
+def collect(module: cst.Module, positions: Positions) -> dict[str, tuple[Function, ...]]:
+    """All functions by qualified name (`Class.method`, `outer.inner`), those of one name in source order."""
+    collector = _Collector(positions)
+    module.visit(collector)
+    return {name: tuple(functions) for name, functions in collector.functions.items()}
+
+
+def dotted(node: cst.CSTNode | None) -> str | None:
+    """`a.b.c` for a chain of names, None for anything else."""
+    if isinstance(node, cst.Name):
+        return node.value
+    if isinstance(node, cst.Attribute):
+        base = dotted(node.value)
+        return f"{base}.{node.attr.value}" if base else None
+    return None
+
+
+class _Collector(cst.CSTVisitor):
+    def __init__(self, positions: Positions) -> None:
+        super().__init__()
+        self.positions = positions
+        self.functions: dict[str, list[Function]] = {}
+        self.scope: list[str] = []
+        self.open: list[tuple[list[Statement], set[str]] | None] = []  # None for a class
+        self.entries: list[tuple[int, list[Function]]] = []
+
+    def visit_ClassDef(self, node: cst.ClassDef) -> None:  # noqa: N802
+        self.scope.append(node.name.value)
+        self.open.append(None)
+
+    def leave_ClassDef(self, original_node: cst.ClassDef) -> None:  # noqa: N802
+        self.scope.pop()
+        self.open.pop()
+
+    def visit_FunctionDef(self, node: cst.FunctionDef) -> None:  # noqa: N802
+        self.scope.append(node.name.value)
+        self.open.append(([], set()))
+
+    def leave_FunctionDef(self, original_node: cst.FunctionDef) -> None:  # noqa: N802
+        entry = self.open.pop()
+        assert entry is not None
+        statements, names = entry
+        function = Function(
+            line=self.positions[original_node].start.line - 1,
+            statements=tuple(sorted(statements, key=lambda s: s.first)),
+            names=frozenset(names),
+            entry=_entry(original_node, self.positions),
+        )
+        self.functions.setdefault(".".join(self.scope), []).append(function)
+        self.scope.pop()
+        outer = self.open[-1] if self.open else None
+        if outer:
+            outer[1].update(names)
+
+    def visit_Name(self, node: cst.Name) -> None:  # noqa: N802
+        if self.open and self.open[-1]:
+            self.open[-1][1].add(node.value)
+
+    def visit_SimpleStatementLine(self, node: cst.SimpleStatementLine) -> None:  # noqa: N802
+        self._add(node, one_line_suite=False)
+
+    def visit_SimpleStatementSuite(self, node: cst.SimpleStatementSuite) -> None:  # noqa: N802
+        self._add(node, one_line_suite=True)
+
+    def visit_For(self, node: cst.For) -> None:  # noqa: N802
+        self._add_other(node.target, _targets(node.target), "it is the target of a `for`")
+
+    def visit_AsName(self, node: cst.AsName) -> None:  # noqa: N802
+        self._add_other(node, _targets(node.name), "it is bound by `as`")
+
+    def visit_NamedExpr(self, node: cst.NamedExpr) -> None:  # noqa: N802
+        self._add_other(node, _targets(node.target), "it is bound by `:=` inside an expression")
+
+    def _add(self, node: cst.SimpleStatementLine | cst.SimpleStatementSuite, one_line_suite: bool) -> None:
+        scope = self.open[-1] if self.open else None
+        if not scope:
+            return
+        span = self.positions[node]
+        continued = node.trailing_whitespace.whitespace.value.count("\\")
+        for i, small in enumerate(node.body):
+            outer = _outer_call(small)
+            for call in _inner_calls(small, outer):
+                self._add_other(
+                    call, [dotted(call.func) or ""], "the call is part of an expression", calls=True
+                )
+            assigns, calls, returns = _effects(small, outer)
+            if not (assigns or calls or returns):
+                continue
+            scope[0].append(
+                Statement(
+                    first=span.start.line - 1,
+                    last=span.end.line + continued,
+                    assigns=assigns,
+                    calls=calls,
+                    returns=returns,
+                    first_in_line=i == 0,
+                    last_in_line=i == len(node.body) - 1,
+                    one_line_suite=one_line_suite,
+                    spanning_string=_spanning_string(small, self.positions),
+                )
+            )
+
+    def _add_other(self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False) -> None:
+        scope = self.open[-1] if self.open else None
+        if scope and names and all(names):
+            span = self.positions[node]
+            kept = tuple(names)
+            scope[0].append(
+                Statement(
+                    first=span.start.line - 1,
+                    last=span.end.line,
+                    assigns=() if calls else kept,
+                    calls=kept if calls else (),
+                    reason=reason,
+                )
+            )
+
+
+def _value(small: cst.BaseSmallStatement) -> cst.BaseExpression | None:
+    if isinstance(small, cst.Expr | cst.Assign | cst.AugAssign | cst.AnnAssign | cst.Return):
+        return small.value
+    return None
+
+
+def _outer_call(small: cst.BaseSmallStatement) -> cst.Call | None:
+    """The call that is the statement's whole value, under an `await` or not."""
+    value = _value(small)
+    if isinstance(value, cst.Await):
+        value = value.expression
+    return value if isinstance(value, cst.Call) else None
+
+
+def _effects(
+    small: cst.BaseSmallStatement, call: cst.Call | None
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """(assigned, called, returned) names of one small statement."""
+    assigns: list[str] = []
+    if isinstance(small, cst.Assign):
+        assigns = [name for target in small.targets for name in _targets(target.target)]
+    elif isinstance(small, cst.AugAssign) or (isinstance(small, cst.AnnAssign) and small.value is not None):
+        assigns = _targets(small.target)
+    called = dotted(call.func) if call else None
+    returns: list[str] = []
+    if isinstance(small, cst.Return):
+        returned = called or dotted(small.value)
+        returns = ["", returned] if returned else [""]
+    unique = tuple(dict.fromkeys(assigns))
+    return unique, (called,) if called else (), tuple(returns)
+
+
+def _targets(node: cst.CSTNode) -> list[str]:
+    if isinstance(node, cst.Tuple | cst.List):
+        return [name for element in node.elements for name in _targets(element.value)]
+    if isinstance(node, cst.StarredElement):
+        return _targets(node.value)
+    name = dotted(node)
+    return [name] if name else []
+
+
+def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Iterator[cst.Call]:
+    stack: list[cst.CSTNode] = [small]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, cst.Call) and node is not outer:
+            yield node
+        stack += node.children
+
+
+def _spanning_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
+    """Whether a string literal runs over the end of a line: its lines must not be indented."""
+    stack: list[cst.CSTNode] = [small]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, cst.SimpleString | cst.FormattedString):
+            span = positions[node]
+            if span.start.line != span.end.line:
+                return True
+        stack += node.children
+    return False
+
+
+def _entry(node: cst.FunctionDef, positions: Positions) -> tuple[int, int] | None:
+    body = node.body
+    if not isinstance(body, cst.IndentedBlock):
+        return None
+    first = body.body[0]
+    if node.get_docstring(clean=False) is None:
+        decorators = first.decorators if isinstance(first, cst.FunctionDef | cst.ClassDef) else ()
+        line = min(positions[n].start.line for n in (first, *decorators)) - 1
+        return line, line
+    if not isinstance(first, cst.SimpleStatementLine) or len(first.body) > 1:
+        return None
+    continued = first.trailing_whitespace.whitespace.value.count("\\")
+    return positions[first].end.line + continued, positions[first].start.line - 1
