@@ -10,9 +10,9 @@ if TYPE_CHECKING:
 LISTED = 30  # failed runs that the Markdown lists; the page lists all
 
 NOTES = """\
-*Injected* counts the experiments that say something about their fault; a harness error, or a mutant that could
-not be made, is counted apart. *Activated*: an injected statement ran while triggered. *Manifested*: an actuator
-output then differed from the fault-free run. *Hazard, no alert*: no counted alert in the whole run."""
+*Injected* counts the experiments that say something about their fault; a harness error, or a mutant that
+could not be made, is counted apart. *Activated*: an injected statement ran while triggered. *Manifested*: an
+actuator output then differed from the fault-free run. *Hazard, no alert*: no counted alert at all."""
 
 
 def markdown(content: "Content") -> str:

@@ -123,8 +123,13 @@ def run(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
-    with campaign_progress(terminal) as notify:
-        summary = campaign_run.run(workspace, campaign, out, workers=workers, choices=chosen, notify=notify)
+    try:
+        with campaign_progress(terminal) as notify:
+            summary = campaign_run.run(
+                workspace, campaign, out, workers=workers, choices=chosen, notify=notify
+            )
+    except KeyboardInterrupt:
+        raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
     _tell(terminal, out, summary)
     if summary.exit_code:
         raise typer.Exit(summary.exit_code)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from mutator.manifest import TargetManifest
     from mutator.model import Fault, Trigger
     from mutator.spec import FaultSpec, Variant
+    from mutator.stpa import ContextTable
     from mutator.workspace import Workspace
 
 ARMED_AFTER_S = 1.5  # the controller is engaged at 1.3 s; contexts count from 0.2 s later
@@ -35,7 +36,7 @@ class FaultChoice:
         from mutator.expand import expand
         from mutator.spec import AS_DESCRIBED
 
-        spec = self._narrowed(workspace.spec(_spec_name(self.spec)))
+        spec = self._narrowed(workspace.spec(self.spec))
         reading = self.reading or AS_DESCRIBED
         return expand(spec, self.seed or 0, reading, models=models, manifest=manifest)
 
@@ -57,6 +58,11 @@ def one_of_each_variant(faults: "tuple[Fault, ...]") -> "tuple[tuple[Fault, int]
     return tuple((group[len(group) // 2], len(group)) for group in groups.values())
 
 
+def context_tables(workspace: "Workspace") -> tuple["ContextTable", ...]:
+    """The context tables of the library, in the order of their names."""
+    return tuple(workspace.context_table(name) for name in workspace.context_table_names())
+
+
 def find_trigger(workspace: "Workspace", text: str, armed_after_s: float = ARMED_AFTER_S) -> "Trigger":
     """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
     from mutator.model import Trigger
@@ -64,7 +70,7 @@ def find_trigger(workspace: "Workspace", text: str, armed_after_s: float = ARMED
 
     if text == "always":
         return always(armed_after_s=armed_after_s)
-    for table in workspace.context_tables():
+    for table in context_tables(workspace):
         if text in (row.id for row in table.rows):
             return table.triggers(armed_after_s=armed_after_s, rows=(text,))[0]
     try:
@@ -74,7 +80,7 @@ def find_trigger(workspace: "Workspace", text: str, armed_after_s: float = ARMED
     try:
         condition = check_condition(text)
     except MutatorError as e:
-        contexts = ", ".join(row.id for table in workspace.context_tables() for row in table.rows)
+        contexts = ", ".join(row.id for table in context_tables(workspace) for row in table.rows)
         raise MutatorError(
             e.got,
             where="--trigger",
@@ -102,11 +108,6 @@ def find_run(given: Path | None, root: Path) -> Path:
 def _from_here(path: Path) -> Path:
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path
-
-
-def _spec_name(text: str) -> str | Path:
-    path = Path(text)
-    return path if path.suffix in (".yaml", ".yml") or path.is_file() else text
 
 
 def _with_value(spec: "FaultSpec", variant: "Variant", value: float) -> "Variant":

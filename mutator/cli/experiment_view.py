@@ -75,8 +75,6 @@ def verdict(record: "Record") -> dict[str, Any]:
     """What became of it, for people and as JSON. Times in s of simulation; None: did not happen."""
     from mutator.verdict import reaction_time
 
-    first_hazard = record.hazards[0][1] if record.hazards else None
-    first_alert = record.alerts[0][1] if record.alerts else None
     activation = record.activation
     return {
         "status": record.status.value,
@@ -88,7 +86,7 @@ def verdict(record: "Record") -> dict[str, Any]:
         "manifested_s": record.t_manifest,
         "hazards_s": dict(record.hazards),
         "alerts_s": dict(record.alerts),
-        "reaction_time_s": reaction_time(first_hazard, first_alert),
+        "reaction_time_s": reaction_time(record.hazards, record.alerts),
         "largest_difference": dict(record.max_dev),
         "trace_digest": record.trace_digest,
     }

@@ -82,10 +82,9 @@ def write_mutants(
     return rows
 
 
-Pairs = "list[tuple[Fault, Trigger]]"
-
-
-def _of_specs(workspace: "Workspace", request: Request) -> tuple["TargetManifest", Pairs]:
+def _of_specs(
+    workspace: "Workspace", request: Request
+) -> tuple["TargetManifest", list[tuple["Fault", "Trigger"]]]:
     from mutator.model import Trigger
 
     if not request.specs:
@@ -93,7 +92,7 @@ def _of_specs(workspace: "Workspace", request: Request) -> tuple["TargetManifest
     target, models = workspace.manifest(request.manifest), workspace.fault_models()
     triggers: list[Trigger] = [choose.find_trigger(workspace, text) for text in request.triggers]
     if not triggers:
-        for table in workspace.context_tables():
+        for table in choose.context_tables(workspace):
             triggers += table.triggers(armed_after_s=choose.ARMED_AFTER_S)
     pairs = []
     for name in _spec_names(workspace, request.specs):
@@ -102,7 +101,9 @@ def _of_specs(workspace: "Workspace", request: Request) -> tuple["TargetManifest
     return target, pairs
 
 
-def _of_campaign(workspace: "Workspace", request: Request) -> tuple["TargetManifest", Pairs]:
+def _of_campaign(
+    workspace: "Workspace", request: Request
+) -> tuple["TargetManifest", list[tuple["Fault", "Trigger"]]]:
     from mutator.plan import make_plan
 
     if request.specs or request.triggers:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mutator.cli.choose import context_tables
 from mutator.cli.console import Terminal
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED
@@ -83,7 +84,7 @@ def _models(workspace: "Workspace") -> Table:
             "name": m.name,
             "kind": m.kind.value,
             "parameters": ", ".join(p.name + ("?" if p.optional else "") for p in m.params),
-            "about": _line(m.summary),
+            "about": _line(m.about),
         }
         for m in workspace.fault_models()
     ]
@@ -93,7 +94,7 @@ def _models(workspace: "Workspace") -> Table:
 def _triggers(workspace: "Workspace") -> Table:
     rows = [
         {"table": table.name, "name": row.id, "condition": row.condition, "about": _line(row.about)}
-        for table in workspace.context_tables()
+        for table in context_tables(workspace)
         for row in table.rows
     ]
     return ["table", "name", "condition", "about"], rows
