@@ -59,12 +59,13 @@ def at_time(time_s: float, *, name: str = "random", hold: Hold = Hold.TO_END) ->
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
     """A time uniform on the steps from `first_s` to `last_s` (both included), drawn from (seed, key).
 
-    The result is exactly `frame * step_s`, the time a target reports at the start of that step.
+    The result is the start of a step to nine decimals, so that it reads as one would write it.
     """
     first, last = round(first_s / step_s), round(last_s / step_s)
     if last < first:
         raise MutatorError(f"random times from {first_s} s to {last_s} s", expected="an interval")
-    return (first + int(generator(seed, key).random() * (last - first + 1))) * step_s
+    frame = first + int(generator(seed, key).random() * (last - first + 1))
+    return round(frame * step_s, 9)
 
 
 def divide(a: float, b: float) -> float:
