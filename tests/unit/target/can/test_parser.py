@@ -1,0 +1,108 @@
+"""The parser believes nothing before size, checksum and counter are right, and notices silence."""
+
+import pytest
+from selfdrive.can.dbc import load
+from selfdrive.can.packer import Packer
+from selfdrive.can.parser import CanParser, Expected
+from selfdrive.car.honda.values import CAR_DBC
+
+MESSAGES = load(CAR_DBC)
+EXPECTED = {
+    "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100, (-1,)),
+    "WHEEL_SPEEDS": Expected(("WHEEL_SPEED_FL",), 50),
+}
+
+
+@pytest.fixture
+def parser():
+    return CanParser(MESSAGES, EXPECTED, bus=0)
+
+
+@pytest.fixture
+def speed():
+    return Packer(MESSAGES["ENGINE_DATA"], ("XMISSION_SPEED",))
+
+
+@pytest.fixture
+def wheels():
+    return Packer(MESSAGES["WHEEL_SPEEDS"], ("WHEEL_SPEED_FL",))
+
+
+def test_values_before_the_first_frame(parser):
+    """Before any frame a message has its initial values, and the bus is not valid."""
+    parser.update([], 0.0)
+    assert parser.values == {"ENGINE_DATA": (-1,), "WHEEL_SPEEDS": (0,)}
+    assert not parser.valid
+
+
+def test_valid_once_every_message_has_come(parser, speed, wheels):
+    """One message of two is not enough; both make the bus valid and their values readable."""
+    parser.update([speed.pack((50.0,), 0)], 0.0)
+    assert not parser.valid
+    parser.update([speed.pack((51.0,), 1), wheels.pack((52.0,))], 0.01)
+    assert parser.valid
+    assert parser.values["ENGINE_DATA"] == pytest.approx((51.0,))
+    assert parser.values["WHEEL_SPEEDS"] == pytest.approx((52.0,))
+    assert parser.updated == ["ENGINE_DATA", "WHEEL_SPEEDS"]
+
+
+@pytest.mark.parametrize("bit", range(64))
+def test_any_flipped_bit_is_noticed(parser, speed, bit):
+    """A frame with one wrong bit never reaches the values, wherever the bit is."""
+    frame = speed.pack((50.0,), 0)
+    broken = (int.from_bytes(frame.data, "big") ^ (1 << bit)).to_bytes(8, "big")
+    parser.update([frame._replace(data=broken)], 0.0)
+    assert parser.values["ENGINE_DATA"] == (-1,)
+    assert parser.updated == []
+
+
+@pytest.mark.parametrize("change", [{"bus": 1}, {"address": 0x999}, {"data": b"\0" * 7}])
+def test_frames_of_others_are_ignored(parser, speed, change):
+    """Another bus, another address, another length: not this message."""
+    parser.update([speed.pack((50.0,), 0)._replace(**change)], 0.0)
+    assert parser.values["ENGINE_DATA"] == (-1,)
+
+
+def test_silence_of_ten_periods_is_borne_eleven_are_not(parser, speed, wheels):
+    """A message is invalid when it has missed more than ten of its own periods, and valid again once it comes."""
+    parser.update([speed.pack((50.0,), 0), wheels.pack((50.0,))], 1.0)
+    for step in range(1, 11):
+        parser.update([wheels.pack((50.0,))], 1.0 + step / 100)
+        assert parser.valid
+    parser.update([wheels.pack((50.0,))], 1.11)
+    assert not parser.valid
+    parser.update([speed.pack((50.0,), 1)], 1.12)
+    assert parser.valid
+
+
+def test_slower_messages_are_waited_for_longer(parser, speed, wheels):
+    """At 50 Hz ten missed periods are 0.2 s."""
+    parser.update([wheels.pack((50.0,))], 1.0)
+    for step in range(1, 21):
+        parser.update([speed.pack((50.0,), step)], 1.0 + step / 100)
+        assert parser.valid
+    parser.update([speed.pack((50.0,), 21)], 1.21)
+    assert not parser.valid
+
+
+def test_a_stuck_counter_is_believed_four_times(parser, speed):
+    """Frames whose counter does not move on are dropped from the fifth wrong one on."""
+    for repeat in range(8):
+        parser.update([speed.pack((float(repeat),), 0)], repeat / 100)
+    assert parser.values["ENGINE_DATA"] == pytest.approx((4.0,))
+
+
+def test_a_lost_frame_does_no_harm(parser, speed):
+    """A gap in the counter alone does not reject the frame after it."""
+    parser.update([speed.pack((1.0,), 0)], 0.0)
+    parser.update([speed.pack((2.0,), 2)], 0.02)
+    assert parser.values["ENGINE_DATA"] == pytest.approx((2.0,))
+
+
+def test_counting_right_again_restores_belief(parser, speed):
+    """After too many wrong counters, one right frame brings the message back."""
+    for repeat in range(8):
+        parser.update([speed.pack((1.0,), 0)], repeat / 100)
+    for counter in range(1, 5):
+        parser.update([speed.pack((2.0,), counter)], 0.1 + counter / 100)
+    assert parser.values["ENGINE_DATA"] == pytest.approx((2.0,))

@@ -1,0 +1,116 @@
+"""What the Civic's actuators are sent for a demand."""
+
+import pytest
+from selfdrive.car.honda.carcontroller import BrakeHysteresis, CarController
+from selfdrive.car.honda.values import COMMAND_MESSAGES
+from selfdrive.messages import Actuators, CarControl, CarState
+from selfdrive.sim.actuators import ActuatorReceiver
+
+
+class Rig:
+    """A car controller and the actuators that listen to it."""
+
+    def __init__(self):
+        self.controller = CarController()
+        self.receiver = ActuatorReceiver()
+        self.frame = 0
+        self.car = CarState()
+
+    def send(self, cycles=2, enabled=True, **demand):
+        """Repeat a demand for some cycles; returns what the actuators take."""
+        for _ in range(cycles):
+            control = CarControl(enabled=enabled, actuators=Actuators(**demand))
+            frames = self.controller.update(control, self.car, self.frame)
+            taken = self.receiver.update(frames, self.frame / 100)
+            self.frame += 1
+        return taken
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_gas_is_quantised_like_the_original(rig):
+    """Gas goes out as whole pedal counts: the values the original's plant decoded."""
+    assert rig.send(gas=0.011).gas == pytest.approx(0.01094, abs=1e-5)  # 11 counts
+    assert rig.send(gas=0.0359).gas == pytest.approx(0.035743, abs=1e-6)  # 36 counts
+    assert rig.send(gas=1.5).gas == pytest.approx(0.99611, abs=1e-4)
+    assert rig.send(gas=0.0).gas == 0.0
+    assert rig.send(gas=-0.5).gas == 0.0
+
+
+def test_brake_rises_slowly_and_falls_at_once(rig):
+    """The brake gains at most 0.01 a cycle and is released within the next brake frame."""
+    assert rig.send(cycles=50, brake=0.8).brake == pytest.approx(0.49, abs=0.011)
+    assert rig.send(cycles=50, brake=0.8).brake == pytest.approx(0.79, abs=0.004)
+    assert rig.send(cycles=2, brake=0.0).brake == 0.0
+
+
+def test_brake_is_quantised_and_never_full(rig):
+    """Brakes take 1/256 steps, cut off, and at most 255 of them."""
+    assert rig.send(cycles=200, brake=5.0).brake == 255 / 256
+    rig.send(brake=0.0)
+    assert rig.send(cycles=60, brake=0.3).brake == int((0.3 - 0.01) * 256) / 256
+
+
+def test_brake_hysteresis():
+    """On from 0.02, off below 0.005, and changes within 0.01 are not passed on."""
+    hysteresis = BrakeHysteresis()
+    assert hysteresis.update(0.019) == 0.0
+    assert hysteresis.update(0.021) == pytest.approx(0.011)
+    assert hysteresis.update(0.006) == pytest.approx(0.011)
+    assert hysteresis.update(0.004) == 0.0
+    assert hysteresis.update(0.006) == 0.0
+    assert hysteresis.update(0.5) == pytest.approx(0.49)
+    assert hysteresis.update(0.4951) == pytest.approx(0.49)
+    assert hysteresis.update(0.479) == pytest.approx(0.489)
+
+
+@pytest.mark.parametrize(
+    ("steer", "taken"), [(1.0, 4096), (-1.0, -4096), (2.5, 4096), (0.1, 409), (-0.1, -409)]
+)
+def test_steering_torque(rig, steer, taken):
+    """Torque is limited to the whole of the range, cut off to counts, and keeps its side: left positive."""
+    assert rig.send(steer=steer).steer == pytest.approx(taken / 3840)
+
+
+def test_no_torque_while_the_eps_refuses(rig):
+    """The EPS is not asked for torque it does not allow."""
+    rig.car = CarState(steer_not_allowed=True)
+    assert rig.send(steer=0.5).steer == 0.0
+
+
+def test_disabled_means_zero(rig):
+    """Without engagement nothing reaches the actuators, whatever is demanded."""
+    rig.send(cycles=30, gas=0.3, brake=0.3, steer=0.3)
+    taken = rig.send(enabled=False, gas=0.3, brake=0.3, steer=0.3)
+    assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
+def test_a_demand_that_is_no_number_is_zero(rig, bad):
+    """Not-a-number from a controller that broke becomes no command at all, and later demands work."""
+    taken = rig.send(gas=bad, brake=bad, steer=bad)
+    assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
+    assert rig.send(cycles=20, brake=0.1).brake > 0.0
+
+
+def test_what_is_sent_when(rig):
+    """Steering every cycle, gas and brake every second, the dashboard every tenth; all frames valid."""
+    addresses = []
+    for frame in range(20):
+        frames = rig.controller.update(CarControl(enabled=True), rig.car, frame)
+        addresses.append({f.address for f in frames})
+    assert all(0xE4 in sent for sent in addresses)
+    assert [k for k, sent in enumerate(addresses) if {0x200, 0x1FA} <= sent] == list(range(0, 20, 2))
+    assert [k for k, sent in enumerate(addresses) if {0x30C, 0x33D} <= sent] == [0, 10]
+
+
+def test_every_command_frame_is_accepted(rig):
+    """The receiving side, which checks counter and checksum, takes every frame of a long run."""
+    parser = rig.receiver._parser
+    for cycle in range(40):
+        rig.send(cycles=1, steer=0.01 * cycle, gas=0.01 * cycle)
+        expected = set(COMMAND_MESSAGES) if cycle % 2 == 0 else {"STEERING_CONTROL"}
+        assert set(parser.updated) == expected

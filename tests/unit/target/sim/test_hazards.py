@@ -1,0 +1,59 @@
+"""The hazard definitions, at their edges."""
+
+import pytest
+from selfdrive.sim.hazards import HazardMonitor
+
+
+def first(truth, *rows):
+    monitor = HazardMonitor()
+    for t, row in enumerate(rows):
+        monitor.update(truth(t=float(t), **({"d_rel": 50.0, "v_ego": 20.0} | row)))
+    return monitor.first
+
+
+def test_none_in_ordinary_driving(truth):
+    """Following in the lane is no hazard."""
+    assert first(truth, {}, {}) == {"H1": None, "H2": None, "H3": None}
+
+
+@pytest.mark.parametrize(
+    ("d_rel", "offset", "hit"),
+    [(0.0, 0.0, True), (0.01, 0.0, False), (-3.0, 2.75, True), (-3.0, -2.76, False)],
+)
+def test_h1(truth, d_rel, offset, hit):
+    """A collision needs no distance left and an overlap of the two cars, 2.75 m to either side."""
+    assert (first(truth, {"d_rel": d_rel, "lateral_offset": offset})["H1"] == 0.0) is hit
+
+
+@pytest.mark.parametrize(
+    ("v_ego", "d_rel", "free_road", "hit"),
+    [
+        (0.29, 100.0, False, True),
+        (0.3, 100.0, False, False),
+        (0.0, 99.9, False, False),
+        (0.0, 200.0, True, True),
+    ],
+)
+def test_h2(truth, v_ego, d_rel, free_road, hit):
+    """Standing counts below 0.3 m/s with 100 m and more of free road ahead."""
+    stopped = {"v_ego": v_ego, "d_rel": d_rel, "free_road": free_road}
+    assert (first(truth, {}, stopped)["H2"] == 1.0) is hit
+
+
+def test_h2_needs_a_car_that_has_moved(truth):
+    """A car that has not set off yet does not block the road; once it has moved, its next stop counts."""
+    rest = {"v_ego": 0.0, "d_rel": 150.0}
+    assert first(truth, rest, rest)["H2"] is None
+    assert first(truth, rest, {"v_ego": 0.3}, rest)["H2"] == 2.0
+
+
+@pytest.mark.parametrize(("offset", "hit"), [(0.94, False), (0.96, True), (-0.96, True)])
+def test_h3(truth, offset, hit):
+    """A side of the car leaves the lane beyond 0.95 m of offset."""
+    assert (first(truth, {"lateral_offset": offset})["H3"] == 0.0) is hit
+
+
+def test_only_the_first_time_counts(truth):
+    """A hazard that ends and comes back keeps its first time."""
+    out = {"lateral_offset": 2.0}
+    assert first(truth, {}, out, {}, out)["H3"] == 1.0

@@ -1,0 +1,100 @@
+"""Sideways motion: what torque does to the wheel, and the wheel to the car."""
+
+from math import radians
+
+import pytest
+from selfdrive.car.honda.interface import get_params
+from selfdrive.sim.lateral import LateralDynamics
+
+
+@pytest.fixture
+def car():
+    return LateralDynamics(get_params())
+
+
+def run(car, seconds, torque, speed, curvature=0.0):
+    for _ in range(round(seconds * 100)):
+        car.step(torque, speed, curvature)
+
+
+def hold(car, seconds, angle, speed, curvature=0.0):
+    """Drive with the wheel held at an angle."""
+    for _ in range(round(seconds * 100)):
+        car.steer_angle, car.steer_rate = angle, 0.0
+        car._move(speed)
+
+
+def test_nothing_moves_without_torque(car):
+    """A straight car on a straight road stays exactly where it is."""
+    run(car, 30.0, 0.0, 26.8)
+    assert (car.offset, car.heading, car.steer_angle, car.yaw_rate) == (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_left_is_positive_all_the_way(car, sign):
+    """Torque to a side turns wheel, car and path to that side."""
+    run(car, 1.0, 0.2 * sign, 20.0)
+    assert car.steer_angle * sign > 0 and car.yaw_rate * sign > 0
+    assert car.heading * sign > 0 and car.offset * sign > 0
+
+
+def test_sides_are_symmetric():
+    """Left and right are mirror images to the last bit."""
+    left, right = LateralDynamics(get_params()), LateralDynamics(get_params())
+    run(left, 2.0, 0.3, 20.0)
+    run(right, 2.0, -0.3, 20.0)
+    assert (left.offset, left.heading, left.steer_angle) == (
+        -right.offset,
+        -right.heading,
+        -right.steer_angle,
+    )
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0, 15.0, 26.8, 40.0])
+def test_steady_turn_is_that_of_the_bicycle_model(car, speed):
+    """Held at an angle, the car settles at yaw rate v delta / (L (1 + K v^2)), K the understeer gradient."""
+    p = get_params()
+    rear = p.wheelbase - p.center_to_front
+    understeer = (
+        p.mass / p.wheelbase**2 * (rear / p.tire_stiffness_front - p.center_to_front / p.tire_stiffness_rear)
+    )
+    hold(car, 10.0, radians(10.0), speed)
+    expected = speed * radians(10.0) / 13.0 / (p.wheelbase * (1 + understeer * speed**2))
+    assert understeer > 0
+    assert car.yaw_rate == pytest.approx(expected, rel=1e-6)
+
+
+def test_full_torque_is_limited_by_the_tyres(car):
+    """At 60 mph full torque turns the wheel no faster than 0.5 rad/s and ends near 2.8 m/s^2."""
+    fastest = 0.0
+    for _ in range(600):
+        car.step(1.0, 26.8, 0.0)
+        fastest = max(fastest, car.steer_rate)
+    assert 0.3 < fastest <= 0.5
+    assert car.yaw_rate * 26.8 == pytest.approx(2.8, abs=0.1)
+
+
+def test_the_wheel_returns_by_itself(car):
+    """Let go in a bend, the tyres pull the wheel back to the middle without a lasting swing."""
+    run(car, 3.0, 0.5, 20.0)
+    turned = car.steer_angle
+    run(car, 4.0, 0.0, 20.0)
+    assert abs(car.steer_angle) < 0.01 * turned
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.05, 0.3, 2.0])
+def test_slow_driving_is_stable(car, speed):
+    """At walking pace and at rest nothing grows without bounds, and a standing car does not move."""
+    run(car, 20.0, 1.0, speed)
+    assert abs(car.steer_angle) <= 8.7
+    assert abs(car.lateral_speed) <= 2 * speed
+    assert abs(car.yaw_rate) <= speed
+    if speed == 0.0:
+        assert (car.offset, car.heading) == (0.0, 0.0)
+
+
+def test_a_bend_carries_the_lane_away(car):
+    """Straight on in a left-hand bend of 500 m, the car is to the right of its lane by s^2 / 2R."""
+    run(car, 1.0, 0.0, 20.0, curvature=0.002)
+    assert car.offset == pytest.approx(-(20.0**2) / 1000, rel=0.02)
+    assert car.heading == pytest.approx(-0.04, rel=0.01)

@@ -1,0 +1,76 @@
+"""Longitudinal motion, against numbers measured on the original's plant."""
+
+import pytest
+from selfdrive.car.honda.interface import get_params
+from selfdrive.messages import Actuators
+from selfdrive.sim.plant import BASE_SPEED, Plant, acceleration
+
+
+@pytest.fixture
+def plant():
+    def make(speed):
+        return Plant(get_params(), speed=speed)
+
+    return make
+
+
+def test_coasting_from_60_mph(plant):
+    """The first steps of a coasting car are the original's to its printed digits."""
+    car = plant(26.8224)
+    car.step(Actuators(), 0.0, 0.0)
+    assert (car.position, car.speed, car.acceleration) == pytest.approx((0.26822, 26.821, -0.17586), abs=6e-4)
+    for _ in range(100):
+        car.step(Actuators(), 0.0, 0.0)
+    assert (car.position, car.speed, car.acceleration) == pytest.approx((27.002, 26.645, -0.17485), abs=6e-4)
+
+
+def test_position_uses_the_old_speed(plant):
+    """Euler's order: a step moves the car by its speed at the step's beginning, exactly."""
+    car = plant(10.0)
+    car.step(Actuators(brake=1.0), 0.0, 0.0)
+    assert car.position == 0.1
+    assert car.speed == 10.0 + 0.01 * car.acceleration
+
+
+def test_gas_below_and_above_base_speed():
+    """Gas gives a constant force below 19.6 m/s and constant power above."""
+    assert BASE_SPEED == pytest.approx(19.608, abs=1e-3)
+    for speed, force in ((10.0, 5100 * 3.33), (25.0, 100_000 / 25.0 * 3.33)):
+        gain = acceleration(speed, 0.5, 0.0, 0.0) - acceleration(speed, 0.0, 0.0, 0.0)
+        assert gain == pytest.approx(0.5 * force / 1700)
+
+
+def test_brake_and_grade():
+    """A unit of brake takes 3.0 m/s^2, a grade its own value."""
+    free = acceleration(15.0, 0.0, 0.0, 0.0)
+    assert free - acceleration(15.0, 0.0, 1.0, 0.0) == pytest.approx(3.0)
+    assert free - acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)
+
+
+def test_creep():
+    """An idling car creeps: 1 m/s^2 at rest falling to none at 1.5 m/s, less the rolling resistance."""
+    assert acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
+    assert acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
+    assert acceleration(1.5, 0.0, 0.0, 0.0) == pytest.approx(-0.0981, abs=1e-3)
+
+
+def test_the_car_never_drives_backwards(plant):
+    """Braked to a stop the car stays there: no speed, no acceleration, no further way."""
+    car = plant(1.0)
+    for _ in range(200):
+        car.step(Actuators(brake=1.0), 0.0, 0.0)
+    stopped_at = car.position
+    car.step(Actuators(brake=1.0), 0.0, 0.0)
+    assert (car.speed, car.acceleration, car.position) == (0.0, 0.0, stopped_at)
+
+
+def test_way_along_the_road(plant):
+    """Only the motion along the road counts: a car askew makes less way, one outside in a bend too."""
+    straight, askew, outside = plant(20.0), plant(20.0), plant(20.0)
+    askew.lateral.heading = 0.5
+    outside.lateral.offset = -2.0
+    straight.step(Actuators(), 0.0, 0.0)
+    askew.step(Actuators(), 0.0, 0.0)
+    outside.step(Actuators(), 0.0, 0.01)
+    assert askew.position == pytest.approx(straight.position * 0.87758, rel=1e-4)
+    assert outside.position == pytest.approx(straight.position / 1.02, rel=1e-9)

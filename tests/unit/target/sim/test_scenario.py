@@ -1,0 +1,144 @@
+"""Scenario files: what they mean, and how mistakes in them are answered."""
+
+import pytest
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.scenario import ButtonPress, load_scenario, parse_scenario
+
+GOOD = """\
+schema: scenario/1
+name: T1
+title: a try
+duration_s: 12.5
+host:
+  speed_mph: 60
+  lateral_offset_m: -0.4
+lead:
+  gap_m: 80
+  speed_kph: [36, 72]
+  at_s: [0, 10]
+buttons:
+  - {button: decel_set, press_s: 1.2, release_s: 1.3}
+  - {button: cancel, press_s: 5, release_s: 5.1}
+road:
+  grade: {at_s: [0, 5], mps2: [0, 1]}
+  curvature: {at_m: [0, 100], per_m: [0, 0.002]}
+"""
+
+
+def parse(text):
+    return parse_scenario(text, "some/file.yaml", "digest")
+
+
+def edit(old, new):
+    assert old in GOOD
+    return GOOD.replace(old, new, 1)
+
+
+def test_everything_arrives_in_si_units():
+    """Units are converted once, times become steps."""
+    scenario = parse(GOOD)
+    assert (scenario.name, scenario.title, scenario.digest, scenario.steps) == ("T1", "a try", "digest", 1250)
+    assert scenario.speed == pytest.approx(26.8224)
+    assert scenario.lateral_offset == -0.4
+    assert scenario.lead.gap == 80.0
+    assert scenario.lead.speeds == pytest.approx((10.0, 20.0))
+    assert scenario.lead.times == (0.0, 10.0)
+    assert scenario.buttons == (
+        ButtonPress(code=3, press=120, release=130),
+        ButtonPress(code=2, press=500, release=510),
+    )
+    assert scenario.grade == ((0.0, 5.0), (0.0, 1.0))
+    assert scenario.curvature == ((0.0, 100.0), (0.0, 0.002))
+
+
+def test_buttons_are_down_from_press_to_release():
+    """The step of the press is the first with the button down, the step of the release the first without."""
+    scenario = parse(GOOD)
+    assert [scenario.button(k) for k in (119, 120, 129, 130, 505)] == [0, 3, 3, 0, 2]
+
+
+def test_what_may_be_left_out():
+    """Lead, buttons, road and offset are optional; a single lead speed needs no times."""
+    scenario = parse("schema: scenario/1\nname: a\ntitle: b\nduration_s: 1\nhost: {speed_mps: 5}\n")
+    assert (scenario.lead, scenario.buttons, scenario.grade, scenario.curvature) == (None, (), None, None)
+    assert (scenario.speed, scenario.lateral_offset) == (5.0, 0.0)
+    single = parse(edit("  speed_kph: [36, 72]\n  at_s: [0, 10]\n", "  speed_kph: 36\n"))
+    assert (single.lead.times, single.lead.speeds) == ((0.0,), (10.0,))
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "got", "remedy"),
+    [
+        (edit("gap_m", "gap_ft"), 9, "unknown key 'gap_ft'", "did you mean 'gap_m'?"),
+        (edit("name: T1", "name: T1\nname: T2"), 3, "key 'name' a second time", "remove one"),
+        (edit("speed_mph: 60", "speed: 60"), 6, "unknown key 'speed'", "did you mean"),
+        (
+            edit("speed_mph: 60", "speed_mph: 60\n  speed_kph: 96"),
+            6,
+            "speed_kph and speed_mph",
+            "unit stands",
+        ),
+        (edit("  speed_mph: 60\n", ""), 6, "no speed", "unit stands"),
+        (edit("speed_mph: 60", "speed_mph: fast"), 6, "speed_mph: 'fast'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: .nan"), 6, "speed_mph: '.nan'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: -1"), 6, "speed_mph: '-1'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: '60'"), 6, "speed_mph: '60'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: [60]"), 6, "speed_mph: a list", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: yes"), 6, "speed_mph: 'yes'", "a speed in mph"),
+        (edit("duration_s: 12.5", "duration_s: 12.503"), 4, "duration_s: '12.503'", "10 ms"),
+        (edit("duration_s: 12.5", "duration_s: 1e9"), 4, "duration_s: '1e9'", "length of the run"),
+        (edit("duration_s: 12.5\n", ""), 1, "no 'duration_s'", "length of the run"),
+        (edit("scenario/1", "scenario/2"), 1, "schema: 'scenario/2'", "scenario/1"),
+        (edit("name: T1", "name: 1"), 2, "name: '1'", "short name"),
+        (edit("at_s: [0, 10]", "at_s: [0, 10, 20]"), 11, "at_s: a list", "one for each speed"),
+        (edit("at_s: [0, 10]", "at_s: [10, 0]"), 11, "at_s: 0 after 10", "in order"),
+        (edit("[36, 72]", "36"), 11, "at_s: a list", "give a list of speeds"),
+        (edit("[36, 72]", "[]"), 10, "speed_kph: a list", "[a, b, ...]"),
+        (edit("  at_s: [0, 10]\n", ""), 9, "no 'at_s'", "times of the speeds"),
+        (edit("button: decel_set", "button: decelset"), 13, "button: 'decelset'", "decel_set"),
+        (edit("release_s: 1.3", "release_s: 1.1"), 13, "release_s: '1.1'", "after pressing"),
+        (edit("press_s: 5,", "press_s: 1.25,"), 14, "press_s: '1.25'", "in order"),
+        (edit("mps2: [0, 1]", "mps2: [0, 1, 2]"), 16, "at_s: a list", "one for each value"),
+        (edit("per_m: [0, 0.002]", "per_m: [0, 2]"), 17, "per_m: '2'", "curvature in 1/m"),
+        (edit("host:", "host: 3\nhosts:"), 6, "unknown key 'hosts'", "did you mean 'host'?"),
+        (edit("host:\n  speed_mph: 60\n  lateral_offset_m: -0.4\n", "host: 3\n"), 5, "'3'", "give the keys"),
+        (edit("name: T1", "name: [T1"), 3, "", "mend the syntax"),
+        ("", 1, "an empty file", "write the keys"),
+        ("- a\n", 1, "a list", "give the keys"),
+    ],
+)
+def test_mistakes(text, line, got, remedy):
+    """A mistake is told with file and line, what was got, what was expected and what to do."""
+    with pytest.raises(ConfigError) as caught:
+        parse(text)
+    message = str(caught.value)
+    assert message.startswith(f"some/file.yaml:{line}: {got}")
+    assert ", expected " in message
+    assert remedy in message.rsplit("; ", 1)[1]
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    """A file that is not there, and one that is no text, are told by name."""
+    with pytest.raises(ConfigError, match=r"no\.yaml: No such file"):
+        load_scenario(tmp_path / "no.yaml")
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match=r"binary\.yaml: not UTF-8 text"):
+        load_scenario(tmp_path / "binary.yaml")
+
+
+@pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
+def test_the_five_scenarios(scenarios, name):
+    """All five: 60 mph, 100 m to the lead at 40 mph, set pressed at 1.2 s for 0.1 s, 30 s."""
+    scenario = load_scenario(scenarios / f"{name}.yaml")
+    assert (scenario.name, scenario.steps, scenario.speed) == (name, 3000, pytest.approx(26.8224))
+    assert scenario.lead.gap == 100.0
+    assert scenario.lead.speeds[0] == pytest.approx(25 * 0.44704 if name == "S2" else 40 * 0.44704)
+    assert scenario.buttons == (ButtonPress(code=3, press=120, release=130),)
+
+
+def test_digest_is_that_of_the_bytes(tmp_path):
+    """Any change of the file changes the digest, even a comment."""
+    first, second = tmp_path / "a.yaml", tmp_path / "b.yaml"
+    first.write_text(GOOD)
+    second.write_text(GOOD + "# more\n")
+    assert load_scenario(first).digest != load_scenario(second).digest

@@ -1,0 +1,85 @@
+"""What sensors and radar put on the bus."""
+
+import cantools
+import pytest
+from selfdrive.car.honda.values import CAR_DBC, RADAR_DBC
+from selfdrive.sim.radar import RadarSensor
+from selfdrive.sim.road import Road
+from selfdrive.sim.sensors import CarSensors
+
+CAR = cantools.database.load_file(CAR_DBC)
+RADAR = cantools.database.load_file(RADAR_DBC)
+
+
+def read(database, frames):
+    return {
+        database.get_message_by_frame_id(f.address).name: database.decode_message(
+            f.address, f.data, decode_choices=False
+        )
+        for f in frames
+    }
+
+
+def test_speed_and_angle_as_cantools_reads_them(truth):
+    """All speeds agree with the truth in km/h, the angle is in degrees."""
+    frames = CarSensors().measure(truth(v_ego=20.0, steer_angle=-0.1, steer_rate=0.2), 3, 0)
+    values = read(CAR, frames)
+    assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(72.0)
+    for corner in ("FL", "FR", "RL", "RR"):
+        assert values["WHEEL_SPEEDS"][f"WHEEL_SPEED_{corner}"] == pytest.approx(72.0)
+    assert values["STEERING_SENSORS"]["STEER_ANGLE"] == pytest.approx(-5.7)
+    assert values["STEERING_SENSORS"]["STEER_ANGLE_RATE"] == pytest.approx(11.0)
+    assert values["SCM_BUTTONS"]["CRUISE_BUTTONS"] == 3
+
+
+@pytest.mark.parametrize(("speed", "shown"), [(0.29999, 0.0), (0.3, 1.08), (0.0, 0.0)])
+def test_speed_reads_zero_below_its_threshold(truth, speed, shown):
+    """Below 0.3 m/s all speeds read 0 and the wheels count as standing."""
+    values = read(CAR, CarSensors().measure(truth(v_ego=speed), 0, 0))
+    assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(shown)
+    assert values["STANDSTILL"]["WHEELS_MOVING"] == (shown > 0)
+
+
+def test_every_message_has_its_period_and_counter(truth):
+    """Each message comes in its own period, its counter moving on by one every time."""
+    sensors, seen = CarSensors(), {}
+    for frame in range(100):
+        for name, values in read(CAR, sensors.measure(truth(v_ego=0.1 * frame), 0, frame)).items():
+            seen.setdefault(name, []).append(values.get("COUNTER"))
+    assert {len(counters) for counters in seen.values()} == {100, 50, 10}
+    for name, counters in seen.items():
+        if name != "WHEEL_SPEEDS":
+            assert counters == [k % 4 for k in range(len(counters))], name
+
+
+def radar(truth, road=None, **values):
+    frames = RadarSensor(road or Road(None, None)).measure(truth(**values))
+    return read(RADAR, frames)["TRACK_15"]
+
+
+def test_radar_cuts_off_towards_zero(truth):
+    """Distance and speed lose what is less than a step, whatever the sign, like the original's."""
+    track = radar(truth, d_rel=97.681, v_ego=26.777, v_lead=17.8868)
+    assert (track["LONG_DIST"], track["REL_SPEED"]) == (97.625, -8.875)
+
+
+@pytest.mark.parametrize(("d_rel", "read_as"), [(255.99, 255.9375), (256.0, 0.0), (317.0, 61.0), (-5.0, 0.0)])
+def test_radar_distance_wraps(truth, d_rel, read_as):
+    """Twelve bits of 1/16 m wrap around at 256 m; behind the bumper reads 0."""
+    assert radar(truth, d_rel=d_rel)["LONG_DIST"] == read_as
+
+
+def test_radar_sees_the_lead_where_it_is(truth):
+    """The lead stays in its lane: it moves right in view when the car drifts or turns left (right positive)."""
+    assert radar(truth, d_rel=50.0, lateral_offset=1.0)["LAT_DIST"] == 1.0
+    assert radar(truth, d_rel=50.0, heading=0.1)["LAT_DIST"] == pytest.approx(4.99, abs=0.0625)
+    left_bend = Road(None, ((0.0,), (0.002,)))
+    assert radar(truth, left_bend, d_rel=50.0)["LAT_DIST"] == pytest.approx(-2.5, abs=0.0625)
+    assert radar(truth, left_bend, d_rel=250.0)["LAT_DIST"] == -31.0
+
+
+def test_radar_of_a_broken_measurement():
+    """What is no number reads 0 and raises nothing."""
+    sensor = RadarSensor(Road(None, None))
+    track = read(RADAR, sensor._pack(float("nan"), float("inf"), 0.0))["TRACK_15"]
+    assert (track["LONG_DIST"], track["REL_SPEED"]) == (0.0, 0.0)

@@ -1,0 +1,161 @@
+"""The loop around a scripted controller: order, timing, record and trace."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from selfdrive.car.honda.hondacan import CommandPacker
+from selfdrive.car.honda.values import CruiseButton
+from selfdrive.messages import ControlsState, LeadData, Plan
+from selfdrive.sim.recorder import CHANNELS, INTEGER_CHANNELS
+from selfdrive.sim.scenario import load_scenario
+from selfdrive.sim.simulator import Simulator
+
+
+class Script:
+    """In the controller's place: notes what it is given, sends what `commands(step)` says."""
+
+    def __init__(self, commands=lambda step: (0, 0, 0)):
+        self.commands = commands
+        self.steps = []
+        self.packer = CommandPacker()
+        self.controlsd = SimpleNamespace(state=ControlsState(), plan=Plan())
+        self.radar_state = None
+
+    def step(self, t, frames, view):
+        self.steps.append((t, frames, view))
+        step = len(self.steps) - 1
+        torque, brake, gas = self.commands(step)
+        return [
+            self.packer.steering(torque, True, step),
+            self.packer.brake(brake, True, False, False, False, step),
+            self.packer.gas(gas, step),
+        ]
+
+
+@pytest.fixture
+def s1(scenarios):
+    return load_scenario(scenarios / "S1.yaml")
+
+
+def drive(scenario, script, steps):
+    simulator = Simulator()
+    simulator.reset(scenario, 0)
+    simulator.manager = script
+    for _ in range(steps):
+        simulator.step()
+    return simulator
+
+
+def test_a_command_acts_in_the_next_step(s1):
+    """What is sent in step k moves the car in step k + 1, and row k shows the commands that were felt."""
+    script = Script(lambda step: (-384, 51, 0) if step == 3 else (0, 0, 0))
+    trace = drive(s1, script, 8).result().trace
+    assert np.flatnonzero(trace["brake"]).tolist() == [4]
+    assert trace["brake"][4] == 51 / 256
+    assert trace["steer_torque"][4] == pytest.approx(0.1)
+    assert np.flatnonzero(np.diff(trace["a_ego"]) < -0.5).tolist() == [3]
+    assert np.flatnonzero(trace["steer_angle"])[0] == 4
+
+
+def test_what_the_controller_is_given(s1):
+    """Car frames every step; radar frames and a view every fifth, from the same moment."""
+    script = Script()
+    drive(s1, script, 20)
+    assert [t for t, _, _ in script.steps] == [k / 100 for k in range(20)]
+    for k, (_, frames, view) in enumerate(script.steps):
+        assert (view is not None) == (k % 5 == 0)
+        assert ({0x400, 0x445} <= {f.address for f in frames if f.bus == 1}) == (k % 5 == 0)
+        assert {0x158, 0x1D0, 0x14A, 0x296} <= {f.address for f in frames if f.bus == 0}
+
+
+def test_buttons_reach_the_bus(s1):
+    """The set button is down from step 120 until step 130."""
+    script = Script()
+    drive(s1, script, 140)
+    down = [
+        k
+        for k, (_, frames, _) in enumerate(script.steps)
+        for f in frames
+        if f.address == 0x296 and f.data[0] >> 5 == CruiseButton.DECEL_SET
+    ]
+    assert down == list(range(120, 130))
+
+
+def test_truth_of_a_coasting_run(s1):
+    """The first rows hold the original's plant to its printed digits, and HWT is distance over speed."""
+    trace = drive(s1, Script(), 101).result().trace
+    row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
+    expected = {"d_rel": 91.058, "v_rel": -8.7637, "v_ego": 26.645, "a_ego": -0.17485, "hwt": 3.4174}
+    assert row == pytest.approx(expected, abs=6e-4)
+    assert trace["d_rel"][0] == pytest.approx(99.911, abs=6e-4)
+
+
+def test_hwt_at_standstill_is_infinite(s1):
+    """A standing car has no headway time."""
+    trace = drive(replace(s1, speed=0.0), Script(lambda step: (0, 255, 0)), 5).result().trace
+    assert trace["v_ego"][-1] == 0.0
+    assert np.isinf(trace["hwt"][-1])
+
+
+def test_free_road(s1):
+    """Without a lead the object ahead stays at 200 m and at the host's speed, for truth, radar and camera."""
+    script = Script()
+    result = drive(replace(s1, lead=None), script, 50).result()
+    assert set(result.trace["d_rel"]) == {200.0}
+    assert set(result.trace["v_rel"]) == {0.0}
+    assert result.record["no_lead"] is True
+    views = [view for _, _, view in script.steps if view]
+    assert {view.lead_d_rel for view in views} == {200.0}
+    tracks = {f.data for _, frames, _ in script.steps for f in frames if f.address == 0x445}
+    assert tracks == {bytes.fromhex("c800000000000000")}
+
+
+def test_hazards_and_alerts_in_the_record(s1):
+    """First hazards with their times; of alerts the first of each kind, and every raising; others do not count."""
+    script = Script(lambda step: (0, 0, 1332))
+    simulator = Simulator()
+    simulator.reset(replace(s1, steps=1000), 7)
+    simulator.manager = script
+    while not simulator.done:
+        on = simulator.frame // 100 % 2 == 1
+        script.controlsd.state = ControlsState(
+            enabled=simulator.frame >= 131, alerts=("fcw", "startup") if on else ("startup",)
+        )
+        simulator.step()
+    record = simulator.result().record
+    trace = simulator.result().trace
+    hit = trace["t"][np.argmax(trace["d_rel"] <= 0.0)]
+    assert record["hazards"] == {"H1": hit, "H2": None, "H3": None}
+    assert record["alerts"] == [{"name": "fcw", "t": 1.0}]
+    assert [event["t"] for event in record["alert_events"]] == [1.0, 3.0, 5.0, 7.0, 9.0]
+    assert (record["engaged_from"], record["engaged_to"]) == (1.31, 9.99)
+    assert (record["seed"], record["steps"], record["scenario"]) == (7, 1000, "S1")
+    assert np.unique(trace["alert"][100:200]).tolist() == [2]
+    assert np.unique(trace["alert"][200:300]).tolist() == [0]
+
+
+def test_trace_channels(s1):
+    """Every channel has one value a step, of its type; the controller's own view is among them."""
+    script = Script()
+    script.radar_state = SimpleNamespace(lead_one=LeadData(status=True, d_rel=50.0, v_lead_k=17.0))
+    script.controlsd.plan = Plan(v_target=25.0, source="mpc2")
+    script.controlsd.state = ControlsState(long_state="stopping")
+    trace = drive(s1, script, 10).result().trace
+    assert tuple(trace) == CHANNELS
+    for name, values in trace.items():
+        assert len(values) == 10
+        assert values.dtype == (np.int32 if name in INTEGER_CHANNELS else np.float64)
+    last = {name: values[-1] for name, values in trace.items()}
+    assert (last["lead_status"], last["lead_d_rel"], last["lead_v_lead_k"]) == (1, 50.0, 17.0)
+    assert (last["v_target"], last["plan_source"], last["long_state"]) == (25.0, 2, 2)
+
+
+def test_a_result_may_be_taken_on_the_way(s1):
+    """Asking for the result does not disturb a run."""
+    simulator = drive(s1, Script(), 10)
+    early = simulator.result()
+    simulator.step()
+    assert (early.record["steps"], len(early.trace["t"])) == (10, 10)
+    assert simulator.result().record["steps"] == 11

@@ -1,0 +1,70 @@
+"""The lead vehicle, the road and what the camera sees of them."""
+
+import pytest
+from selfdrive.sim.camera import Camera
+from selfdrive.sim.lead import LeadVehicle
+from selfdrive.sim.road import Road
+from selfdrive.visiond.visiond import Visiond
+
+STRAIGHT = Road(None, None)
+BEND = Road(None, ((0.0,), (0.002,)))
+
+
+def test_lead_follows_its_profile():
+    """The lead has the speed its table gives at each step's beginning, and moves with it."""
+    lead = LeadVehicle(100.0, (0.0, 1.0, 2.0), (10.0, 10.0, 20.0))
+    speeds = []
+    for frame in range(300):
+        lead.step(frame / 100)
+        speeds.append(lead.speed)
+    assert speeds[:101] == [10.0] * 101
+    assert speeds[150] == pytest.approx(15.0)
+    assert speeds[250] == 20.0
+    assert lead.position == pytest.approx(100.0 + sum(speeds) / 100)
+
+
+def test_grade_and_curvature_tables():
+    """Grade is a table over time, curvature one over distance; a plain road has neither."""
+    road = Road(((0.0, 10.0, 11.0), (0.0, 0.0, 1.0)), ((100.0, 200.0), (0.0, 0.002)))
+    assert [road.grade(t) for t in (5.0, 10.5, 20.0)] == [0.0, 0.5, 1.0]
+    assert [road.curvature(s) for s in (0.0, 150.0, 300.0)] == [0.0, 0.001, 0.002]
+    assert (STRAIGHT.grade(5.0), STRAIGHT.curvature(5.0), STRAIGHT.bend(5.0, 50)) == (0.0, 0.0, None)
+
+
+def test_bend_is_a_parabola_for_constant_curvature():
+    """A road of constant curvature leaves its tangent by k x^2 / 2, to the side of the curvature."""
+    points = BEND.bend(0.0, 50)
+    assert points == pytest.approx([0.001 * x * x for x in range(50)])
+    assert BEND.sideways(0.0, 40.2) == points[40]
+    assert STRAIGHT.sideways(0.0, 40.0) == 0.0
+
+
+def test_lane_in_view(truth):
+    """In the middle of the lane the lines are 1.85 m to either side; a car 0.4 m left sees them 0.4 m right."""
+    view = Camera(STRAIGHT).look(truth(d_rel=42.0))
+    assert (view.left_lane_y, view.right_lane_y, view.path_y, view.lead_d_rel) == (1.85, -1.85, 0.0, 42.0)
+    assert view.bend == (0.0,) * 50
+    view = Camera(STRAIGHT).look(truth(lateral_offset=0.4))
+    assert (view.left_lane_y, view.right_lane_y, view.path_y) == pytest.approx((1.45, -2.25, -0.4))
+
+
+def test_heading_and_bend_in_view(truth):
+    """A car turned left sees the lane run to the right; in a left-hand bend it curves to the left."""
+    assert Camera(STRAIGHT).look(truth(heading=0.1)).bend[49] == pytest.approx(-49 * 0.100335, rel=1e-4)
+    assert Camera(BEND).look(truth()).bend[49] == pytest.approx(0.001 * 49**2)
+    both = Camera(BEND).look(truth(heading=0.1)).bend
+    assert both[49] == pytest.approx(0.001 * 49**2 - 49 * 0.100335, rel=1e-4)
+
+
+def test_ideal_vision_passes_geometry_on(truth):
+    """The model holds the view's lines shifted by where they pass the car, and the lead's distance."""
+    visiond = Visiond()
+    assert visiond.latest is None
+    visiond.update(Camera(BEND).look(truth(lateral_offset=0.5, d_rel=33.0)), 7.0)
+    model = visiond.latest
+    bend = [0.001 * x * x for x in range(50)]
+    assert model.t == 7.0
+    assert model.left_lane.points == pytest.approx([1.35 + y for y in bend])
+    assert model.right_lane.points == pytest.approx([-2.35 + y for y in bend])
+    assert model.path.points == pytest.approx([-0.5 + y for y in bend])
+    assert (model.lead.d_rel, model.lead.prob) == (33.0, 1.0)
