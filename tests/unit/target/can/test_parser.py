@@ -64,7 +64,7 @@ def test_frames_of_others_are_ignored(parser, speed, change):
 
 
 def test_silence_of_ten_periods_is_borne_eleven_are_not(parser, speed, wheels):
-    """A message is invalid when it has missed more than ten of its own periods, and valid again once it comes."""
+    """A message that has missed more than ten of its periods is invalid, and valid again once it comes."""
     parser.update([speed.pack((50.0,), 0), wheels.pack((50.0,))], 1.0)
     for step in range(1, 11):
         parser.update([wheels.pack((50.0,))], 1.0 + step / 100)

@@ -25,7 +25,7 @@ def pack(name, counter, **signals):
 
 
 def test_an_ordinary_car(reader, bench):
-    """Sensors of a driving car read as that car: in drive, belted, closed, main switch on, nothing pressed."""
+    """A driving car reads as that car: in drive, belted, closed, main switch on, nothing pressed."""
     state = read(reader, bench, v_ego=20.0, steer_angle=radians(12.3), steer_rate=radians(-7.0))
     assert state.can_valid and state.cruise_available and state.gear == "drive"
     assert state.v_ego_raw == pytest.approx(20.0, abs=0.002)

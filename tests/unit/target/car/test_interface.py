@@ -31,7 +31,7 @@ def test_no_events_without_cause(car, bench):
 
 
 def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
-    """All CAN lost after 0.10 s: invalid from 0.21 s, an error in the fifth cycle, 0.25 s, until CAN is back."""
+    """CAN lost after 0.10 s: invalid from 0.21 s, an error in the fifth cycle, 0.25 s, until it is back."""
     for _ in range(11):
         update(car, bench)
     first = next(step for step in range(11, 60) if "can_error" in kinds(car.update([], step / 100)))

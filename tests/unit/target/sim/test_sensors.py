@@ -70,7 +70,7 @@ def test_radar_distance_wraps(truth, d_rel, read_as):
 
 
 def test_radar_sees_the_lead_where_it_is(truth):
-    """The lead stays in its lane: it moves right in view when the car drifts or turns left (right positive)."""
+    """The lead stays in its lane: it moves right (positive) in view when the car drifts or turns left."""
     assert radar(truth, d_rel=50.0, lateral_offset=1.0)["LAT_DIST"] == 1.0
     assert radar(truth, d_rel=50.0, heading=0.1)["LAT_DIST"] == pytest.approx(4.99, abs=0.0625)
     left_bend = Road(None, ((0.0,), (0.002,)))

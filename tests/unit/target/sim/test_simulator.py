@@ -113,7 +113,7 @@ def test_free_road(s1):
 
 
 def test_hazards_and_alerts_in_the_record(s1):
-    """First hazards with their times; of alerts the first of each kind, and every raising; others do not count."""
+    """First hazards with their times; of counted alerts the first of each kind, and every raising."""
     script = Script(lambda step: (0, 0, 1332))
     simulator = Simulator()
     simulator.reset(replace(s1, steps=1000), 7)

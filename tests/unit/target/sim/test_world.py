@@ -40,7 +40,7 @@ def test_bend_is_a_parabola_for_constant_curvature():
 
 
 def test_lane_in_view(truth):
-    """In the middle of the lane the lines are 1.85 m to either side; a car 0.4 m left sees them 0.4 m right."""
+    """In mid-lane the lines are 1.85 m to either side; a car 0.4 m left sees them 0.4 m right."""
     view = Camera(STRAIGHT).look(truth(d_rel=42.0))
     assert (view.left_lane_y, view.right_lane_y, view.path_y, view.lead_d_rel) == (1.85, -1.85, 0.0, 42.0)
     assert view.bend == (0.0,) * 50
