@@ -8,9 +8,9 @@ from selfdrive.controls.radard import Radard
 from selfdrive.messages import CameraView, CanFrame, RadarState
 from selfdrive.visiond.visiond import Visiond
 
-# First step of the control loop. The original's process is up 0.1 s after the car; its first speed
-# reading comes another two cycles later.
-START_STEP = 12
+# First step of the control loop: the original's process is up 0.1 s after the car. Its first cycle
+# finds no CAN frames yet.
+START_STEP = 11
 
 
 class Manager:
@@ -33,11 +33,12 @@ class Manager:
         if view is not None:
             self.visiond.update(view, t)
         radar = self._radar.update(frames, t)
-        started = self._step >= START_STEP
-        # radard waits for the first speed from controlsd
-        if radar is not None and self._step > START_STEP:
-            self.radar_state = self.radard.update(radar, self.visiond.latest, self.controlsd.state)
+        step = self._step
         self._step += 1
-        if not started:
+        if step < START_STEP:
             return []
+        if step == START_STEP:
+            frames = []
+        elif radar is not None:  # radard waits for the first speed from controlsd
+            self.radar_state = self.radard.update(radar, self.visiond.latest, self.controlsd.state)
         return self.controlsd.update(t, frames, self.radar_state, self.visiond.latest)

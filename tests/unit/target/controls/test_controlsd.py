@@ -1,0 +1,231 @@
+"""The control loop with a car made of messages."""
+
+from types import SimpleNamespace
+
+import pytest
+from selfdrive.car.params import CarParams
+from selfdrive.common.conversions import KPH_TO_MS
+from selfdrive.controls.controlsd import Controlsd
+from selfdrive.controls.lib import events as ev
+from selfdrive.controls.lib.events import Event
+from selfdrive.controls.lib.pathplanner import ModelFit
+from selfdrive.messages import (
+    ButtonEvent,
+    CarControl,
+    CarState,
+    LeadData,
+    LeadVision,
+    ModelData,
+    PathData,
+    RadarState,
+)
+
+ENGAGE = Event("button_enable", (ev.ENABLE,))
+GAS = Event("pedal_pressed", (ev.PRE_ENABLE,))
+CAN = Event("can_error", (ev.NO_ENTRY, ev.IMMEDIATE_DISABLE))
+BUSY = Event("steer_temp_unavailable", (ev.NO_ENTRY, ev.WARNING))
+BROKEN = Event("steer_unavailable", (ev.NO_ENTRY, ev.IMMEDIATE_DISABLE, ev.PERMANENT))
+RELEASE = (ButtonEvent("decel", False),)
+
+
+class FakeCar:
+    """Gives the CarState it is told to and keeps what it is asked for."""
+
+    def __init__(self) -> None:
+        self.state = CarState()
+        self.asked: list[CarControl] = []
+        self.frames: list[int] = []
+
+    def update(self, frames: list, t: float) -> CarState:
+        return self.state
+
+    def apply(self, control: CarControl, frame: int) -> list:
+        self.asked.append(control)
+        self.frames.append(frame)
+        return [frame]
+
+
+class FreeMpc:
+    """Sees no lead."""
+
+    prev_lead_status = new_lead = False
+    v_mpc = v_mpc_future = 99.0
+    a_mpc = 0.0
+    a_plan = (0.0,) * 21
+
+    def set_cur_state(self, v: float, a: float) -> None: ...
+
+    def update(self, v_ego: float, a_ego: float, lead: LeadData) -> None: ...
+
+
+class Drive:
+    """controlsd at 20 m/s in the middle of a straight lane, radar and camera alive."""
+
+    def __init__(self, params: CarParams) -> None:
+        self.car = FakeCar()
+        self.controlsd = Controlsd(params, self.car, ModelFit())
+        planner = self.controlsd._planner
+        planner.mpc1 = planner.mpc2 = FreeMpc()
+        self.controlsd._lateral.mpc = SimpleNamespace(update=lambda *_: 0.1)
+        self.frame = -1
+        self.run(5)
+
+    def run(self, cycles: int = 1, *events: Event, **car) -> "Drive":
+        for _ in range(cycles):
+            self.frame += 1
+            t = self.frame * 0.01
+            self.car.state = CarState(**{"t": t, "v_ego": 20.0, "events": events, **car})
+            if self.frame % 5 == 0:
+                lines = [PathData((y,) * 50, 1.0, 1.0) for y in (0.5, 2.35, -1.35)]
+                self.model = ModelData(t, *lines, LeadVision(99.0, 1.0, 0.1))
+                self.radar = RadarState(t, LeadData(), LeadData())
+            self.sent = self.controlsd.update(t, [], self.radar, self.model)
+        return self
+
+    def engage(self) -> "Drive":
+        return self.run(1, ENGAGE, buttons=RELEASE)
+
+    @property
+    def state(self):
+        return self.controlsd.state
+
+    @property
+    def asked(self) -> CarControl:
+        return self.car.asked[-1]
+
+
+@pytest.fixture
+def drive(params: CarParams) -> Drive:
+    """A car that is not engaged yet."""
+    return Drive(params)
+
+
+def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
+    """The cycle that engages controls already, with the speed of now as set speed."""
+    drive.engage()
+    assert (drive.state.state, drive.state.enabled, drive.state.active) == ("enabled", True, True)
+    assert drive.state.long_state == "pid"
+    assert drive.asked.enabled and drive.asked.set_speed == pytest.approx(72 * KPH_TO_MS)
+    assert drive.state.alerts[0] == "enable"
+
+
+def test_not_engaged_nothing_is_asked_of_the_car(drive: Drive) -> None:
+    """Without engaging all actuators are zero and the set speed is the one that means none."""
+    actuators = drive.asked.actuators
+    assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
+    assert not drive.asked.enabled and drive.asked.cancel_cruise
+    assert drive.state.v_cruise == pytest.approx(255 * KPH_TO_MS)
+
+
+def test_control_reaches_the_car(drive: Drive) -> None:
+    """Engaged, the wanted angle gives torque and a speed below the set one gives gas."""
+    drive.engage().run(30, v_ego=19.0)
+    assert drive.asked.actuators.steer == 1.0
+    assert drive.asked.actuators.gas > 0.05
+
+
+def test_a_fault_takes_everything_away_in_its_cycle(drive: Drive) -> None:
+    """With an immediate reason the actuators are zero at once and stay so; the reason is told."""
+    drive.engage().run(30, v_ego=19.0).run(1, CAN, v_ego=19.0)
+    actuators = drive.asked.actuators
+    assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
+    assert (drive.state.enabled, drive.state.long_state) == (False, "off")
+    assert drive.state.alerts[0] == "can_error" and drive.state.events == ("can_error",)
+    drive.run(100)
+    assert not drive.state.enabled
+
+
+def test_pre_enabled_waits_for_the_pedal(drive: Drive) -> None:
+    """Engaged with the foot on the gas, nothing is controlled until it is lifted."""
+    drive.run(1, ENGAGE, GAS, buttons=RELEASE)
+    assert (drive.state.state, drive.state.active, drive.state.long_state) == ("pre_enabled", False, "off")
+    drive.run(1)
+    assert drive.state.long_state == "pid"
+
+
+def test_buttons_change_the_set_speed_once_engaged(drive: Drive) -> None:
+    """The release that engages does not change the speed, later ones do."""
+    drive.engage()
+    assert drive.state.v_cruise == pytest.approx(72 * KPH_TO_MS)
+    drive.run(1, buttons=(ButtonEvent("accel", True),)).run(1, ENGAGE, buttons=(ButtonEvent("accel", False),))
+    assert drive.state.v_cruise == pytest.approx(80 * KPH_TO_MS)
+
+
+def test_lost_messages_disengage(drive: Drive) -> None:
+    """Without new model and radar messages control ends after 0.5 s, with both alerts."""
+    drive.engage()
+    for _ in range(60):
+        drive.frame += 1
+        drive.controlsd.update(drive.frame * 0.01, [], drive.radar, drive.model)
+        if not drive.state.enabled:
+            break
+    assert {"model_error", "radar_error"} <= set(drive.state.alerts)
+    assert drive.frame * 0.01 == pytest.approx(drive.model.t + 0.51)
+
+
+def test_foot_brake_with_nothing_to_stop_for_disengages(drive: Drive) -> None:
+    """Braking by foot while the plan would drive on ends control."""
+    drive.engage().run(1, brake_pressed=True)
+    assert not drive.state.enabled and drive.state.alerts[0] == "no_target"
+
+
+def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
+    """A wanted angle out of reach is told after 0.8 s and changes nothing else."""
+    drive.engage().run(79)
+    assert "steer_saturated" not in drive.state.alerts
+    drive.run(5)
+    assert drive.state.alerts[0] == "steer_saturated" and drive.state.enabled and drive.state.steer_saturated
+
+
+def test_warnings_and_permanent_alerts(drive: Drive) -> None:
+    """A warning shows only while engaged; a lasting fault shows also while disengaged."""
+    drive.run(1, BUSY)
+    assert "steer_temp_unavailable" not in drive.state.alerts
+    drive.run(1, BROKEN)
+    assert "steer_unavailable_permanent" in drive.state.alerts
+    drive.run(100).engage().run(1, BUSY)
+    assert "steer_temp_unavailable" in drive.state.alerts
+
+
+def test_collision_warning_works_disengaged(drive: Drive) -> None:
+    """The planner's warning is told, engaged or not, and asks the car for picture and sound."""
+    drive.controlsd._planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: None)
+    drive.run(5)
+    assert drive.state.alerts[0] == "fcw" and not drive.state.enabled
+    assert (drive.asked.visual_alert, drive.asked.audible_alert) == ("fcw", "chime_repeated")
+
+
+def test_driver_actions_keep_the_car_awake(drive: Drive) -> None:
+    """The time without the driver runs while engaged and starts anew with wheel or buttons."""
+    drive.engage().run(100)
+    awareness = drive.controlsd._awareness
+    assert awareness.status < 1.0
+    drive.run(1, steering_pressed=True)
+    assert awareness.status == 1.0
+    drive.run(100).run(1, buttons=(ButtonEvent("setting", True),))
+    assert awareness.status == 1.0
+
+
+def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
+    """Driving off the middle of the lane is learnt every fifth cycle, not while the driver steers."""
+    offset = drive.controlsd._angle_offset
+    drive.run(20)
+    assert offset.value == 0.0
+    drive.engage().run(20, steering_pressed=True)
+    assert offset.value == 0.0
+    drive.run(5)
+    once = offset.value
+    assert once > 0.0
+    drive.run(10)
+    assert offset.value == pytest.approx(3 * once, rel=1e-3)
+
+
+def test_frames_are_counted_and_passed_on(drive: Drive) -> None:
+    """The car is asked once each cycle, with the cycle's number, and its frames are returned."""
+    assert drive.car.frames == [0, 1, 2, 3, 4]
+    assert drive.sent == [4]
+
+
+def test_startup_is_told(drive: Drive) -> None:
+    """The first cycles show the start-up text."""
+    assert drive.state.alerts == ("startup",) and drive.state.alert_text1 != ""

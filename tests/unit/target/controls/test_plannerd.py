@@ -1,0 +1,169 @@
+"""Choosing and interpolating the longitudinal plan."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import pytest
+from selfdrive.car.params import CarParams
+from selfdrive.controls.lib.pathplanner import ModelFit
+from selfdrive.controls.plannerd import Planner
+from selfdrive.messages import CarState, LeadData, LeadVision, ModelData, PathData, Plan, RadarState
+
+
+class FixedMpc:
+    """A controller that always finds the same, relative to where the plan starts."""
+
+    def __init__(self, dv: float = 1.0, a: float = 0.0, lead: bool = False, future: float = 99.0) -> None:
+        self.dv, self.a_mpc, self.prev_lead_status, self.v_mpc_future = dv, a, lead, future
+        self.new_lead = False
+        self.a_plan = (0.0,) * 21
+        self.start = (0.0, 0.0)
+
+    def set_cur_state(self, v: float, a: float) -> None:
+        self.start = (v, a)
+        self.v_mpc = v + self.dv
+
+    def update(self, v_ego: float, a_ego: float, lead: LeadData) -> None:
+        self.lead = lead
+
+
+class Drive:
+    """A planner with fixed controllers at 20 m/s."""
+
+    def __init__(self, params: CarParams, mpc1: FixedMpc | None = None, mpc2: FixedMpc | None = None) -> None:
+        self.planner = Planner(params, ModelFit())
+        self.planner.mpc1, self.planner.mpc2 = mpc1 or FixedMpc(), mpc2 or FixedMpc()
+        self.car = CarState(v_ego=20.0, a_ego=0.3)
+        self.frame = -1
+
+    def run(
+        self,
+        cycles: int,
+        long_state: str = "pid",
+        kph: float = 72.0,
+        slow_down: bool = False,
+        radar: bool = True,
+    ) -> list[Plan]:
+        plans = []
+        for _ in range(cycles):
+            self.frame += 1
+            t = self.frame * 0.01
+            if radar and self.frame % 5 == 0:
+                self.state = RadarState(t, LeadData(), LeadData())
+                self.model = ModelData(
+                    t, *([PathData((0.0,) * 50, 1.0, 1.0)] * 3), LeadVision(99.0, 1.0, 0.1)
+                )
+            self.planner.take_model(20.0, self.model)
+            plans.append(self.planner.update(t, self.car, self.state, long_state, kph, slow_down))
+        return plans
+
+
+def started(params: CarParams, *mpcs: FixedMpc) -> Drive:
+    drive = Drive(params, *mpcs)
+    drive.run(5, "off")
+    return drive
+
+
+def test_out_of_control_the_plan_is_the_car(params: CarParams) -> None:
+    """Not engaged, the plan starts from the car's speed; what it gains of speed is not planned on."""
+    drive = Drive(params)
+    plan = drive.run(1, "off")[-1]
+    assert (plan.v_target, plan.a_target, plan.source) == (20.0, 0.0, "cruise")
+    drive.car = CarState(v_ego=19.0, a_ego=-0.5)
+    assert drive.run(5, "off")[-1].v_target == pytest.approx(18.995)
+
+
+def test_moving_off_starts_at_walking_pace(params: CarParams) -> None:
+    """While the brake is released the plan waits at 0.3 m/s with 0.5 m/s^2."""
+    drive = Drive(params)
+    drive.car = CarState(v_ego=0.0)
+    plan = drive.run(1, "starting")[-1]
+    assert (plan.v_target, plan.a_target) == (pytest.approx(0.305), 0.5)
+
+
+def test_cruise_within_limits(params: CarParams) -> None:
+    """Towards a higher set speed acceleration rises by its limit a second, up to its limit."""
+    plans = started(params).run(500, kph=100.0)
+    steps = [after.a_target - before.a_target for before, after in pairwise(plans)]
+    assert max(steps) <= 0.5 * 0.01 * 1.5
+    assert max(p.a_target for p in plans) == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_slowest_wins(params: CarParams) -> None:
+    """The plan that is slowest in 0.2 s is taken, if it is for a lead."""
+    slow, slower = FixedMpc(-0.1, -0.5, True), FixedMpc(-0.2, -1.0, True)
+    assert started(params, slow, slower).run(1)[-1].source == "mpc2"
+    assert started(params, slower, slow).run(1)[-1].source == "mpc1"
+    assert started(params, FixedMpc(-0.2, -1.0, False), slow).run(1)[-1].source == "mpc2"
+    assert started(params, FixedMpc(+0.5, 0.5, True)).run(1)[-1].source == "cruise"
+
+
+def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> None:
+    """Between replans acceleration goes linearly to the goal; the next one starts where this one is."""
+    mpc = FixedMpc(-0.1, -1.0, True)
+    drive = started(params, mpc)
+    plans = drive.run(6)
+    assert [p.a_target for p in plans[:5]] == pytest.approx([-0.05, -0.10, -0.15, -0.20, -0.25])
+    assert mpc.start == pytest.approx((plans[4].v_target, -0.25))
+
+
+def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:
+    """Without new radar states the plan is followed for 0.22 s and then kept."""
+    drive = started(params, FixedMpc(-0.1, -1.0, True))
+    targets = [plan.a_target for plan in drive.run(40, radar=False)]
+    assert targets[:18] == sorted(set(targets), reverse=True)
+    assert targets[18:] == [targets[17]] * 22
+
+
+def test_future_is_the_slowest_of_all(params: CarParams) -> None:
+    """The plan's end is the slowest of both controllers and the set speed."""
+    assert Drive(params, FixedMpc(future=12.0)).run(1)[-1].v_target_future == 12.0
+    assert Drive(params, FixedMpc(), FixedMpc(future=11.0)).run(1)[-1].v_target_future == 11.0
+    assert Drive(params).run(1, kph=36.0)[-1].v_target_future == pytest.approx(10.0)
+
+
+def test_absent_driver_slows_the_car(params: CarParams) -> None:
+    """With nobody at the wheel the car slows down towards whatever speed is set."""
+    assert started(params).run(200, kph=100.0, slow_down=True)[-1].a_target == pytest.approx(-0.2, abs=0.01)
+
+
+def errors(drive: Drive, plans: list[Plan]) -> dict[str, int]:
+    """Cycle of the first appearance of each error event."""
+    first: dict[str, int] = {}
+    for k, plan in enumerate(plans):
+        for event in plan.events:
+            first.setdefault(event.name, k)
+    return first
+
+
+def test_silence_of_more_than_half_a_second_is_an_error(params: CarParams) -> None:
+    """A radar state and model from cycle 0 are too old in cycle 51."""
+    drive = Drive(params)
+    plans = drive.run(1) + drive.run(60, radar=False)
+    assert errors(drive, plans) == {"model_error": 51, "radar_error": 51}
+
+
+def test_nothing_yet_is_an_error_too(params: CarParams) -> None:
+    """Before the first messages engaging is refused."""
+    plan = Planner(params, ModelFit()).update(0.1, CarState(), None, "off", 255.0, False)
+    assert [event.name for event in plan.events] == ["model_error", "radar_error"]
+
+
+def test_radar_errors_are_told_at_once(params: CarParams) -> None:
+    """A fault that the radar reports is an error in the same cycle."""
+    drive = Drive(params)
+    drive.run(1)
+    state = RadarState(0.01, LeadData(), LeadData(), ("fault",))
+    plan = drive.planner.update(0.01, drive.car, state, "pid", 72.0, False)
+    assert [event.name for event in plan.events] == ["radar_error"]
+
+
+def test_warning_goes_with_the_lead_and_not_with_the_brake(params: CarParams) -> None:
+    """A collision warning is passed on unless the driver brakes already; a new lead is counted anew."""
+    drive = Drive(params)
+    resets = []
+    drive.planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: resets.append(1))
+    assert drive.run(1)[-1].fcw and not resets
+    drive.planner.mpc1.new_lead = True
+    drive.car = CarState(v_ego=20.0, brake_pressed=True)
+    assert not drive.run(5)[-1].fcw and resets == [1]

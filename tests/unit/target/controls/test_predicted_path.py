@@ -1,0 +1,42 @@
+"""Distance of an object from the way the car will go."""
+
+from math import cos, hypot, pi, sin
+
+import pytest
+from selfdrive.controls.lib.predicted_path import distance_to, model_curve, steering_curve
+
+
+def test_straight_on() -> None:
+    """On a straight path the distance is the lateral position, positive to the left."""
+    straight = steering_curve(0.0)
+    assert distance_to(straight, 50.0, 1.2) == pytest.approx(1.2)
+    assert distance_to(straight, 50.0, -1.2) == pytest.approx(-1.2)
+    assert distance_to(straight, 50.0, 0.0) == 0.0
+
+
+def test_slanting_line() -> None:
+    """Beside a slanting line it is the shortest way that counts."""
+    assert distance_to(model_curve((0.0, 0.0, 1.0, 0.0)), 20.0, 0.0) == pytest.approx(-20.0 / 2**0.5)
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.3])
+@pytest.mark.parametrize("offset", [-1.0, 0.5])
+def test_steering_circle(angle: float, offset: float) -> None:
+    """Beside the circle that the wheel describes, the distance is that from the circle."""
+    radius = 200.0
+    x, y = (radius - offset) * sin(angle), radius - (radius - offset) * cos(angle)
+    assert distance_to(steering_curve(1.0 / radius), x, y) == pytest.approx(offset, abs=1e-3)
+    assert distance_to(steering_curve(-1.0 / radius), x, -y) == pytest.approx(-offset, abs=1e-3)
+
+
+def test_model_curve_agrees_with_a_search() -> None:
+    """The nearest point of a bent path is found as by trying all of them."""
+    poly = (1e-5, -5e-4, 0.02, 0.3)
+    curve = model_curve(poly)
+    best = min(hypot(x / 100.0 - 40.0, curve(x / 100.0)[0] - 3.0) for x in range(14000))
+    assert distance_to(curve, 40.0, 3.0) == pytest.approx(best, abs=1e-3)
+
+
+def test_sharp_steering_stays_finite() -> None:
+    """Points beyond the circle have a finite distance."""
+    assert abs(distance_to(steering_curve(0.1), 100.0, 0.0)) < 2000.0 * pi

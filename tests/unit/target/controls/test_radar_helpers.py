@@ -1,0 +1,153 @@
+"""Tracks and clusters."""
+
+import pytest
+from selfdrive.controls.lib.radar_helpers import Cluster, Track, cluster_tracks
+
+
+def track(
+    d_rel: float = 50.0, y_rel: float = 0.0, v_rel: float = 0.0, d_path: float = 0.0, v_ego: float = 20.0
+):
+    return Track(d_rel, y_rel, v_rel, d_path, v_ego)
+
+
+def step(
+    t: Track, v_rel: float, v_ego: float = 20.0, d_path: float = 0.0, driver_steers: bool = False
+) -> None:
+    t.update(50.0, 0.0, v_rel, d_path, v_ego, driver_steers)
+
+
+@pytest.mark.parametrize(
+    ("v_rel", "v_ego", "stationary"),
+    [(-20.0, 20.0, True), (-16.1, 20.0, True), (-15.9, 20.0, False), (-3.9, 3.9, False), (-23.9, 20.0, True)],
+)
+def test_stationary_is_slower_than_4_while_the_car_is_faster(
+    v_rel: float, v_ego: float, stationary: bool
+) -> None:
+    """An object slower than 4 m/s stands, if the car itself is faster than 4 m/s."""
+    assert track(v_rel=v_rel, v_ego=v_ego).stationary is stationary
+
+
+def test_what_has_moved_is_never_stationary_again() -> None:
+    """A vehicle that was seen moving is not taken for standing when it stops."""
+    t = track(v_rel=0.0)
+    step(t, -20.0)
+    assert not t.stationary
+
+
+def test_a_standing_object_may_start() -> None:
+    """A standing object that moves off is stationary no more."""
+    t = track(v_rel=-20.0)
+    step(t, -15.0)
+    assert not t.stationary
+
+
+def test_oncoming_may_change() -> None:
+    """Oncoming is faster than 3.9 m/s towards the car, now."""
+    t = track(v_rel=-24.0)
+    assert t.oncoming
+    step(t, -23.0)
+    assert not t.oncoming
+
+
+def test_camera_clears_stationary_after_three_fusions() -> None:
+    """Two fusions with the camera are not trusted, three are."""
+    t = track(v_rel=-20.0)
+    t.fuse()
+    t.fuse()
+    assert t.stationary
+    t.fuse()
+    assert not t.stationary
+
+
+def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
+    """A lead that brakes with 2 m/s^2 is seen doing so."""
+    t = track(v_rel=0.0)
+    for k in range(1, 61):
+        step(t, -0.1 * k)
+    assert t.filter.rate == pytest.approx(-2.0, abs=0.05)
+    assert t.filter.value == pytest.approx(14.0, abs=0.7)
+    assert t.a_rel == pytest.approx(-2.0, abs=0.01)
+
+
+def test_relative_acceleration_is_limited() -> None:
+    """A jump of the speed counts 10 m/s^2 at the most, low-passed."""
+    t = track(v_rel=0.0)
+    step(t, -5.0)
+    assert t.a_rel == pytest.approx(-10.0 * 0.1358, abs=0.01)
+
+
+def test_lateral_speed_is_not_learnt_while_the_driver_steers() -> None:
+    """Moving towards the path gives lateral speed, unless the driver's steering moves the path."""
+    free, steered = track(d_path=3.0), track(d_path=3.0)
+    for k in range(1, 21):
+        step(free, 0.0, d_path=3.0 - 0.05 * k)
+        step(steered, 0.0, d_path=3.0 - 0.05 * k, driver_steers=True)
+    assert free.v_lat == pytest.approx(-0.69, abs=0.05)
+    assert steered.v_lat == 0.0
+
+
+def lead(d_rel: float = 50.0, d_path: float = 0.0, v_lat: float = 0.0, v_rel: float = 0.0) -> Cluster:
+    t = track(d_rel=d_rel, d_path=d_path, v_rel=v_rel)
+    t.v_lat = v_lat
+    return Cluster([t])
+
+
+@pytest.mark.parametrize(
+    ("cluster", "expected"),
+    [
+        (lead(d_path=1.4), True),
+        (lead(d_path=-1.6), False),
+        (lead(v_rel=-20.0), False),
+        (lead(v_rel=-30.0), False),
+        (lead(d_rel=10.0, d_path=2.0, v_lat=-0.6), True),  # cuts in
+        (lead(d_rel=60.0, d_path=2.0, v_lat=-0.6), False),  # too far for lateral speed to count
+        (lead(d_rel=10.0, d_path=2.6, v_lat=-5.0), False),  # no more than 1 m is corrected
+        (lead(d_rel=10.0, d_path=1.4, v_lat=5.0), True),  # leaving does not count
+    ],
+)
+def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> None:
+    """A lead is within 1.5 m of the path, with its lateral speed, and neither stands nor comes on."""
+    assert cluster.is_lead(20.0) is expected
+
+
+def test_second_lead_is_apart() -> None:
+    """Another vehicle is more than 8 m further, or more than 1 m/s different."""
+    first = lead(d_rel=40.0)
+    assert not lead(d_rel=48.0).is_apart(first)
+    assert lead(d_rel=48.1).is_apart(first)
+    assert lead(d_rel=41.0, v_rel=1.1).is_apart(first)
+
+
+def test_clusters_are_what_lies_within_two_and_a_half() -> None:
+    """Tracks near each other are one vehicle; sideways counts double, speed counts as distance."""
+    tracks = [
+        track(d_rel=40.0),
+        track(d_rel=42.0),
+        track(d_rel=40.0, y_rel=2.0),
+        track(d_rel=41.0, v_rel=4.0),
+    ]
+    clusters = cluster_tracks(tracks)
+    assert sorted(c.d_rel for c in clusters) == [40.0, 41.0, 41.0]
+
+
+def test_centroids_keep_a_chain_apart() -> None:
+    """A long chain is not one vehicle: distances are to the middle of what is already merged."""
+    clusters = cluster_tracks([track(d_rel=d) for d in (40.0, 42.0, 44.0, 46.0)])
+    assert sorted(c.d_rel for c in clusters) == [41.0, 45.0]
+
+
+def test_nothing_gives_no_clusters() -> None:
+    """Without tracks there are no clusters."""
+    assert cluster_tracks([]) == []
+
+
+def test_message_has_means_from_the_bumper_and_the_best_fusion() -> None:
+    """The lead's message holds the means of its tracks, its distance is less the radar's place."""
+    near, far = track(d_rel=40.0, v_rel=-1.0), track(d_rel=42.0, v_rel=-2.0)
+    for _ in range(20):
+        far.fuse()
+    data = Cluster([near, far]).lead_data(2.7)
+    assert (data.status, data.d_rel, data.v_rel) == (True, pytest.approx(38.3), -1.5)
+    assert (data.v_lead, data.v_lead_k, data.fcw) == (18.5, 18.5, True)
+    near.fuse()
+    assert not Cluster([near]).lead_data(2.7).fcw

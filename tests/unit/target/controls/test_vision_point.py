@@ -1,0 +1,60 @@
+"""The camera's lead against radar tracks."""
+
+import pytest
+from selfdrive.controls.lib.polynomial import ZERO
+from selfdrive.controls.lib.radar_helpers import Track
+from selfdrive.controls.lib.vision_point import VisionPoint
+from selfdrive.messages import LeadVision
+
+
+def seen(d_rel: float = 50.0, prob: float = 1.0, cycles: int = 40) -> VisionPoint:
+    point = VisionPoint()
+    for _ in range(cycles):
+        point.update(LeadVision(d_rel, prob, 0.1))
+    return point
+
+
+def track(d_rel: float = 50.0, y_rel: float = 0.0, v_rel: float = 0.0) -> Track:
+    return Track(d_rel, y_rel, v_rel, 0.0, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "matches"),
+    [
+        (track(d_rel=57.9), True),
+        (track(d_rel=58.1), False),
+        (track(y_rel=1.99), True),
+        (track(y_rel=2.01), False),
+        (track(v_rel=9.9), True),
+        (track(v_rel=10.1), False),
+    ],
+)
+def test_match_needs_place_and_speed(other: Track, matches: bool) -> None:
+    """Half the distance and twice the side must be within 4 m, the speed within 10 m/s."""
+    assert (seen().best_match([other], ZERO) is other) is matches
+
+
+def test_the_best_of_several() -> None:
+    """The closest in place and speed together is the camera's lead."""
+    tracks = [track(d_rel=52.0), track(d_rel=51.0), track(d_rel=50.0, v_rel=3.0)]
+    assert seen().best_match(tracks, ZERO) is tracks[1]
+
+
+def test_it_is_taken_to_be_on_the_path() -> None:
+    """In a bend the camera's lead is looked for on the path."""
+    bend = (0.0, 0.001, 0.0, 0.0)
+    off, on = track(y_rel=0.0), track(y_rel=2.5)
+    assert seen().best_match([off, on], bend) is on
+
+
+def test_an_unsure_lead_matches_nothing() -> None:
+    """A lead of 70 % or less is not used."""
+    assert seen(prob=0.7).best_match([track()], ZERO) is None
+
+
+def test_becoming_sure_starts_at_the_seen_distance() -> None:
+    """The first sure distance is taken as it is, with no speed from before."""
+    point = seen(d_rel=80.0)
+    point.update(LeadVision(30.0, 0.5, 0.1))
+    point.update(LeadVision(30.0, 0.9, 0.1))
+    assert point.best_match([track(d_rel=30.0)], ZERO) is not None
