@@ -141,7 +141,11 @@ def _library(workspace: "Workspace") -> Iterator[Finding]:
         yield Finding(name="templates", level=Level.OK, found=found)
     except MutatorError as e:
         yield Finding(name="templates", level=Level.FAIL, found=str(e), remedy=e.remedy or "")
-    for name in workspace.target_names():
+    names = workspace.target_names()
+    if not names:
+        remedy = "a manifest in targets/ describes a controller tree"
+        yield Finding(name="target", level=Level.FAIL, found="no manifest in the library", remedy=remedy)
+    for name in names:
         try:
             manifest = workspace.manifest(name)
             found = f"{manifest.root}: {len(manifest.tree.files)} files"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator import tables
+from mutator.jsonio import write_atomic
 from mutator.model import Status
 from mutator.runfolder import RunFolder
 from mutator.tables import Count, Row
@@ -66,8 +67,8 @@ def write(run: Path) -> Report:
     out = run / FOLDER
     out.mkdir(exist_ok=True)
     report = Report(markdown=out / "REPORT.md", page=out / "index.html", rows=len(rows))
-    _replace(report.markdown, markdown(content))
-    _replace(report.page, page(content))
+    write_atomic(report.markdown, markdown(content).encode())
+    write_atomic(report.page, page(content).encode())
     return report
 
 
@@ -128,10 +129,3 @@ def _line(folder: RunFolder, row: Row) -> Line:
 
 def _link(file: Path, seen_from: Path) -> str | None:
     return Path(os.path.relpath(file, seen_from)).as_posix() if file.exists() else None
-
-
-def _replace(path: Path, text: str) -> None:
-    """Whole or not at all: a reader never meets half a report."""
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)

@@ -24,6 +24,7 @@ class Row:
     fault_id: str
     module: str
     fault_type: str
+    variant: str
     value: str
     unit: str
     scenario: str
@@ -50,9 +51,9 @@ class Row:
 
     @property
     def fault(self) -> str:
-        """The fault in words: `radar/chaff 35 m`."""
-        value = f" {self.value} {self.unit}".rstrip() if self.value else ""
-        return f"{self.module}/{self.fault_type}{value}"
+        """The fault in words: `radar/chaff/distance 35 m`."""
+        value = f" {self.value} {self.unit}".rstrip(" -") if self.value else ""
+        return f"{self.module}/{self.fault_type}/{self.variant}{value}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,6 +171,7 @@ def _row(line: dict[str, str]) -> Row:
         fault_id=line["fault_id"],
         module=line["module"],
         fault_type=line["fault_type"],
+        variant=line["variant"],
         value=line["value"],
         unit=line["unit"],
         scenario=line["scenario"],

@@ -13,13 +13,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mutator.cli import diffs
 from mutator.errors import MutatorError
 from mutator.ids import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-PIPE_WIDTH = 240  # a table in a pipe is cut by nobody's window
+    from rich.table import Table
 
 STYLES = {
     "ok": "green",
@@ -42,11 +42,11 @@ class Terminal:
 
     @cached_property
     def out(self) -> "Console":
-        return _console(sys.stdout.isatty(), stderr=False)
+        return _console(stderr=False)
 
     @cached_property
     def err(self) -> "Console":
-        return _console(sys.stderr.isatty(), stderr=True)
+        return _console(stderr=True)
 
     def say(self, text: str = "", style: str | None = None) -> None:
         """One line or paragraph as it is: no markup, no wrapping at a pipe's invented width."""
@@ -67,46 +67,32 @@ class Terminal:
         heads: Sequence[str],
         rows: Iterable[Sequence[object]],
         *,
-        title: str | None = None,
         right: Sequence[int] = (),
         total: bool = False,
     ) -> None:
         """A table; columns in `right` are numbers; with `total` the last row is set apart."""
+        cells = [[_cell(c) for c in row] for row in rows]
         if self.as_json:
             return
-        from rich import box
-        from rich.table import Table
-        from rich.text import Text
-
-        tty = self.out.is_terminal
-        table = Table(
-            title=title,
-            title_justify="left",
-            box=box.SIMPLE_HEAD if tty else None,
-            pad_edge=False,
-            header_style="bold",
-            show_edge=False,
-        )
-        for i, head in enumerate(heads):
-            table.add_column(Text(head), justify="right" if i in right else "left", overflow="fold")
-        all_rows = [list(row) for row in rows]
-        for i, row in enumerate(all_rows):
-            last = total and i == len(all_rows) - 1
-            if last and tty:
-                table.add_section()
-            cells = [Text(_cell(c), style=STYLES.get(str(c), "bold" if last else "")) for c in row]
-            table.add_row(*cells)
-        self.out.print(table)
+        if self.out.is_terminal:
+            self.out.print(_rich_table(heads, cells, right, total))
+        else:
+            self.say("\n".join(_plain_table(heads, cells, right)))
 
     def diff(self, patch: str) -> None:
-        """A unified diff, coloured in a terminal, byte for byte as text elsewhere."""
+        """A unified diff, coloured in a terminal; elsewhere its very bytes, for `patch`."""
         if self.as_json:
+            return
+        if not self.out.is_terminal:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(patch.encode("utf-8", "surrogateescape"))
+            sys.stdout.buffer.flush()
             return
         from rich.text import Text
 
         text = Text()
         for line in patch.splitlines():
-            text.append(line + "\n", style=diff_style(line))
+            text.append(line + "\n", style=diffs.style(line))
         self.out.print(text, soft_wrap=True, end="")
 
     @contextmanager
@@ -141,21 +127,10 @@ class Terminal:
             yield lambda: progress.advance(task)
 
 
-def diff_style(line: str) -> str:
-    """Rich style of one line of a unified diff."""
-    if line.startswith(("+++", "---", "diff ", "index ", "new file")):
-        return "bold"
-    if line.startswith("@@"):
-        return "cyan"
-    if line.startswith("+"):
-        return "green"
-    return "red" if line.startswith("-") else ""
-
-
 def show_error(error: MutatorError) -> None:
     """An error of the user's, in one piece: place, what was got, expected, what to do."""
     terminal = Terminal()
-    place = f"{_short(error.where)}:{error.line}" if error.line is not None else _short(error.where)
+    place = f"{short_path(error.where)}:{error.line}" if error.line is not None else short_path(error.where)
     terminal.err.print(f"error: {place + ': ' if place else ''}{error.got}", style="bold red", **_AS_IS)
     if error.expected:
         terminal.err.print(f"  expected: {error.expected}", **_AS_IS)
@@ -166,21 +141,48 @@ def show_error(error: MutatorError) -> None:
 _AS_IS: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
 
 
-def _short(where: str | None) -> str:
+def _rich_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool) -> "Table":
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
+    for i, head in enumerate(heads):
+        table.add_column(Text(head), justify="right" if i in right else "left", overflow="fold")
+    for i, row in enumerate(rows):
+        last = total and i == len(rows) - 1
+        if last:
+            table.add_section()
+        table.add_row(*(Text(c, style=STYLES.get(c, "bold" if last else "")) for c in row))
+    return table
+
+
+def _plain_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+
+    def line(cells: Sequence[str]) -> str:
+        pairs = zip(cells, widths, strict=True)
+        padded = [c.rjust(w) if i in right else c.ljust(w) for i, (c, w) in enumerate(pairs)]
+        return "  ".join(padded).rstrip()
+
+    return [line(heads), *map(line, rows)]
+
+
+def short_path(where: str | Path | None) -> str:
     """A path as the user would type it: relative when it lies below the current folder."""
     if not where:
         return ""
     path = Path(where)
     try:
-        return str(path.relative_to(Path.cwd())) if path.is_absolute() else where
+        return str(path.relative_to(Path.cwd()) if path.is_absolute() else path)
     except ValueError:
-        return where
+        return str(where)
 
 
-def _console(tty: bool, *, stderr: bool) -> "Console":
+def _console(*, stderr: bool) -> "Console":
     from rich.console import Console
 
-    return Console(stderr=stderr, width=None if tty else PIPE_WIDTH, highlight=False)
+    return Console(stderr=stderr, highlight=False)
 
 
 def _cell(value: object) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.cli import choose
 from mutator.cli.console import STYLES, Terminal
+from mutator.cli.diffs import readable
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def describe(experiment: "Experiment") -> dict[str, Any]:
     hold = fault.hold or trigger.hold
     return {
         "experiment": experiment.id,
-        "fault": f"{fault.spec} {'' if fault.value is None else fault.value} {fault.unit}".strip(),
+        "fault": choose.fault_words(fault),
         "aim": fault.aim,
         "reading": fault.reading,
         "scenario": " ".join((experiment.scenario, *fault.changes)),
@@ -99,7 +100,9 @@ def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -
     for name, value in facts.items():
         terminal.say(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
     terminal.say()
-    terminal.diff(patch)
+    diff, note = readable(patch)
+    terminal.diff(diff)
+    terminal.say(note, style="dim")
     terminal.say()
 
 

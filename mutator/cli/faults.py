@@ -8,6 +8,7 @@ import typer
 
 from mutator.cli import choose
 from mutator.cli.console import Terminal
+from mutator.cli.diffs import readable
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 
 if TYPE_CHECKING:
@@ -36,9 +37,9 @@ def register(app: typer.Typer) -> None:
 
 TRY_EXAMPLES = """\b
 Examples:
-  mutator try radar/chaff --scenario S1 --trigger C1
-  mutator try radar/chaff --value 40 --trigger 10      exactly 40 m, from 10 s on
-  mutator try my_fault.yaml --scenario S5              a spec of one's own
+  mutator try radar/chaff --scenario S1 --trigger C2
+  mutator try radar/chaff -s S1 --value 40 --trigger 10   exactly 40 m, from 10 s on
+  mutator try my_fault.yaml --scenario S5               a spec of one's own
 """
 
 
@@ -74,9 +75,9 @@ def try_fault(
     target = workspace.manifest(manifest)
     choice = choose.FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
     faults = choice.faults(workspace, target, workspace.fault_models())
-    fault, of = choose.one_of_each_variant(faults)[0]
+    fault, _ = choose.one_of_each_variant(faults)[0]
     if len(faults) > 1:
-        terminal.note(f"{fault.spec}: {fault.value} {fault.unit}, one of {of} (choose by --variant, --value)")
+        terminal.note(f"{choose.fault_words(fault)}, one of {len(faults)} (choose by --variant, --value)")
     when = choose.find_trigger(workspace, trigger, armed_after)
     experiment = _experiment(workspace, fault, scenario, when, seed or 0)
     folder = out / experiment.id
@@ -102,9 +103,9 @@ def _experiment(workspace: "Workspace", fault: Any, scenario: str, trigger: Any,
 
 DIFF_EXAMPLES = """\b
 Examples:
-  mutator diff radar/chaff                   what the spec does to the source, one diff a variant
-  mutator diff my_fault.yaml --trigger C2
-  mutator diff 3f9a                          of an experiment of the newest run
+  mutator diff radar/chaff                        what the spec does to the source
+  mutator diff my_fault.yaml --trigger C2 --patch | (cd target && patch -p1)
+  mutator diff 3f9a                               of an experiment of the newest run
 """
 
 
@@ -119,6 +120,9 @@ def diff(
     seed: Seed = None,
     reading: Reading = None,
     run: Run = None,
+    patch: Annotated[
+        bool, typer.Option("--patch", help="The whole patch, probe included: `patch -p1` applies it.")
+    ] = False,
     manifest: Manifest = "openpilot",
     as_json: Json = False,
     *,
@@ -126,7 +130,7 @@ def diff(
 ) -> None:
     """Show what a fault changes in the source.
 
-    What is printed can be given to `patch -p1` at the target's root.
+    Of a spec, one diff for each of its variants, whose values share it.
     """
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -134,9 +138,8 @@ def diff(
         from mutator.cli.experiment_view import experiment_patch, find_experiment
 
         found = find_experiment(workspace, run, what)
-        _print_diffs(
-            terminal, [(found.experiment.fault.spec, found.experiment.id, experiment_patch(workspace, found))]
-        )
+        name = (choose.fault_words(found.experiment.fault), found.experiment.id)
+        _print_diffs(terminal, [(*name, experiment_patch(workspace, found))], whole=patch)
         return
     from mutator.mutant import build
 
@@ -147,23 +150,26 @@ def diff(
     for fault, of in choose.one_of_each_variant(choice.faults(workspace, target, models)):
         mutant = build(target, models, fault, when)
         many = f", one of {of}" if of > 1 else ""
-        diffs.append((f"{fault.spec}: {fault.value} {fault.unit}{many}", mutant.id, mutant.patch))
-    _print_diffs(terminal, diffs)
+        diffs.append((choose.fault_words(fault) + many, mutant.id, mutant.patch))
+    _print_diffs(terminal, diffs, whole=patch)
 
 
-def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]]) -> None:
+def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole: bool) -> None:
     if terminal.as_json:
         terminal.emit([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
         # `patch` skips what stands before a diff, so the heading may stay in a pipe.
         terminal.say(f"# {fault}", style="bold")
-        terminal.diff(patch)
+        text, note = (patch, "") if whole else readable(patch)
+        terminal.diff(text)
+        if note:
+            terminal.note(note)
 
 
 GENERATE_EXAMPLES = """\b
 Examples:
   mutator generate radar/chaff --out mutants                     patches under every context
-  mutator generate 'radar/*' --out mutants --trees --trigger C1  whole trees too
+  mutator generate 'radar/*' --out mutants --trees --trigger C2  whole trees too
   mutator generate --campaign quickstart --out mutants           the mutants of a campaign
 """
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator.cli.choose import context_tables
-from mutator.cli.console import Terminal
+from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED
 
@@ -59,7 +59,8 @@ def list_library(
     for name, (columns, rows) in tables.items():
         numbers = [i for i, c in enumerate(columns) if all(isinstance(r[c], int) for r in rows)]
         terminal.say(f"{name} ({len(rows)})", style="bold")
-        terminal.table(columns, [[r[c] for c in columns] for r in rows], right=numbers)
+        if rows:
+            terminal.table(columns, [[r[c] for c in columns] for r in rows], right=numbers)
         terminal.say()
 
 
@@ -69,12 +70,12 @@ def _specs(workspace: "Workspace") -> Table:
 
 
 def _scenarios(workspace: "Workspace") -> Table:
-    rows = [{"name": n, "file": str(workspace.scenario(n))} for n in workspace.scenario_names()]
+    rows = [{"name": n, "file": short_path(workspace.scenario(n))} for n in workspace.scenario_names()]
     return ["name", "file"], rows
 
 
 def _campaigns(workspace: "Workspace") -> Table:
-    rows = [{"name": n, "file": str(workspace.campaign(n))} for n in workspace.campaign_names()]
+    rows = [{"name": n, "file": short_path(workspace.campaign(n))} for n in workspace.campaign_names()]
     return ["name", "file"], rows
 
 
@@ -104,7 +105,7 @@ def _targets(workspace: "Workspace") -> Table:
     rows = []
     for name in workspace.target_names():
         manifest = workspace.manifest(name)
-        row = {"name": name, "root": str(manifest.root), "package": manifest.package}
+        row = {"name": name, "root": short_path(manifest.root), "package": manifest.package}
         rows.append(row | {"files": len(manifest.tree.files)})
     return ["name", "root", "package", "files"], rows
 

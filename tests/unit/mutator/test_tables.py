@@ -31,7 +31,7 @@ SEEN = {
 
 def write_table(path: Path, *lines: dict[str, str]) -> Path:
     with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, [*COLUMNS, "detail"], restval="")
+        table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
         table.writeheader()
         for i, line in enumerate(lines):
             table.writerow({"experiment_id": f"{i:016x}"} | line)
