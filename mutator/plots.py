@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: told apart by colour-blind readers and in grey
 FAULTY_COLOUR = "#d55e00"
-PANEL_HEIGHT = 1.25  # inches
+PANEL_HEIGHT = 1.1  # inches
 WIDTH = 9.0
 
 
@@ -104,7 +104,7 @@ def _panel(axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tupl
     """One channel: golden broad beneath, faulty narrow above, so that equal lines show in both colours."""
     axis.plot(*map(_finite, golden), color=GOLDEN_COLOUR, linewidth=2.4, alpha=0.55, label="golden")
     axis.plot(*map(_finite, faulty), color=FAULTY_COLOUR, linewidth=1.1, label="faulty")
-    unit = f"\n[{channel.unit}]" if channel.unit else ""
+    unit = f"\n[{channel.unit}]" if channel.unit not in ("", "-") else ""
     axis.set_ylabel(channel.name + unit, fontsize=8)
     axis.tick_params(labelsize=8)
     axis.grid(visible=True, linewidth=0.4, alpha=0.5)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -150,6 +150,11 @@ class _SpecModel(StrictModel):
     variants: dict[str, _VariantModel]
 
 
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a spec file, but for its key `schema`."""
+    return _SpecModel.model_json_schema()
+
+
 def load_spec(path: Path) -> FaultSpec:
     """Read one spec strictly (file:line errors). Models, ranges and anchors are checked by `expand`."""
     model, source = read(path, _SpecModel, SCHEMA)
@@ -209,7 +214,9 @@ def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys:
     given = [kind for kind, way in ways.items() if way is not None]
     place = (*keys, key)
     if len(given) != 1:
-        raise source.error(place, f"{len(given)} ways to draw", expected="integers_from, reals_from or values")
+        raise source.error(
+            place, f"{len(given)} ways to draw", expected="integers_from, reals_from or values"
+        )
     kind: Literal["integers", "reals", "list"] = given[0]  # type: ignore[assignment]
     ranges = model.integers_from or model.reals_from
     if model.integers_from and any(x != int(x) for pair in model.integers_from.ranges() for x in pair):
