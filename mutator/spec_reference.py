@@ -25,10 +25,10 @@ INTRODUCTION = f"""\
 A fault spec is one YAML file: a fault type of a module, in one or more variants. The library keeps it at
 `fault_library/faults/<module>/<fault_type>.yaml`; `mutator try FILE --scenario S1` takes one from anywhere.
 
-The YAML is plain: no tags, anchors or aliases, no key twice, `true` and `false` as the only booleans. An
-unknown key, a wrong type, a unit of the wrong dimension or a value out of range is an error with file and line.
-Numbers carry their unit in the last part of their key (`distance_m`, `by_kph`); a number without a unit has a
-key without one.
+The YAML is plain: no tags, anchors or aliases, no key twice, `true` and `false` as the only booleans.
+An unknown key, a wrong type, a unit of the wrong dimension or a value out of range is an error with file and
+line. Numbers carry their unit in the last part of their key (`distance_m`, `by_kph`); a number without a unit
+has a key without one.
 
 The first key is `schema: {SCHEMA}`. A file of a newer schema is refused.
 """
@@ -57,8 +57,8 @@ SECTIONS = {
     "AtModel": (
         "A place",
         "Exactly one anchor is given. It must be found exactly once in the function, in statement position; "
-        "if there are several, the error lists them and `nth` chooses one. Names are as written in the source "
-        "(`d_rel`, `self.angle`, `frames.extend`).",
+        "if there are several, the error lists them and `nth` chooses one. Names are as written in the "
+        "source (`d_rel`, `self.angle`, `frames.extend`).",
     ),
 }
 
@@ -69,8 +69,8 @@ ABOUT = {
     "_SpecModel.variants": "Name of the variant -> variant; at least one.",
     "_VariantModel.aim": "The hazard it aims at, one of the target's.",
     "_VariantModel.about": "What this variant does.",
-    "_VariantModel.changes": "Changes of the scenario that belong to the fault, by their names in the target's "
-    "manifest.",
+    "_VariantModel.changes": "Changes of the scenario that belong to the fault, by their names in the "
+    "target's manifest.",
     "_VariantModel.hold": "How long the fault stays active, where it does not follow the trigger: "
     "`to_end` for a fault that latches.",
     "_VariantModel.draw": "One draw: name and unit -> draw. Without it the variant is a single fault.",
@@ -91,8 +91,8 @@ ABOUT = {
     "InjectionModel.unit": "The unit that the changed variable has in the source, a suffix of the table "
     "below, or `'1'` for a plain number. Needed where the model has parameters in that unit.",
     "InjectionModel.params": "Parameters of the model, their unit in the key. A value is a number, a name, "
-    "the draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a number that is written in one unit and "
-    "read as another.",
+    "the draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a number that is written in one "
+    "unit and read as another.",
     "AtModel.file": "A file of the target, relative to its root.",
     "AtModel.function": "A qualified name: `measure`, `RadarSensor.measure`, `outer.<locals>.inner`.",
     "AtModel.after_assign": "After the statement that assigns to this name.",
@@ -120,9 +120,9 @@ def render(models: FaultModels, example: str) -> str:
 
 
 MODELS = """\
-A model is a template in `templates/` with the parameters below. A model that inserts puts lines before or after
-the anchored statement; one that guards wraps the statement itself. A parameter in *the variable's unit* may be
-given in any unit of the same dimension. `target` may be left out where the anchor names the variable.
+A model is a template in `templates/` with the parameters below. A model that inserts puts lines before or
+after the anchored statement; one that guards wraps the statement itself. A parameter in *the variable's unit*
+may be given in any unit of the same dimension. `target` may be left out where the anchor names the variable.
 """
 
 
@@ -144,7 +144,10 @@ def _default(value: dict[str, Any]) -> str:
 def _type(value: dict[str, Any]) -> str:
     """A JSON Schema type in words."""
     if "anyOf" in value:
-        return " or ".join(_type(v) for v in value["anyOf"] if v.get("type") != "null")
+        types = [v.get("type") for v in value["anyOf"]]
+        # A whole number is a number.
+        skipped = {"null", "integer"} if "number" in types else {"null"}
+        return " or ".join(_type(v) for v in value["anyOf"] if v.get("type") not in skipped)
     if "$ref" in value:
         title = SECTIONS[value["$ref"].rsplit("/", 1)[-1]][0]
         return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
