@@ -171,7 +171,7 @@ def test_foot_brake_with_nothing_to_stop_for_disengages(drive: Drive) -> None:
 
 def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
     """A wanted angle out of reach is told after 0.8 s and changes nothing else."""
-    drive.engage().run(79)
+    drive.engage().run(78)
     assert "steer_saturated" not in drive.state.alerts
     drive.run(5)
     assert drive.state.alerts[0] == "steer_saturated" and drive.state.enabled and drive.state.steer_saturated

@@ -110,9 +110,9 @@ def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> Non
 def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:
     """Without new radar states the plan is followed for 0.22 s and then kept."""
     drive = started(params, FixedMpc(-0.1, -1.0, True))
-    targets = [plan.a_target for plan in drive.run(40, radar=False)]
-    assert targets[:18] == sorted(set(targets), reverse=True)
-    assert targets[18:] == [targets[17]] * 22
+    targets = [plan.a_target for plan in drive.run(1) + drive.run(40, radar=False)]
+    assert targets[:22] == sorted(set(targets), reverse=True)
+    assert targets[22:] == [targets[21]] * 19
 
 
 def test_future_is_the_slowest_of_all(params: CarParams) -> None:
