@@ -20,15 +20,14 @@ def checksum_base(address: int) -> int:
 
 def encode(field: Field, value: float) -> int:
     """Nearest raw value of the field, held at its ends; not-a-number becomes raw 0."""
-    mask, sign_bit = field.mask, field.sign_bit
-    scaled = (value - field.offset) / field.factor
+    _, _, mask, sign_bit, factor, offset = field
+    scaled = (value - offset) / factor
     try:
         raw = round(scaled)
     except (ValueError, OverflowError):
         raw = 0 if scaled != scaled else mask if scaled > 0 else -mask
-    low = -sign_bit
-    high = mask + low
-    return (low if raw < low else high if raw > high else raw) & mask
+    raw += sign_bit
+    return ((0 if raw < 0 else mask if raw > mask else raw) - sign_bit) & mask
 
 
 class Packer:
@@ -39,7 +38,7 @@ class Packer:
         self._address, self._size, self._bus = message.address, message.size, bus
         self._counter_shift = message.counter_shift or 0
         self._counter_mask = 0 if message.counter_shift is None else 0x3
-        self._has_checksum = message.has_checksum
+        self._checksum_mask = 0xF if message.has_checksum else 0
         self._checksum_base = checksum_base(message.address)
         self._values: tuple[float, ...] | None = None
         self._word = 0
@@ -49,15 +48,14 @@ class Packer:
         if values != self._values:
             self._word = self._encode(values)
             self._values = values
+        size = self._size
         word = self._word | (counter & self._counter_mask) << self._counter_shift
-        data = word.to_bytes(self._size, "big")
-        if self._has_checksum:
-            word |= (self._checksum_base - half_byte_sum(data)) & 0xF
-            data = word.to_bytes(self._size, "big")
-        return CanFrame(self._address, data, self._bus)
+        halves = half_byte_sum(word.to_bytes(size, "big"))
+        word |= (self._checksum_base - halves) & self._checksum_mask
+        return CanFrame(self._address, word.to_bytes(size, "big"), self._bus)
 
     def _encode(self, values: tuple[float, ...]) -> int:
         word = 0
         for field, value in zip(self._fields, values, strict=True):
-            word |= encode(field, value) << field.shift
+            word |= encode(field, value) << field[1]
         return word

@@ -24,13 +24,15 @@ class _State:
 
     __slots__ = (
         "bad_counters",
+        "body",
+        "body_mask",
         "checksum_base",
+        "checksum_mask",
         "counter",
         "counter_shift",
+        "deadline",
         "fields",
-        "has_checksum",
         "name",
-        "seen",
         "size",
         "timeout",
     )
@@ -38,27 +40,28 @@ class _State:
     def __init__(self, message: Message, expected: Expected) -> None:
         self.name, self.size = message.name, message.size
         self.fields: list[Field] = [message.fields[name] for name in expected.signals]
-        self.has_checksum, self.counter_shift = message.has_checksum, message.counter_shift
+        self.counter_shift = message.counter_shift
+        self.checksum_mask = 0xF if message.has_checksum else 0
         self.checksum_base = checksum_base(message.address)
+        self.body_mask = sum(field.mask << field.shift for field in self.fields)
+        self.body = -1  # the payload's bits that matter, of the last valid frame
         self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # the excess keeps rounding of t out
-        self.seen = float("-inf")
-        self.counter: int | None = None
+        self.deadline = float("-inf")  # s, after which the message is overdue
+        self.counter: int | None = None  # of the next frame
         self.bad_counters = 0
 
     def accepts(self, data: bytes, word: int) -> bool:
         """Whether size, checksum and counter are right; keeps count of wrong counters."""
-        if len(data) != self.size:
-            return False
-        if self.has_checksum and (half_byte_sum(data) - self.checksum_base) & 0xF:
+        if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
             return False
         if self.counter_shift is None:
             return True
-        counter = word >> self.counter_shift & 0x3
-        if self.counter is not None and counter != (self.counter + 1) & 0x3:
+        expected, self.counter = self.counter, (word >> self.counter_shift) + 1 & 0x3
+        if word >> self.counter_shift & 0x3 == expected or expected is None:
+            if self.bad_counters:
+                self.bad_counters -= 1
+        else:
             self.bad_counters += 1
-        elif self.bad_counters:
-            self.bad_counters -= 1
-        self.counter = counter
         return self.bad_counters < MAX_BAD_COUNTERS
 
 
@@ -78,6 +81,7 @@ class CanParser:
         self.valid = False
         self._bus = bus
         self._states = {messages[name].address: _State(messages[name], e) for name, e in expected.items()}
+        self._valid_until = float("-inf")  # a lower bound, found anew when it has passed
 
     def update(self, frames: Sequence[CanFrame], t: float) -> None:
         """Take the frames received until time `t` (s)."""
@@ -87,12 +91,17 @@ class CanParser:
             if frame_bus != bus or (state := states.get(address)) is None:
                 continue
             word = int.from_bytes(data, "big")
-            if state.accepts(data, word):
-                state.seen = t
+            if not state.accepts(data, word):
+                continue
+            state.deadline = t + state.timeout
+            updated.append(state.name)
+            if word & state.body_mask != state.body:
+                state.body = word & state.body_mask
                 self.values[state.name] = decode(state.fields, word)
-                updated.append(state.name)
         self.updated = updated
-        self.valid = all(t - state.seen <= state.timeout for state in states.values())
+        if t > self._valid_until:
+            self._valid_until = min([state.deadline for state in states.values()])
+        self.valid = t <= self._valid_until
 
 
 def decode(fields: Sequence[Field], word: int) -> tuple[float, ...]:

@@ -49,14 +49,19 @@ class LateralDynamics:
         self._push = DT_CTRL * c_front / mass
         self._turn = DT_CTRL * front * c_front / inertia
 
-    def step(self, torque: float, speed: float, curvature: float) -> None:
-        """Advance 10 ms with `torque` (left positive, 1 is full) at `speed` on a road of `curvature`."""
+    def step(self, torque: float, speed: float, curvature: float) -> float:
+        """Advance 10 ms with `torque` (left positive, 1 is full) at `speed` on a road of `curvature`.
+
+        Returns the speed along the road (m/s).
+        """
         self._turn_wheel(torque, speed)
         self._move(speed)
-        heading, offset, v_lat = self.heading, self.offset, self.lateral_speed
-        along = (speed * cos(heading) - v_lat * sin(heading)) / (1.0 - curvature * offset)
-        self.offset = offset + DT_CTRL * (speed * sin(heading) + v_lat * cos(heading))
-        self.heading = heading + DT_CTRL * (self.yaw_rate - curvature * along)
+        offset, v_lat = self.offset, self.lateral_speed
+        cosine, sine = cos(self.heading), sin(self.heading)
+        along = (speed * cosine - v_lat * sine) / (1.0 - curvature * offset)
+        self.offset = offset + DT_CTRL * (speed * sine + v_lat * cosine)
+        self.heading += DT_CTRL * (self.yaw_rate - curvature * along)
+        return along
 
     def _turn_wheel(self, torque: float, speed: float) -> None:
         ratio = self._car.steer_ratio

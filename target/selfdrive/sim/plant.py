@@ -1,7 +1,5 @@
 """The standard plant: openpilot's longitudinal PC simulation, with a car that really steers."""
 
-from math import cos, sin
-
 from selfdrive.car.params import CarParams
 from selfdrive.common.interp import interp
 from selfdrive.common.realtime import DT_CTRL
@@ -42,11 +40,8 @@ class Plant:
 
     def step(self, actuators: Actuators, grade: float, curvature: float) -> None:
         """Advance 10 ms by Euler's method: position with the old speed, then the new speed."""
-        old, lateral = self.speed, self.lateral
-        heading = lateral.heading
-        along = old * cos(heading) - lateral.lateral_speed * sin(heading)
-        self.position += DT_CTRL * along / (1.0 - curvature * lateral.offset)
-        lateral.step(actuators.steer, old, curvature)
+        old = self.speed
+        self.position += DT_CTRL * self.lateral.step(actuators.steer, old, curvature)
         self.acceleration = acceleration(old, actuators.gas, actuators.brake, grade)
         self.speed = old + DT_CTRL * self.acceleration
         if self.speed <= 0.0:

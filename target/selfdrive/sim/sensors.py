@@ -58,7 +58,7 @@ class CarSensors:
             self._buttons.pack((button,), frame),
         ]
         if frame % _BRAKES_EVERY == 0:
-            frames.append(self._standstill.pack((speed > 0.0,), frame // _BRAKES_EVERY))
+            frames.append(self._standstill.pack((speed_kph > 0.0,), frame // _BRAKES_EVERY))
         for period, by_counter in self._constant:
             if frame % period == 0:
                 frames += by_counter[frame // period % _COUNTERS]

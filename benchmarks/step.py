@@ -1,0 +1,133 @@
+"""CPU time of one simulated run beyond imports, and which part of the loop it goes to.
+
+`python benchmarks/step.py [scenario.yaml] [--repeat N]`; the parts are measured in a run of their own, as
+measuring slows it down. Times are of this process, so other work on the machine matters little.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter, process_time
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "target"))
+
+from selfdrive.car.honda.interface import CarInterface  # noqa: E402
+from selfdrive.car.honda.radar_interface import RadarInterface  # noqa: E402
+from selfdrive.controls.controlsd import Controlsd  # noqa: E402
+from selfdrive.controls.lib.lateral_mpc import LateralMpc  # noqa: E402
+from selfdrive.controls.lib.long_mpc import LongitudinalMpc  # noqa: E402
+from selfdrive.controls.plannerd import Planner  # noqa: E402
+from selfdrive.controls.radard import Radard  # noqa: E402
+from selfdrive.sim.actuators import ActuatorReceiver  # noqa: E402
+from selfdrive.sim.camera import Camera  # noqa: E402
+from selfdrive.sim.hazards import HazardMonitor  # noqa: E402
+from selfdrive.sim.plant import Plant  # noqa: E402
+from selfdrive.sim.radar import RadarSensor  # noqa: E402
+from selfdrive.sim.recorder import Recorder  # noqa: E402
+from selfdrive.sim.scenario import Scenario, load_scenario  # noqa: E402
+from selfdrive.sim.sensors import CarSensors  # noqa: E402
+from selfdrive.sim.simulator import Simulator  # noqa: E402
+from selfdrive.visiond.visiond import Visiond  # noqa: E402
+
+PARTS = (
+    (Plant, "step"),
+    (HazardMonitor, "update"),
+    (CarSensors, "measure"),
+    (RadarSensor, "measure"),
+    (Camera, "look"),
+    (ActuatorReceiver, "update"),
+    (Recorder, "append"),
+    (Visiond, "update"),
+    (RadarInterface, "update"),
+    (CarInterface, "update"),
+    (CarInterface, "apply"),
+    (Radard, "update"),
+    (Planner, "update"),
+    (LongitudinalMpc, "update"),
+    (LateralMpc, "update"),
+    (Controlsd, "update"),
+)
+CAR_AND_SIM = PARTS[:11]
+
+
+class Stopwatch:
+    """Own time of nested parts: what a part calls is charged to the one called."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.calls: dict[str, int] = {}
+        self._inner = [0.0]
+
+    def wrap(self, owner: type, name: str) -> Callable[[], None]:
+        """Time a method from now on; the result puts it back."""
+        original, key = getattr(owner, name), part_name(owner, name)
+        self.seconds[key], self.calls[key] = 0.0, 0
+
+        def timed(*args, **kwargs):
+            self._inner.append(0.0)
+            start = perf_counter()
+            result = original(*args, **kwargs)
+            spent = perf_counter() - start
+            self.seconds[key] += spent - self._inner.pop()
+            self.calls[key] += 1
+            self._inner[-1] += spent
+            return result
+
+        setattr(owner, name, timed)
+        return lambda: setattr(owner, name, original)
+
+
+def part_name(owner: type, name: str) -> str:
+    return f"{owner.__name__}.{name}"
+
+
+def run(scenario: Scenario) -> tuple[float, float]:
+    """CPU seconds of building the loop, and of running it with its result."""
+    start = process_time()
+    simulator = Simulator()
+    simulator.reset(scenario, 0)
+    built = process_time()
+    while not simulator.done:
+        simulator.step()
+    simulator.result()
+    return built - start, process_time() - built
+
+
+def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
+    """One run with every part timed, and its length in seconds."""
+    watch = Stopwatch()
+    restore = [watch.wrap(owner, name) for owner, name in PARTS]
+    start = perf_counter()
+    run(scenario)
+    total = perf_counter() - start
+    for put_back in restore:
+        put_back()
+    return watch, total
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scenario", nargs="?", type=Path, default=ROOT / "fault_library/scenarios/S1.yaml")
+    parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest counts")
+    options = parser.parse_args()
+    scenario = load_scenario(options.scenario)
+    times = [run(scenario) for _ in range(options.repeat)]
+    first_build = times[0][0]
+    build, loop = min(times, key=sum)
+    print(f"{scenario.name}, {scenario.steps} steps, CPU time beyond imports, best of {options.repeat}:")
+    print(f"  build {first_build:.3f} s in a fresh process, {build:.3f} s again")
+    print(f"  run   {loop:.3f} s, {1000 * loop / scenario.steps:.4f} ms a step")
+    print(f"  total {first_build + loop:.3f} s in a fresh process")
+    watch, total = run_in_parts(scenario)
+    print(f"\nOwn time of each part in a timed run ({total:.3f} s):")
+    for key, seconds in sorted(watch.seconds.items(), key=lambda item: -item[1]):
+        per_step = 1000 * seconds / scenario.steps
+        print(f"  {key:26} {per_step:.4f} ms a step  {seconds / total:6.1%}  {watch.calls[key]} calls")
+    ours = sum(watch.seconds[part_name(*part)] for part in CAR_AND_SIM)
+    print(f"  car and simulator together {1000 * ours / scenario.steps:.4f} ms a step  {ours / total:6.1%}")
+
+
+if __name__ == "__main__":
+    main()
