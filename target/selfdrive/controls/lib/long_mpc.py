@@ -1,6 +1,70 @@
-"""Longitudinal model-predictive control: how to follow one lead vehicle."""
+"""Longitudinal model-predictive control: how to follow one lead vehicle.
 
+The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
+"""
+
+import math
+from array import array
+
+import casadi as ca
+
+from selfdrive.controls.lib.mpc_solver import Iteration, Ocp, build_solver
 from selfdrive.messages import LeadData
+
+N_NODES = 21
+RK4_STEP = 0.2  # s
+INTERVALS = ((1, 1.0),) * 5 + ((3, 3.0),) * 15  # 0.2 s, then 0.6 s, which weigh three times as much
+NODE_STEPS = tuple(RK4_STEP * n for n, _ in INTERVALS)  # s
+FUTURE_NODE = 10  # 4 s ahead
+
+COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK = 5.0, 0.1, 10.0, 20.0
+TIME_GAP = 1.8  # s
+STANDSTILL_GAP = 4.0  # m
+BRAKING = 2 * 9.81  # m/s^2, twice the deceleration assumed of both cars
+
+LEAD_DECAY = 1.5  # 1/s, rate at which a lead's acceleration fades
+LEAD_DECAY_FACTOR = 0.9  # each update while it lasts
+LEAD_STEADY_ACCEL = 0.5  # m/s^2, below it counts as none
+LEAD_STOPPED_SPEED = 0.1  # m/s
+LEAD_JUMP = 2.5  # m from one update to the next: another car
+NO_LEAD_GAP, NO_LEAD_SPEED = 50.0, 10.0  # m, m/s faster than the host: a lead that never matters
+CRASH_GAP = -50.0  # m
+BACKWARDS_SPEED = -0.01  # m/s
+
+
+def _ode(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> ca.SX:
+    """Derivative of (x, v, a of the host; x, v, a of the lead); the lead's acceleration decays."""
+    return ca.vertcat(z[1], z[2], jerk, z[4], z[5], -decay * z[5])
+
+
+def _residuals(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Danger of a collision, error of the gap, acceleration and jerk; without jerk at the end."""
+    x, v, a, x_lead, v_lead, _ = ca.vertsplit(z)
+    wanted = STANDSTILL_GAP + TIME_GAP * (2 * v - v_lead) + (v * v - v_lead * v_lead) / BRAKING
+    lack = wanted - (x_lead - x)
+    danger = ca.exp(0.3 * lack / (ca.sqrt(v + 0.5) + 0.1)) - 1
+    comfort = 1 + v / 10
+    end = ca.vertcat(danger, -lack / (0.1 * v + 0.5), a * comfort)
+    return ca.vertcat(end, jerk * comfort), end
+
+
+def build_long_solver() -> ca.Function:
+    """Build the solver of one iteration; it keeps nothing between calls, so instances may share it."""
+    return build_solver(
+        Ocp(
+            name="long_mpc",
+            n_state=6,
+            n_param=1,
+            rk4_step=RK4_STEP,
+            intervals=INTERVALS,
+            ode=_ode,
+            residuals=_residuals,
+            weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK),
+            terminal_weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION),
+            state_bounds=((1, 0.0, math.inf),),
+            linear=True,
+        )
+    )
 
 
 class LongitudinalMpc:
@@ -11,31 +75,107 @@ class LongitudinalMpc:
     (the solution is for a real lead and may compete for the plan), `new_lead` (the lead appeared or
     jumped in this update), `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s
     to 1 s, then every 0.6 s), and `resets`, the number of times a solution was thrown away.
+
+    A solution is thrown away when it is not finite (the plan of the update before stays readable), and,
+    for a real lead, when it goes 50 m through the lead or backwards. The next one then starts from
+    nothing, `v_mpc` and `a_mpc` are the car's own, and the next lead is a new one.
+
+    v >= 0 is asked of all nodes but the first. The plan's own speed may be slightly negative, as it is
+    in the original at the end of a stop; jerk has no limit, so some jerk always meets the bounds and
+    the problem is never infeasible. Where the solver fails all the same, the jerk planned before is
+    kept (`unsolved` counts this), and the rules above judge the outcome.
     """
 
-    def __init__(self, mpc_id: int, solver=None) -> None:
-        """`mpc_id` is 1 or 2, for the log. Instances may share a `solver`: it keeps nothing between calls."""
+    def __init__(self, mpc_id: int, solver: ca.Function | None = None) -> None:
+        """`mpc_id` is 1 or 2, for the log. `solver`: of `build_long_solver`, to share it."""
         self.mpc_id = mpc_id
-        self.v_mpc = 0.0
-        self.a_mpc = 0.0
-        self.v_mpc_future = 0.0
-        self.prev_lead_status = False
-        self.new_lead = False
-        self.resets = 0
-        self.v_plan: tuple[float, ...] = (0.0,) * 21
-        self.a_plan: tuple[float, ...] = (0.0,) * 21
-        self.x_plan: tuple[float, ...] = (0.0,) * 21
-        self.x_lead_plan: tuple[float, ...] = (0.0,) * 21
-        self.solver = solver
+        self.solver = solver or build_long_solver()
+        self._iteration = Iteration(self.solver)
+        self.reset()
 
     def reset(self) -> None:
         """Back to the state after construction, without building the solver again."""
-        raise NotImplementedError
+        self._iteration.restart()
+        self._v_start = self._a_start = 0.0
+        self._decay = LEAD_DECAY
+        self._prev_x_lead = 0.0
+        self.prev_lead_status = self.new_lead = False
+        self.resets = self._iteration.unsolved = 0
+        self._publish(self._iteration.guess)
+
+    @property
+    def unsolved(self) -> int:
+        """Number of updates in which the solver failed and the plan's jerk was kept."""
+        return self._iteration.unsolved
 
     def set_cur_state(self, v: float, a: float) -> None:
         """Where the plan starts: speed (m/s) and acceleration (m/s^2)."""
-        raise NotImplementedError
+        self._v_start, self._a_start = v, a
 
     def update(self, v_ego: float, a_ego: float, lead: LeadData | None) -> None:
         """Plan for `lead` (None or status False: no lead). `v_ego`, `a_ego`: the car's own."""
-        raise NotImplementedError
+        self.new_lead = False
+        if lead is not None and lead.status:
+            x_lead, v_lead, a_lead, decay = self._follow(lead)
+        else:
+            self.prev_lead_status = False
+            x_lead, v_lead, a_lead, decay = NO_LEAD_GAP, v_ego + NO_LEAD_SPEED, 0.0, LEAD_DECAY
+        start = (0.0, self._v_start, self._a_start, x_lead, v_lead, a_lead)
+        self._iteration.guess[:6] = array("d", start)  # the original linearises the first node there
+        finite = self._iteration.run(start, (decay,))
+        if finite:
+            self._publish(self._iteration.solution)
+        if not finite or (self.prev_lead_status and self._runs_into_lead()):
+            self._discard(v_ego, a_ego)
+
+    def _follow(self, lead: LeadData) -> tuple[float, float, float, float]:
+        """Lead's position, speed, acceleration and its decay as the plan takes them."""
+        x, v, a = lead.d_rel, max(0.0, lead.v_lead), lead.a_lead_k
+        if v < LEAD_STOPPED_SPEED or -a / 2 > v:  # stopped, or soon will be
+            v = a = 0.0
+        self._decay = LEAD_DECAY if abs(a) < LEAD_STEADY_ACCEL else self._decay * LEAD_DECAY_FACTOR
+        decay = max(self._decay, -a / (v + 0.01))  # a braking lead stops, it does not reverse
+        if not self.prev_lead_status or abs(x - self._prev_x_lead) > LEAD_JUMP:
+            self._simulate(x, v, a, decay)
+            self.new_lead = True
+        self.prev_lead_status = True
+        self._prev_x_lead = x
+        return x, v, a, decay
+
+    def _simulate(self, x_lead: float, v_lead: float, a_lead: float, decay: float) -> None:
+        """First guess for a new lead: the host brakes evenly to the lead's speed over the gap."""
+        x, v, a = 0.0, self.v_mpc, 0.0
+        room = 2 * x_lead + 0.01
+        if v > v_lead and room != 0.0:
+            a = a_lead - (v - v_lead) * (v - v_lead) / room
+        nodes: list[float] = []
+        for dt in (*NODE_STEPS, 0.0):
+            nodes += (x, v, a, x_lead, v_lead, a_lead)
+            x += v * dt
+            v += a * dt
+            x_lead += v_lead * dt
+            v_lead += a_lead * dt
+            a_lead -= decay * a_lead * dt
+            if v <= 0.0:
+                v = a = 0.0
+        self._iteration.restart(nodes)
+
+    def _publish(self, z: array) -> None:
+        """Take the results out of the trajectory `z`."""
+        end = 6 * N_NODES
+        self.x_plan, self.v_plan, self.a_plan = z[0:end:6], z[1:end:6], z[2:end:6]
+        self.x_lead_plan = z[3:end:6]
+        self.v_mpc, self.a_mpc = self.v_plan[1], self.a_plan[1]
+        self.v_mpc_future = self.v_plan[FUTURE_NODE]
+
+    def _runs_into_lead(self) -> bool:
+        """The plan goes through the lead, or backwards."""
+        gap = min(lead - host for lead, host in zip(self.x_lead_plan, self.x_plan, strict=True))
+        return gap < CRASH_GAP or min(self.v_plan) < BACKWARDS_SPEED
+
+    def _discard(self, v_ego: float, a_ego: float) -> None:
+        """Throw the solution away and start anew from the car's own speed."""
+        self.resets += 1
+        self._iteration.restart()
+        self.v_mpc, self.a_mpc = v_ego, a_ego
+        self.prev_lead_status = False

@@ -1,0 +1,234 @@
+"""One real-time iteration of nonlinear model-predictive control, built with CasADi.
+
+The scheme is that of ACADO's generated code, which the original controller used: multiple shooting
+with RK4, Gauss-Newton Hessian, states eliminated (condensing), one quadratic program, full step. The
+program goes to DAQP, which is set up anew in every call: a built solver has no memory.
+"""
+
+import math
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+FEASIBILITY_TOL = 1e-4  # in the units of the bounded states; DAQP's own is 1e-6 on scaled rows
+STATIONARITY_TOL = 1e-6  # relative to the gradient
+LARGEST = 1e100  # square sum of a trajectory that still means something
+LARGEST_GRADIENT = 1e300
+
+Bounds = tuple[tuple[int, float, float], ...]  # (index of the state, lowest, highest)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ocp:
+    """An optimal control problem with one control: least squares over N intervals.
+
+    `ode(z, u, p)` makes the CasADi expression of the state's derivative, `residuals(z, u, p)` those of
+    the stage and of the terminal cost. `intervals` has (number of RK4 steps, factor on the weights).
+    """
+
+    name: str
+    n_state: int
+    n_param: int
+    rk4_step: float  # s
+    intervals: tuple[tuple[int, float], ...]
+    ode: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    residuals: Callable[[ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
+    weights: tuple[float, ...]
+    terminal_weights: tuple[float, ...]
+    state_bounds: Bounds
+    control_bound: float = math.inf  # the same on both sides
+    linear: bool = False  # the ode is linear in state and control
+    shift: bool = False  # start the next iteration one interval further on
+
+    @property
+    def n_control(self) -> int:
+        """Number of intervals, each with its control."""
+        return len(self.intervals)
+
+    @property
+    def n_trajectory(self) -> int:
+        """Length of a trajectory: the states node by node, then the controls."""
+        return self.n_state * (self.n_control + 1) + self.n_control
+
+
+def _rk4(ocp: Ocp) -> ca.Function:
+    """One step of RK4: (state, control, p) -> (next state, its derivatives by state and by control)."""
+    z, u, p, h = ca.SX.sym("z", ocp.n_state), ca.SX.sym("u"), ca.SX.sym("p", ocp.n_param), ocp.rk4_step
+    k1 = ocp.ode(z, u, p)
+    k2 = ocp.ode(z + h / 2 * k1, u, p)
+    k3 = ocp.ode(z + h / 2 * k2, u, p)
+    k4 = ocp.ode(z + h * k3, u, p)
+    end = z + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+    return ca.Function("rk4", [z, u, p], ca.cse([end, ca.jacobian(end, z), ca.jacobian(end, u)]))
+
+
+def _integrator(ocp: Ocp, step: ca.Function, n_steps: int) -> ca.Function:
+    """`n_steps` of RK4: (state and control, p) -> (next state, its derivative by both)."""
+    zu, p = ca.SX.sym("zu", ocp.n_state + 1), ca.SX.sym("p", ocp.n_param)
+    end, m = zu[:-1], ca.SX.eye(ocp.n_state + 1)[:-1, :]
+    for _ in range(n_steps):
+        end, a, b = step(end, zu[-1], p)
+        m = a @ m
+        m[:, -1] += b
+    return ca.Function("integrate", [zu, p], [end, m])
+
+
+def _stage_terms(ocp: Ocp) -> tuple[ca.Function, ca.Function]:
+    """Gauss-Newton Hessian and gradient, by state and control, of a stage and of the terminal cost.
+
+    Both are functions of (state and control, p, the state's change, factor on the weights); the
+    gradient is that at the changed state, for linearised residuals.
+    """
+    zu, p = ca.SX.sym("zu", ocp.n_state + 1), ca.SX.sym("p", ocp.n_param)
+    change, factor = ca.SX.sym("change", ocp.n_state), ca.SX.sym("factor")
+    functions = []
+    costs = zip(ocp.residuals(zu[:-1], zu[-1], p), (ocp.weights, ocp.terminal_weights), strict=True)
+    for r, weights in costs:
+        c = ca.jacobian(r, zu)
+        cw = c.T @ (factor * ca.diag(ca.DM(weights)))
+        functions.append(
+            ca.Function("stage", [zu, p, change, factor], [cw @ c, cw @ (r + c[:, :-1] @ change)])
+        )
+    return tuple(functions)
+
+
+def _linearise(
+    ocp: Ocp, integrators: dict[int, ca.Function], zu: list[ca.SX], p: ca.SX
+) -> list[tuple[ca.SX, ca.SX]]:
+    """Next state and its derivative by state and control, for each interval."""
+    kinds = [n for n, _ in ocp.intervals]
+    if not ocp.linear:
+        return [integrators[n](zu_k, p) for n, zu_k in zip(kinds, zu, strict=True)]
+    matrix = {n: integrate(zu[0], p)[1] for n, integrate in integrators.items()}
+    return [(matrix[n] @ zu_k, matrix[n]) for n, zu_k in zip(kinds, zu, strict=True)]
+
+
+def _condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
+    """(trajectory, first state, p) -> the program in the change of the controls.
+
+    Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their
+    derivative by all controls. With E_k that derivative at node k, M that of an interval by its state
+    and control, and T_k the Hessian, by node k's state, of all costs from there on, column k of the
+    program's Hessian is made of E_k and M' T_{k+1} M: no large matrices are ever multiplied.
+    """
+    n, nx = ocp.n_control, ocp.n_state
+    old, z0, p = ca.SX.sym("old", ocp.n_trajectory), ca.SX.sym("z0", nx), ca.SX.sym("p", ocp.n_param)
+    z = ca.vertsplit(old[: nx * (n + 1)], nx)
+    zu = [ca.vertcat(z[k], old[nx * (n + 1) + k]) for k in range(n)]
+
+    change, sensitivity = [z0 - z[0]], [ca.SX(nx, 0)]
+    intervals = _linearise(ocp, integrators, zu, p)
+    for k, (end, m) in enumerate(intervals):
+        a, b = m[:, :nx], m[:, nx]
+        change.append(end + a @ change[k] - z[k + 1])
+        sensitivity.append(ca.horzcat(a @ sensitivity[k], b))
+
+    stage, terminal = _stage_terms(ocp)
+    columns, gradient = [], []
+    block, slope = terminal(ca.vertcat(z[n], 0), p, change[n], 1)
+    for k in reversed(range(n)):
+        m = intervals[k][1]
+        here, slope_here = stage(zu[k], p, change[k], ocp.intervals[k][1])
+        block, slope = m.T @ block[:nx, :nx] @ m + here, m.T @ slope[:nx] + slope_here
+        columns.append(ca.vertcat(sensitivity[k].T @ block[:nx, nx], block[nx, nx], ca.SX(n - 1 - k, 1)))
+        gradient.append(slope[nx])
+
+    states = ca.vertcat(*z) + ca.vertcat(*change)
+    derivative = ca.vertcat(*(ca.horzcat(e, ca.SX(nx, n - k)) for k, e in enumerate(sensitivity)))
+    outputs = [ca.triu2symm(ca.horzcat(*columns[::-1])), ca.vertcat(*gradient[::-1]), states, derivative]
+    return ca.Function("condense", [old, z0, p], outputs)
+
+
+def _shifted(ocp: Ocp, integrate: ca.Function, new: ca.MX, p: ca.MX) -> ca.MX:
+    """The trajectory moved on by one interval; the last control is held, through the last interval."""
+    end = ocp.n_state * (ocp.n_control + 1)
+    last = ca.vertcat(new[end - ocp.n_state : end], new[-1])
+    return ca.vertcat(new[ocp.n_state : end], integrate(last, p)[0], new[end + 1 :], new[-1])
+
+
+def _solve_program(
+    name: str, hessian: ca.MX, gradient: ca.MX, rows: ca.MX, bounds: tuple[ca.MX, ca.MX, ca.MX, ca.MX]
+) -> tuple[ca.MX, ca.MX]:
+    """Minimiser of the quadratic program and 1; or zeros and 0 where there is none.
+
+    The plug-in says nothing of its success inside a graph, so the conditions of optimality are tested.
+    Its checks of the input would raise on NaN; without them NaN comes out as not solved.
+    """
+    low, high, x_low, x_high = bounds
+    options = {"error_on_fail": False, "inputs_check": False}
+    qp = ca.conic(name, "daqp", {"h": hessian.sparsity(), "a": rows.sparsity()}, options)
+    sol = qp(h=hessian, g=gradient, a=rows, lba=low, uba=high, lbx=x_low, ubx=x_high)
+    x = sol["x"]
+    slope = ca.norm_inf(hessian @ x + gradient + rows.T @ sol["lam_a"] + sol["lam_x"])
+    at = rows @ x
+    excess = ca.mmax(ca.vertcat(low - at, at - high, x_low - x, x - x_high))
+    stationary = slope <= STATIONARITY_TOL * (1 + ca.norm_inf(gradient))
+    solved = stationary * (excess <= FEASIBILITY_TOL) * (ca.sumsqr(x) < LARGEST)
+    return ca.if_else(solved, x, ca.MX.zeros(x.shape)), solved
+
+
+def build_solver(ocp: Ocp) -> ca.Function:
+    """One iteration: (trajectory, first state, p) -> (new trajectory, next guess, (solved, finite)).
+
+    `solved` is 0 when the program has no solution (bounds that cannot be met) or is too badly
+    conditioned to find it: the controls then stay as they were. `finite` is 0 when NaN or infinity
+    came in or came up: the trajectories mean nothing. Equal inputs give equal bytes, whatever was
+    solved before.
+    """
+    n, nx = ocp.n_control, ocp.n_state
+    old, z0 = ca.MX.sym("old", ocp.n_trajectory), ca.MX.sym("z0", nx)
+    p = ca.MX.sym("p", ocp.n_param)
+    step = _rk4(ocp)
+    integrators = {k: _integrator(ocp, step, k) for k in dict.fromkeys(k for k, _ in ocp.intervals)}
+    hessian, gradient, states, derivative = _condense(ocp, integrators)(old, z0, p)
+
+    bounded = [(nx * k + i, lo, hi) for k in range(1, n + 1) for i, lo, hi in ocp.state_bounds]
+    index, low, high = (list(values) for values in zip(*bounded, strict=True))
+    rows, now, u = derivative[index, :], states[index], old[nx * (n + 1) :]
+    bounds = (low - now, high - now, -ocp.control_bound - u, ocp.control_bound - u)
+    du, solved = _solve_program(ocp.name, hessian, gradient, rows, bounds)
+
+    new = ca.vertcat(states + derivative @ du, u + du)
+    following = _shifted(ocp, integrators[ocp.intervals[-1][0]], new, p) if ocp.shift else new
+    finite = (ca.sumsqr(new) < LARGEST) * (ca.norm_1(gradient) < LARGEST_GRADIENT)
+    return ca.Function(ocp.name, [old, z0, p], [new, following, ca.vertcat(solved, finite)])
+
+
+class Iteration:
+    """Runs a solver on buffers of its own; holds the trajectory from one iteration to the next.
+
+    `guess` is the trajectory the next iteration linearises at, `solution` the last one computed: the
+    states node by node, then the controls. They are written in place. `unsolved` counts the iterations
+    that kept the controls.
+    """
+
+    def __init__(self, solver: ca.Function) -> None:
+        self._buffer, self._evaluate = solver.buffer()
+        inputs = [array("d", bytes(8 * solver.size1_in(i))) for i in range(3)]
+        outputs = [array("d", bytes(8 * solver.size1_out(i))) for i in range(3)]
+        for i, (arg, res) in enumerate(zip(inputs, outputs, strict=True)):
+            self._buffer.set_arg(i, memoryview(arg))
+            self._buffer.set_res(i, memoryview(res))
+        self.guess, self._start, self._param = inputs
+        self.solution, self._next, self._flags = outputs
+        n_state = len(self._start)
+        self._n_control = (len(self.guess) - n_state) // (n_state + 1)
+        self.unsolved = 0
+
+    def restart(self, nodes: Sequence[float] | None = None, control: float = 0.0) -> None:
+        """Guess anew: the states of all nodes (None: zeros) and the same control all along."""
+        controls = array("d", [control]) * self._n_control
+        states = array("d", nodes or bytes(8 * (len(self.guess) - self._n_control)))
+        self.guess[:] = states + controls
+
+    def run(self, start: Sequence[float], param: Sequence[float]) -> bool:
+        """One iteration from the state `start`; False when the solution is not finite."""
+        self._start[:] = array("d", start)
+        self._param[:] = array("d", param)
+        self._evaluate()
+        self.guess[:] = self._next
+        solved, finite = self._flags
+        self.unsolved += solved != 1.0
+        return finite == 1.0
