@@ -73,20 +73,20 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
         )
     _refuse_instrumented(lines, data, where)
     try:
+        compile(data, str(where), "exec", dont_inherit=True)
         module = cst.parse_module(data)
-    except cst.ParserSyntaxError as error:
+    except (SyntaxError, ValueError, RecursionError, cst.ParserSyntaxError) as error:
+        message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
-            f"not valid Python: {error.message}", where=where, line=error.raw_line, remedy="mend the target"
+            f"not valid Python: {message}", where=where, line=line, remedy="mend the target"
         ) from None
-    except (UnicodeDecodeError, LookupError, RecursionError, ValueError) as error:
-        raise MutatorError(f"cannot be parsed: {error}", where=where, remedy="mend the target") from None
     wrapper = MetadataWrapper(module, unsafe_skip_copy=True)
     positions: Mapping[cst.CSTNode, CodeRange] = wrapper.resolve(PositionProvider)
     return ParsedFile(
         path=path,
         data=data,
         lines=lines,
-        encoding=module.encoding,
+        encoding=module.encoding.removesuffix("-sig"),
         newline=module.default_newline.encode(),
         indent_unit=module.default_indent.encode(),
         import_line=_import_line(module, positions),

@@ -3,7 +3,7 @@
 import shutil
 from collections.abc import ItemsView
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from mutator import patch, splice
@@ -162,7 +162,9 @@ def _checked(file: ParsedFile, data: bytes) -> bytes:
     return data
 
 
+@lru_cache(maxsize=64)
 def _compile(data: bytes, where: Path) -> None:
+    """InvalidMutant unless `data` compiles. Mutants share files (the observed one), hence the memory."""
     try:
         compile(data, str(where), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError) as error:

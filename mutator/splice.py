@@ -5,6 +5,7 @@ comments, a missing newline at the end. A guard also indents the statement it wr
 lines.
 """
 
+from codecs import BOM_UTF8
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -71,6 +72,14 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
 
 def probe_import(file: ParsedFile, package: str) -> Edit:
     """The edit that imports the probe: after docstring and `__future__` imports."""
+    if file.import_line == 0 and file.data.startswith(BOM_UTF8):
+        raise MutatorError(
+            "a byte order mark right before the first statement",
+            where=file.where,
+            line=1,
+            expected="a comment or docstring there, or no mark",
+            remedy="save the file without byte order mark",
+        )
     line = f"from {package} import _fi  # fi:{PROBE_TAG}".encode(file.encoding)
     return Edit(index=file.import_line, rank=Rank.BEFORE, lines=(line + file.newline,))
 
@@ -118,12 +127,12 @@ def apply(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
         added = list(edit.lines)
         if done and edit.index == len(file.lines):
             added = _end_of_file(pieces, added, file.newline)
-        pieces.append(Piece(sign="+", lines=tuple(added)))
         if edit.reindent:
             done += edit.reindent
             wrapped = file.lines[edit.index : done]
             pieces.append(Piece(sign="-", lines=wrapped))
-            pieces.append(Piece(sign="+", lines=_indented(wrapped, edit.unit)))
+            added += _indented(wrapped, edit.unit)
+        pieces.append(Piece(sign="+", lines=tuple(added)))
     _keep(pieces, file.lines[done:])
     return tuple(pieces)
 

@@ -1,0 +1,1 @@
+"""A car that follows another one: the smallest target there is."""
