@@ -65,6 +65,22 @@ def one_of_each_variant(faults: "tuple[Fault, ...]") -> "tuple[tuple[Fault, int]
     return tuple((group[len(group) // 2], len(group)) for group in groups.values())
 
 
+def target_name(workspace: "Workspace", given: str | None) -> str:
+    """The target that was named, or the library's only one."""
+    names = workspace.target_names()
+    if given is None and len(names) != 1:
+        known = ", ".join(names) or "none"
+        raise MutatorError(
+            f"{len(names)} targets in the library ({known})", remedy="name one: --manifest NAME"
+        )
+    return given or names[0]
+
+
+def find_target(workspace: "Workspace", given: str | None) -> "TargetManifest":
+    """The manifest of that target."""
+    return workspace.manifest(target_name(workspace, given))
+
+
 def context_tables(workspace: "Workspace") -> tuple["ContextTable", ...]:
     """The context tables of the library, in the order of their names."""
     return tuple(workspace.context_table(name) for name in workspace.context_table_names())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator.cli import choose
-from mutator.cli.console import Terminal
+from mutator.cli.console import Terminal, short_path
 from mutator.cli.diffs import readable
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 
@@ -58,7 +58,7 @@ def try_fault(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where diff, traces and plot go.")] = Path(
         "runs/try"
     ),
-    manifest: Manifest = "openpilot",
+    manifest: Manifest = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -72,7 +72,7 @@ def try_fault(
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    target = workspace.manifest(manifest)
+    target = choose.find_target(workspace, manifest)
     choice = choose.FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
     faults = choice.faults(workspace, target, workspace.fault_models())
     fault, _ = choose.one_of_each_variant(faults)[0]
@@ -123,7 +123,7 @@ def diff(
     patch: Annotated[
         bool, typer.Option("--patch", help="The whole patch, probe included: `patch -p1` applies it.")
     ] = False,
-    manifest: Manifest = "openpilot",
+    manifest: Manifest = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -143,7 +143,7 @@ def diff(
         return
     from mutator.mutant import build
 
-    target, models = workspace.manifest(manifest), workspace.fault_models()
+    target, models = choose.find_target(workspace, manifest), workspace.fault_models()
     choice = choose.FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
     when = choose.find_trigger(workspace, trigger)
     diffs = []
@@ -192,7 +192,7 @@ def generate(
     ] = None,
     seed: Seed = None,
     reading: Reading = None,
-    manifest: Manifest = "openpilot",
+    manifest: Manifest = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -210,10 +210,9 @@ def generate(
         manifest=manifest,
         trees=trees,
     )
-    index = write_mutants(place.workspace(), request, out, terminal)
+    target, index = write_mutants(place.workspace(), request, out, terminal)
     if as_json:
         terminal.emit(index)
     terminal.say(f"{len(index)} mutants in {out}; the list of them is {out / 'index.csv'}")
-    terminal.say(
-        f"apply one at the target's root: patch -p1 < {out / 'patches'}/{index[0]['mutant_id']}.patch"
-    )
+    first = out / index[0]["patch"]
+    terminal.say(f"apply one: patch -p1 -d {short_path(target.root)} < {first}")

@@ -45,14 +45,14 @@ class Request:
     triggers: tuple[str, ...]
     seed: int | None
     reading: str | None
-    manifest: str
+    manifest: str | None
     trees: bool
 
 
 def write_mutants(
     workspace: "Workspace", request: Request, out: Path, terminal: Terminal
-) -> list[dict[str, str]]:
-    """Write `out`/patches, `out`/trees if wanted, and `out`/index.csv; returns the index.
+) -> tuple["TargetManifest", list[dict[str, str]]]:
+    """Write `out`/patches, `out`/trees if wanted, and `out`/index.csv; returns the target and the index.
 
     `out` must be new or empty, since old patches beside new ones would be taken for theirs.
     """
@@ -79,7 +79,7 @@ def write_mutants(
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
-    return rows
+    return target, rows
 
 
 def _of_specs(
@@ -89,7 +89,7 @@ def _of_specs(
 
     if not request.specs:
         raise MutatorError("no spec named", remedy="name specs (`mutator list specs`) or --campaign")
-    target, models = workspace.manifest(request.manifest), workspace.fault_models()
+    target, models = choose.find_target(workspace, request.manifest), workspace.fault_models()
     triggers: list[Trigger] = [choose.find_trigger(workspace, text) for text in request.triggers]
     if not triggers:
         for table in choose.context_tables(workspace):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mutator.cli.choose import context_tables
+from mutator.cli.choose import context_tables, target_name
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED
@@ -128,7 +128,7 @@ Examples:
 
 @with_place
 def check(
-    manifest: Manifest = "openpilot",
+    manifest: Manifest = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -142,7 +142,7 @@ def check(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     with terminal.wait("checking every spec in both readings"):
-        problems = check_library(workspace, manifest)
+        problems = check_library(workspace, target_name(workspace, manifest))
     if as_json:
         terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
     for problem in problems:

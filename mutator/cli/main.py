@@ -52,7 +52,6 @@ class Verbs(TyperGroup):
 
 app = typer.Typer(
     cls=Verbs,
-    no_args_is_help=True,
     rich_markup_mode=None,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -89,8 +88,14 @@ for module in (library, faults, campaigns, experiments, machine):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
     try:
-        code = get_command(app).main(args=argv, prog_name="mutator", standalone_mode=False)
-        return code if isinstance(code, int) else EXIT_OK
+        # Not `app()`: it would answer errors, interruptions and closed pipes in its own way.
+        command = get_command(app)
+        words = list(sys.argv[1:] if argv is None else argv)
+        with command.make_context("mutator", words or ["--help"]) as ctx:
+            command.invoke(ctx)
+        return EXIT_OK
+    except typer.Exit as e:
+        return e.exit_code
     except MutatorError as e:
         show_error(e)
         return e.exit_code
@@ -100,6 +105,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _say(str(e) or "interrupted")
         return EXIT_INTERRUPTED
     except BrokenPipeError:
+        # Who read the output has seen enough; what is still buffered goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
     except OSError as e:

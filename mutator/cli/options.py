@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
-Manifest = Annotated[str, typer.Option(help="Name or file of the target's manifest.")]
+Manifest = Annotated[
+    str | None, typer.Option(help="Name or file of the target's manifest; default: the library's only one.")
+]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of drawn values and times.")]
 Reading = Annotated[
     str | None,

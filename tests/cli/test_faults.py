@@ -1,0 +1,146 @@
+"""`diff` and `generate`: faults without running them."""
+
+import csv
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.mutant import unsplice
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+
+def test_diff_shows_one_diff_for_each_variant(cli: Cli, toy: Path) -> None:
+    """Values of a variant share a diff, so each variant is shown once, without the probe's file."""
+    answer = cli("diff", "sensor/distance")
+    assert answer.code == 0
+    headings = [line for line in answer.out.splitlines() if line.startswith("# ")]
+    assert len(headings) == 3
+    assert "sensor/distance/silent" in answer.out
+    assert "+++ b/toycar/_fi.py" not in answer.out
+    assert "not shown: toycar/_fi.py" in answer.err
+
+
+def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, toy: Path) -> None:
+    """`--value` replaces the drawn values."""
+    answer = cli("diff", "sensor/distance", "--variant", "longer", "--value", "12.5")
+    assert "sensor/distance/longer 12.5 m\n" in answer.out
+    assert "gap = gap + 12.5  # fi:" in answer.out
+
+
+def test_a_whole_diff_can_be_applied(cli: Cli, toy: Path) -> None:
+    """With `--patch` what is printed is a patch for the target's root, heading or not."""
+    answer = cli("diff", "sensor/distance", "--variant", "silent", "--trigger", "near", "--patch")
+    tree = toy / "target"
+    subprocess.run(["patch", "-p1", "-s"], input=answer.out, text=True, cwd=tree, check=True)
+    assert "return hwt <= 2.0" in (tree / "toycar" / "_fi.py").read_text()
+
+
+def test_a_spec_file_need_not_be_in_the_library(cli: Cli, toy: Path) -> None:
+    """A spec file from anywhere is as good as a name."""
+    own = Path("own.yaml")
+    shutil.move(toy / "fault_library" / "faults" / "sensor" / "distance.yaml", own)
+    assert cli("diff", own, "--variant", "silent").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["sensor/distanc"], "sensor/distance"),
+        (["missing.yaml"], "missing.yaml"),
+        (["sensor/distance", "--variant", "shorter"], "longer, silent, both"),
+        (["sensor/distance", "--variant", "silent", "--value", "3"], "takes no value"),
+        (["sensor/distance", "--trigger", "hwt <"], "near, far"),
+        (["sensor/distance", "--trigger", "__import__('os')"], "--trigger"),
+        (["sensor/distance", "--reading", "as_guessed"], "as_described"),
+        (["sensor/distance", "--manifest", "plane"], "plane"),
+        (["abcd"], "runs/"),
+    ],
+)
+def test_wrong_choices_are_answered(cli: Cli, toy: Path, words: list[str], said: str) -> None:
+    """What does not exist is refused with 2 and the choices there are; no traceback."""
+    answer = cli("diff", *words)
+    assert answer.code == 2
+    assert said in answer.err
+    assert "Traceback" not in answer.err
+
+
+def read_index(out: Path) -> list[dict[str, str]]:
+    with (out / "index.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_generate_writes_patches_that_apply(cli: Cli, toy: Path) -> None:
+    """Every patch of the index applies to the pristine target and un-splices to it again."""
+    out = Path("mutants")
+    assert cli("generate", "sensor/*", "--out", out).code == 0
+    index = read_index(out)
+    assert len(index) == 6 * 2  # faults x contexts
+    pristine = (toy / "target" / "toycar" / "sensor.py").read_bytes()
+    for line in index:
+        tree = Path("tree")
+        shutil.copytree(toy / "target", tree)
+        patch = (out / line["patch"]).read_bytes()
+        subprocess.run(["patch", "-p1", "-s"], input=patch, cwd=tree, check=True)
+        changed = (tree / "toycar" / "sensor.py").read_bytes()
+        assert changed != pristine
+        assert unsplice(changed) == pristine
+        shutil.rmtree(tree)
+
+
+def test_generated_trees_are_the_patched_ones(cli: Cli, toy: Path) -> None:
+    """With `--trees` each mutant's whole tree stands beside its patch, and equals the patched target."""
+    out = Path("mutants")
+    cli("generate", "sensor/distance", "--out", out, "--trees", "--trigger", "near", "--trigger", "3")
+    for line in read_index(out):
+        shutil.copytree(toy / "target", "tree")
+        subprocess.run(
+            ["patch", "-p1", "-s"], input=(out / line["patch"]).read_bytes(), cwd="tree", check=True
+        )
+        same = subprocess.run(["diff", "-r", "tree", out / line["tree"]], check=False)
+        assert same.returncode == 0
+        shutil.rmtree("tree")
+
+
+def test_the_index_tells_what_each_mutant_is(cli: Cli, toy: Path) -> None:
+    """`--json` gives the index: ids, fault, value, trigger, files."""
+    [near] = cli("generate", "sensor/distance", "--out", "m", "--trigger", "near", "--json").json[:1]
+    assert near["spec"] == "sensor/distance/longer"
+    assert near["condition"] == "hwt <= 2.0"
+    assert near["unit"] == "m"
+    assert near["files"] == "toycar/_fi.py;toycar/sensor.py;toycar/world.py"
+
+
+def test_ids_are_stable(cli: Cli, toy: Path) -> None:
+    """The same input gives the same mutants with the same ids, byte for byte."""
+    for out in ("a", "b"):
+        cli("generate", "sensor/distance", "--out", out)
+    assert subprocess.run(["diff", "-r", "a", "b"], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "no spec named"),
+        (["nothing*"], "no spec matches"),
+        (["sensor/distance", "--campaign", "x"], "one or the other"),
+    ],
+)
+def test_generate_refuses_what_it_cannot_do(cli: Cli, toy: Path, words: list[str], said: str) -> None:
+    """Nothing to generate, or two sources at once, is wrong input."""
+    answer = cli("generate", *words, "--out", "m")
+    assert answer.code == 2
+    assert said in answer.err
+
+
+def test_generate_does_not_mix_with_older_files(cli: Cli, toy: Path) -> None:
+    """A folder with something in it is refused and left as it was."""
+    Path("m").mkdir()
+    (Path("m") / "mine.txt").write_text("keep")
+    answer = cli("generate", "sensor/distance", "--out", "m")
+    assert answer.code == 2
+    assert [p.name for p in Path("m").iterdir()] == ["mine.txt"]

@@ -1,0 +1,178 @@
+"""Help, errors, exit codes and start-up of the command line."""
+
+import errno
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator import __version__
+from mutator.cli import library
+from mutator.cli.main import GROUPS, app, main
+from mutator.errors import EXIT_CHECK_FAILED, CheckFailed, MutatorError
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+VERBS = [verb for _, verbs in GROUPS for verb in verbs]
+HEAVY = ("pandas", "libcst", "matplotlib", "pydantic", "rich", "jinja2", "pyarrow", "numpy", "pytest")
+
+
+def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
+    """The help lists each verb once, in groups, and no verb is left out of them."""
+    answer = cli("--help")
+    assert answer.code == 0
+    assert sorted(VERBS) == sorted(c.name or "" for c in app.registered_commands)
+    for title, verbs in GROUPS:
+        assert f"{title}:" in answer.out
+        assert all(f"\n  {verb} " in answer.out for verb in verbs)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_each_verb_explains_itself(cli: Cli, verb: str) -> None:
+    """`mutator VERB --help` says what it does and how it is called."""
+    answer = cli(verb, "--help")
+    assert answer.code == 0
+    assert answer.out.startswith(f"Usage: mutator {verb} ")
+
+
+def test_no_word_at_all_is_a_call_for_help(cli: Cli) -> None:
+    """`mutator` alone prints the help."""
+    assert cli() == cli("--help")
+
+
+def test_the_version_is_told(cli: Cli) -> None:
+    """`--version` prints name and version."""
+    assert cli("--version").out == f"mutator {__version__}\n"
+
+
+def test_help_needs_no_heavy_package() -> None:
+    """Help and errors of use come at once, since nothing that takes long to import is imported."""
+    code = (
+        "import sys, mutator.cli.main as m; m.main(['--help']);"
+        f"print([x for x in {HEAVY} if x in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_listing_needs_neither_splicer_nor_plots_nor_tables() -> None:
+    """`list` reads YAML and nothing else, so libcst, matplotlib and pandas stay away."""
+    code = (
+        "import sys, mutator.cli.main as m; m.main(['list']);"
+        "print([x for x in ('libcst', 'matplotlib', 'pandas', 'pyarrow') if x in sys.modules])"
+    )
+    clone = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=clone)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_python_m_mutator_is_mutator() -> None:
+    """The package runs as a module too, with the same exit codes."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mutator", "lst"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "Did you mean 'list'?" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nonsense"], "No such command 'nonsense'"),
+        (["plan"], "Missing argument 'CAMPAIGN'"),
+        (["list", "--wrong"], "No such option: --wrong"),
+        (["plan", "x", "--out", "y", "--limit", "0"], "--limit"),
+        (["list", "cars"], "'cars'"),
+    ],
+)
+def test_wrong_use_is_two_and_says_where_to_look(cli: Cli, words: list[str], said: str) -> None:
+    """A mistake in the command line exits with 2, names the mistake and the help; no traceback."""
+    answer = cli(*words)
+    assert answer.code == 2
+    assert said in answer.err
+    assert "--help" in answer.err
+    assert "Traceback" not in answer.err
+
+
+def test_outside_a_clone_the_way_in_is_told(cli: Cli, nowhere: Path) -> None:
+    """Without library the answer names the options and variables that give one."""
+    answer = cli("list")
+    assert answer.code == 2
+    assert "--root" in answer.err
+    assert "MUTATOR_ROOT" in answer.err
+    assert "Traceback" not in answer.err
+
+
+def test_library_and_templates_are_found_by_options(cli: Cli, toy: Path, nowhere: Path) -> None:
+    """The options that name the place work before and after the verb."""
+    clone = Path(__file__).parents[2]
+    place = ["--root", toy, "--templates", clone / "templates"]
+    before, after = cli(*place, "list", "specs"), cli("list", "specs", *place)
+    assert before.code == after.code == 0
+    assert "sensor/distance" in before.out
+    assert before.out == after.out
+
+
+def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    """Let `list` fail with `error`."""
+
+    def broken(_: object) -> None:
+        raise error
+
+    monkeypatch.setitem(library.LISTS, library.Kind.SPECS, broken)
+
+
+def test_an_error_shows_place_expectation_and_remedy(
+    cli: Cli, toy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A MutatorError is told in one piece: file:line, what was got, what was expected, what to do."""
+    here = Path.cwd() / "spec.yaml"
+    fail_with(monkeypatch, MutatorError("[bold]x", where=here, line=7, expected="a number", remedy="mend it"))
+    answer = cli("list", "specs")
+    assert answer.code == 2
+    assert answer.err == "error: spec.yaml:7: [bold]x\n  expected: a number\n  to do: mend it\n"
+    assert answer.out == ""
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (CheckFailed("the canary sings"), EXIT_CHECK_FAILED, "the canary sings"),
+        (OSError(errno.ENOSPC, "No space left on device", "/full"), 2, "/full: No space left"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+)
+def test_exit_codes(
+    cli: Cli, toy: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
+) -> None:
+    """A failed check is 1, a full disk is the user's to mend (2), an interruption is 130; no traceback."""
+    fail_with(monkeypatch, error)
+    answer = cli("list", "specs")
+    assert answer.code == code
+    assert said in answer.err
+    assert "Traceback" not in answer.err
+
+
+def test_a_defect_is_shown_in_full(cli: Cli, toy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error nobody foresaw keeps its traceback, says that it is a defect, and exits with 3."""
+    fail_with(monkeypatch, ZeroDivisionError("oops"))
+    answer = cli("list", "specs")
+    assert answer.code == 3
+    assert "ZeroDivisionError: oops" in answer.err
+    assert "defect of mutator" in answer.err
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    """`mutator list | head` ends quietly when head has seen enough."""
+    clone = Path(__file__).parents[2]
+    command = f"{sys.executable} -m mutator list --json | head -c 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=clone)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "{", "")
+
+
+def test_main_returns_the_code_of_a_verb(toy: Path) -> None:
+    """`main` returns instead of exiting, so that a program may call it."""
+    assert main(["list", "targets"]) == 0
