@@ -1,6 +1,7 @@
 """Keeps the alerts that are on and shows the most urgent."""
 
 from collections.abc import Mapping
+from math import inf
 
 from selfdrive.controls.lib.alerts import ALERTS, Alert
 
@@ -11,6 +12,7 @@ class AlertManager:
     def __init__(self, table: Mapping[str, Alert] = ALERTS) -> None:
         self._table = table
         self._raised: dict[str, float] = {}  # name: time last raised
+        self._next_change = inf  # s, until then nothing runs out
         self.active: tuple[str, ...] = ()
         self.text1 = ""
         self.text2 = ""
@@ -22,21 +24,26 @@ class AlertManager:
         if name not in self._table:
             raise KeyError(f"no alert is named {name!r}")
         self._raised[name] = t
+        self._next_change = t
 
     def process(self, t: float) -> None:
         """Drop what has run out and set what is shown at time `t` (s)."""
-        if not self._raised and not self.active:
+        if t < self._next_change:
             return
         self._raised = {n: t0 for n, t0 in self._raised.items() if t0 + self._table[n].duration > t}
         self.active = tuple(
             sorted(self._raised, key=lambda n: (self._table[n].priority, self._raised[n]), reverse=True)
         )
+        ends = [t0 + s for n, t0 in self._raised.items() for s in self._table[n].ends if t0 + s > t]
+        self._next_change = min(ends, default=inf)
+        self._show(t)
+
+    def _show(self, t: float) -> None:
         self.text1 = self.text2 = ""
         self.visual = self.audible = "none"
-        if self.active:
-            self._show(self._table[self.active[0]], self._raised[self.active[0]], t)
-
-    def _show(self, alert: Alert, t0: float, t: float) -> None:
+        if not self.active:
+            return
+        alert, t0 = self._table[self.active[0]], self._raised[self.active[0]]
         if t0 + alert.text_s > t:
             self.text1, self.text2 = alert.text1, alert.text2
         if t0 + alert.visual_s > t:

@@ -20,9 +20,14 @@ class Alert(NamedTuple):
     text_s: float
 
     @property
+    def ends(self) -> tuple[float, float, float]:
+        """Seconds until sound, picture and text are over."""
+        return self.sound_s, self.visual_s, self.text_s
+
+    @property
     def duration(self) -> float:
         """Seconds until nothing of it is left."""
-        return max(self.sound_s, self.visual_s, self.text_s)
+        return max(self.ends)
 
 
 # Event name: what is wrong, in a few words.

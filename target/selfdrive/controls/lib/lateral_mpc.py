@@ -68,23 +68,25 @@ def _residuals(z: ca.SX, rate: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
     return stage, ca.vertcat(distances, (2 * v + 1) * off_heading)
 
 
-def build_lateral_solver(steer_rate_cost: float) -> ca.Function:
-    """Build the solver of one iteration; it keeps nothing between calls."""
-    return build_solver(
-        Ocp(
-            name="lateral_mpc",
-            n_state=4,
-            n_param=17,
-            rk4_step=RK4_STEP,
-            intervals=INTERVALS,
-            ode=_ode,
-            residuals=_residuals,
-            weights=(COST_PATH, COST_LANE, COST_LANE, COST_HEADING, steer_rate_cost),
-            terminal_weights=(COST_PATH, COST_LANE, COST_LANE, COST_HEADING),
-            state_bounds=((2, -MAX_HEADING, MAX_HEADING), (3, -MAX_DELTA, MAX_DELTA)),
-            control_bound=MAX_RATE,
-            shift=True,
-        )
+def lateral_ocp(steer_rate_cost: float) -> Ocp:
+    """The optimal control problem of steering along the path.
+
+    Its parameters are curvature factor, speed, the coefficients of left lane, right lane and model's
+    path, the probabilities of both lanes, and the lane's width.
+    """
+    return Ocp(
+        name="lateral_mpc",
+        n_state=4,
+        n_param=17,
+        rk4_step=RK4_STEP,
+        intervals=INTERVALS,
+        ode=_ode,
+        residuals=_residuals,
+        weights=(COST_PATH, COST_LANE, COST_LANE, COST_HEADING, steer_rate_cost),
+        terminal_weights=(COST_PATH, COST_LANE, COST_LANE, COST_HEADING),
+        state_bounds=((2, -MAX_HEADING, MAX_HEADING), (3, -MAX_DELTA, MAX_DELTA)),
+        control_bound=MAX_RATE,
+        shift=True,
     )
 
 
@@ -106,7 +108,7 @@ class LateralMpc:
     def __init__(self, params: CarParams) -> None:
         """Uses the car's steering ratio, actuation delay and steering rate cost."""
         self.params = params
-        self._iteration = Iteration(build_lateral_solver(params.steer_rate_cost))
+        self._iteration = Iteration(build_solver(lateral_ocp(params.steer_rate_cost)))
         self.reset()
 
     def reset(self) -> None:

@@ -5,6 +5,7 @@ The optimal control problem, the rules around it and their constants are those o
 
 import math
 from array import array
+from operator import sub
 
 import casadi as ca
 
@@ -48,22 +49,20 @@ def _residuals(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(end, jerk * comfort), end
 
 
-def build_long_solver() -> ca.Function:
-    """Build the solver of one iteration; it keeps nothing between calls, so instances may share it."""
-    return build_solver(
-        Ocp(
-            name="long_mpc",
-            n_state=6,
-            n_param=1,
-            rk4_step=RK4_STEP,
-            intervals=INTERVALS,
-            ode=_ode,
-            residuals=_residuals,
-            weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK),
-            terminal_weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION),
-            state_bounds=((1, 0.0, math.inf),),
-            linear=True,
-        )
+def long_ocp() -> Ocp:
+    """The optimal control problem of following a lead; its parameter is the lead's decay in 1/s."""
+    return Ocp(
+        name="long_mpc",
+        n_state=6,
+        n_param=1,
+        rk4_step=RK4_STEP,
+        intervals=INTERVALS,
+        ode=_ode,
+        residuals=_residuals,
+        weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK),
+        terminal_weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION),
+        state_bounds=((1, 0.0, math.inf),),
+        linear=True,
     )
 
 
@@ -87,9 +86,9 @@ class LongitudinalMpc:
     """
 
     def __init__(self, mpc_id: int, solver: ca.Function | None = None) -> None:
-        """`mpc_id` is 1 or 2, for the log. `solver`: of `build_long_solver`, to share it."""
+        """`mpc_id` is 1 or 2, for the log. `solver`: that of another instance, which has no memory."""
         self.mpc_id = mpc_id
-        self.solver = solver or build_long_solver()
+        self.solver = solver or build_solver(long_ocp())
         self._iteration = Iteration(self.solver)
         self.reset()
 
@@ -170,7 +169,7 @@ class LongitudinalMpc:
 
     def _runs_into_lead(self) -> bool:
         """The plan goes through the lead, or backwards."""
-        gap = min(lead - host for lead, host in zip(self.x_lead_plan, self.x_plan, strict=True))
+        gap = min(map(sub, self.x_lead_plan, self.x_plan))
         return gap < CRASH_GAP or min(self.v_plan) < BACKWARDS_SPEED
 
     def _discard(self, v_ego: float, a_ego: float) -> None:

@@ -200,8 +200,8 @@ class Iteration:
     """Runs a solver on buffers of its own; holds the trajectory from one iteration to the next.
 
     `guess` is the trajectory the next iteration linearises at, `solution` the last one computed: the
-    states node by node, then the controls. They are written in place. `unsolved` counts the iterations
-    that kept the controls.
+    states node by node, then the controls. They are written in place. `unsolved` counts the finite
+    iterations that kept the controls.
     """
 
     def __init__(self, solver: ca.Function) -> None:
@@ -230,5 +230,6 @@ class Iteration:
         self._evaluate()
         self.guess[:] = self._next
         solved, finite = self._flags
-        self.unsolved += solved != 1.0
+        if finite and not solved:
+            self.unsolved += 1
         return finite == 1.0

@@ -43,8 +43,10 @@ class StateMachine:
     def update(self, events: Sequence[Event], alerts: AlertManager, t: float) -> bool:
         """Move on by one cycle at time `t` (s) and raise the alerts of the move; True if just engaged."""
         self._cycles_left = max(0, self._cycles_left - 1)
+        if not events and self.state in (DISABLED, ENABLED):
+            return False  # as in nearly all cycles
         if self.state == DISABLED:
-            return bool(events) and self._try_engage(events, alerts, t)
+            return self._try_engage(events, alerts, t)
         if has_kind(events, USER_DISABLE):
             self._disable(("disable",), alerts, t)
         elif has_kind(events, IMMEDIATE_DISABLE):
