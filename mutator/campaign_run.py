@@ -4,15 +4,42 @@
 this process with the plugin of `mutator.pytest_plugin`.
 """
 
+import io
+import os
+import shutil
+import threading
+import time
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
-from mutator.plan import Choices
-from mutator.records import Progress
+import pytest
+
+from mutator import results
+from mutator.campaign import load_campaign
+from mutator.checks import run_checks
+from mutator.chunks import Pending, pending
+from mutator.engine import prepare_base
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
+from mutator.ids import digest
+from mutator.locks import owned
+from mutator.model import Status
+from mutator.plan import Choices, freeze_owned, make_folder, make_plan
+from mutator.provenance import check_sources, sources
+from mutator.records import Progress, Tail, label, read_records
 from mutator.results import Results
+from mutator.runfolder import RunFolder
+from mutator.worker import terminable
 from mutator.workspace import Workspace
+
+EXIT_INTERRUPTED = 130
+_NOTIFY_S = 0.5
+
+Notify = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,8 +47,8 @@ class Summary:
     """What a run came to. `outcomes` as in Progress; `harness_errors` are (experiment id, detail) pairs."""
 
     planned: int
-    done: int
-    ran: int  # in this session
+    done: int  # have a record that counts
+    ran: int  # of these, in this session
     outcomes: Counter[str]
     harness_errors: tuple[tuple[str, str], ...]
     problem: str  # empty, or why the session ended early (disk full, a worker died)
@@ -32,7 +59,9 @@ class Summary:
     @property
     def exit_code(self) -> int:
         """0 fine; 3 harness errors or experiments left; 130 interrupted."""
-        raise NotImplementedError
+        if self.interrupted:
+            return EXIT_INTERRUPTED
+        return EXIT_OK if self.done == self.planned and not self.problem else EXIT_HARNESS_ERRORS
 
 
 def run(
@@ -42,7 +71,7 @@ def run(
     *,
     workers: int = 0,
     choices: Choices | None = None,
-    notify: Callable[[Progress], None] | None = None,
+    notify: Notify | None = None,
 ) -> Summary:
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
@@ -50,4 +79,177 @@ def run(
     MutatorError, as is a changed campaign file or target. `notify` is called from another thread about
     twice a second. MutatorError for wrong input, CheckFailed when the checks before the campaign fail.
     """
-    raise NotImplementedError
+    with session(
+        workspace, campaign, out, workers=workers, choices=choices or Choices(), notify=notify
+    ) as begun:
+        begun.prepare()
+        if begun.pending:
+            with _followed(begun):
+                _run_pytest(begun)
+        return begun.finish()
+
+
+class Session:
+    """One command at work in a run folder that it owns."""
+
+    def __init__(self, workspace: Workspace, folder: RunFolder, workers: int, notify: Notify | None) -> None:
+        self.workspace = workspace
+        self.folder = folder
+        self.workers = workers
+        self.notify: Notify = notify or (lambda progress: None)
+        self.pending: tuple[Pending, ...] = ()
+        self.problem = ""
+        self.interrupted = False
+        self._began = time.monotonic()
+        self._done_before = 0
+
+    def prepare(self) -> None:
+        """Find what is left to run; if anything is, pass the checks and lay out the pristine tree."""
+        records = read_records(self.folder.path)
+        self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
+        left = pending(self.folder, records)
+        if left:
+            run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
+            manifest = self.workspace.manifest(self.folder.head["target"])
+            prepare_base(manifest, self.folder.base)
+        self.pending = left
+
+    def worker_name(self, name: str) -> str:
+        """Name of a worker's files, used by no session before this one."""
+        files = (self.folder.path / "records").glob("*.jsonl")
+        taken = [int(path.name.split("-")[0]) for path in files]
+        return f"{max(taken, default=0) + 1:04d}-{name}"
+
+    def worker_input(self) -> dict[str, Any]:
+        """All that an xdist worker needs, in types that execnet can send."""
+        return {
+            "parent": os.getpid(),
+            "run": str(self.folder.path),
+            "session": self.worker_name(""),
+            "workspace": {k: str(v) if v else None for k, v in asdict(self.workspace).items()},
+            "pending": [[item.chunk, list(item.places)] for item in self.pending],
+        }
+
+    def finish(self) -> Summary:
+        """Build the table from what there is now, and say what the run has come to."""
+        self.notify(Progress(stage="results"))
+        records = read_records(self.folder.path)
+        wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
+        done = len(records) - len(wrong)
+        built = results.up_to_date(self.folder.path) or results.build(self.folder.path)
+        return Summary(
+            planned=self.folder.planned,
+            done=done,
+            ran=done - self._done_before,
+            outcomes=Counter(label(r.status.value, r.outcome) for r in records.values()),
+            harness_errors=tuple(sorted(wrong.items())),
+            problem=self.problem,
+            interrupted=self.interrupted,
+            results=built,
+            elapsed_s=time.monotonic() - self._began,
+        )
+
+
+@contextmanager
+def session(
+    workspace: Workspace,
+    campaign: str | Path,
+    out: Path,
+    *,
+    workers: int,
+    choices: Choices,
+    notify: Notify | None = None,
+) -> Iterator[Session]:
+    """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
+    make_folder(out)
+    with terminable(), owned(out):
+        if RunFolder.exists(out):
+            folder = _frozen(workspace, campaign, out, choices)
+        else:
+            if notify:
+                notify(Progress(stage="plan"))
+            plan = make_plan(workspace, campaign, **asdict(choices))
+            folder = freeze_owned(plan, out, workspace)
+        shutil.rmtree(folder.work, ignore_errors=True)
+        try:
+            yield Session(workspace, folder, workers, notify)
+        finally:
+            shutil.rmtree(folder.work, ignore_errors=True)
+
+
+def _frozen(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
+    """The run folder, if it was planned from this campaign with these choices and sources."""
+    folder = RunFolder.open(out)
+    head = folder.head
+    loaded = load_campaign(workspace.campaign(campaign))
+    if digest(loaded.source) != head["campaign_digest"]:
+        raise MutatorError(
+            f"holds a run of campaign '{head['campaign']}' with another text than {loaded.path}",
+            where=out,
+            remedy="use another folder, or give the run's own file: " + str(out / "campaign.yaml"),
+        )
+    for name, value in asdict(choices).items():
+        frozen = head["choices"][name]
+        if name in ("seed", "reading"):
+            frozen = head[name]
+        if value is not None and value != frozen:
+            raise MutatorError(
+                f"--{name} {value}",
+                where=out,
+                expected=f"what this run was planned with ({name} {frozen})",
+                remedy=f"leave --{name} away, or use another folder",
+            )
+    scenarios = {scenario for scenario, _ in head["goldens"]}
+    check_sources(out, head["sources"], sources(workspace, workspace.manifest(head["target"]), scenarios))
+    return folder
+
+
+@contextmanager
+def _followed(begun: Session) -> Iterator[None]:
+    """Tell how far the run is while it goes on."""
+    tail = Tail(begun.folder.path, begun.folder.planned)
+    stop = threading.Event()
+
+    def follow() -> None:
+        while not stop.wait(_NOTIFY_S):
+            begun.notify(tail.poll())
+
+    thread = threading.Thread(target=follow, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        begun.notify(tail.poll())
+
+
+def _run_pytest(begun: Session) -> None:
+    """Run the pending chunks as pytest items, without anything of the user's pytest configuration."""
+    from mutator.pytest_campaign import Controller
+
+    installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
+    folder = begun.folder.path
+    arguments = [
+        *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
+        *("-p", "mutator" if installed else "mutator.pytest_plugin"),
+        *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest"),
+        *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(begun.workers)),
+    ]
+    output = _Silent()
+    code = pytest.main(arguments, plugins=[Controller(begun), output])
+    if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not begun.problem:
+        begun.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
+
+
+class _Silent:
+    """Pytest plugin: the terminal reporter writes into a buffer, so the terminal is the caller's."""
+
+    def __init__(self) -> None:
+        self.text = io.StringIO()
+
+    @pytest.hookimpl
+    def pytest_configure(self, config: pytest.Config) -> None:
+        manager = config.pluginmanager
+        manager.unregister(name="terminalreporter")
+        manager.register(pytest.TerminalReporter(config, self.text), "terminalreporter")

@@ -1,34 +1,294 @@
-"""The checks before a campaign: golden twice, null mutant, canary. Without them no campaign starts."""
+"""The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import shutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
-from mutator.plan import Plan
+from mutator import golden, mutant, planfile
+from mutator.engine import Execution, Job, ReferenceEngine, prepare_base
+from mutator.errors import CheckFailed, MutatorError
+from mutator.golden import BadOutput, golden_key
+from mutator.ids import digest
+from mutator.jsonio import read_json, write_json
+from mutator.manifest import TargetManifest
+from mutator.model import Experiment, Status
+from mutator.provenance import sources, versions
 from mutator.records import Progress
 from mutator.runfolder import RunFolder
+from mutator.trigger import always
 from mutator.workspace import Workspace
+
+SCHEMA = "checks/1"
+_FILE = "checks.json"
+_OTHER_HASH_SEED = 4242
+_GOLDEN, _AGAIN, _NULL, _CANARY = "golden", "golden again", "null mutant", "canary"
+
+Notify = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult:
-    """One check: `golden S1`, `null mutant S1`, `canary`; `detail` says what was found."""
+    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` says what was found."""
 
     name: str
     passed: bool
     detail: str
-    cpu_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """What a check needs to know of a run: how it ended, digest of all it wrote, hazards, trigger seen."""
+
+    problem: str
+    digest: str = ""
+    hazards: tuple[tuple[str, float], ...] = ()
+    triggered: bool = False
+    cpu_s: float = 0.0
+
+
+def measured_cpu_s(folder: RunFolder) -> float | None:
+    """Mean CPU time of the golden runs in a folder; None before they ran."""
+    path = folder.path / _FILE
+    return read_json(path, SCHEMA)["run_cpu_s"] if path.is_file() else None
 
 
 def run_checks(
-    workspace: Workspace,
-    plan: Plan,
-    folder: RunFolder,
-    *,
-    workers: int = 1,
-    notify: Callable[[Progress], None] | None = None,
+    workspace: Workspace, folder: RunFolder, *, workers: int = 1, notify: Notify | None = None
 ) -> tuple[CheckResult, ...]:
-    """Run what is not yet known to pass for these very sources; results are kept in checks.json.
+    """Run the checks unless they are known to pass for these very sources; results stay in checks.json.
 
-    CheckFailed (after all ran) when any fails. Also leaves the golden runs in the folder.
+    Also leaves the golden runs in the folder. CheckFailed (after all ran) when any fails.
     """
-    raise NotImplementedError
+    checks = _Checks(workspace, folder)
+    known = checks.known()
+    if known is not None:
+        return known
+    results = tuple(checks.run(workers, notify or (lambda progress: None)))
+    failed = [result for result in results if not result.passed]
+    if failed:
+        text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
+        raise CheckFailed(
+            f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
+            where=folder.path / _FILE,
+            remedy="mend target, templates or canary; the campaign does not start before all pass",
+        )
+    return results
+
+
+class _Checks:
+    """The checks of one run folder."""
+
+    def __init__(self, workspace: Workspace, folder: RunFolder) -> None:
+        head = folder.head
+        self.workspace = workspace
+        self.folder = folder
+        self.manifest: TargetManifest = workspace.manifest(head["target"])
+        self.models = workspace.fault_models()
+        self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
+        self.seed: int = head["seed"]
+        fault = planfile.fault_from(head["canary"]["fault"])
+        self.canary: Experiment = planfile.experiment_from(
+            head["canary"] | {"fault": fault.id}, {fault.id: fault}
+        )
+        self.hazard: str = head["canary_hazard"]
+        now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
+        content = [now, versions(), head["goldens"], self.seed, self.canary.id, self.hazard, head["limits"]]
+        self.digest = digest(content)
+
+    def known(self) -> tuple[CheckResult, ...] | None:
+        """Results of an earlier time, if all passed and the golden runs are still there as they were."""
+        before = self._before()
+        if before is None or before["digest"] != self.digest:
+            return None
+        for key, expected in before["goldens"].items():
+            if _digest_of(self.manifest, self.folder.path / "golden" / key) != expected:
+                return None
+        results = tuple(CheckResult(**result) for result in before["results"])
+        return results if all(result.passed for result in results) else None
+
+    def run(self, workers: int, notify: Notify) -> Iterator[CheckResult]:
+        anchors = self._anchors()
+        if not anchors.passed:  # seconds saved, not minutes spent
+            yield anchors
+            return
+        runs = self._run_all(workers, notify)
+        results = [anchors, *self._judge(runs)]
+        goldens = {golden_key(*key): runs[_GOLDEN, key].digest for key in self.keys}
+        self._check_same_as_before(goldens)
+        cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
+        write_json(
+            self.folder.path / _FILE,
+            {
+                "schema": SCHEMA,
+                "digest": self.digest,
+                "results": [asdict(result) for result in results],
+                "goldens": goldens,
+                "run_cpu_s": sum(cpu) / len(cpu),
+            },
+        )
+        yield from results
+
+    def _before(self) -> dict[str, Any] | None:
+        path = self.folder.path / _FILE
+        return read_json(path, SCHEMA) if path.is_file() else None
+
+    def _check_same_as_before(self, goldens: dict[str, str]) -> None:
+        """A run that has records must not go on with other golden runs (of another Python, say)."""
+        before = self._before()
+        started = any((self.folder.path / "records").glob("*.jsonl"))
+        other = [key for key in goldens if before and before["goldens"].get(key) != goldens[key]]
+        if started and other:
+            raise CheckFailed(
+                f"the golden run {other[0]} is not the one this run began with",
+                where=self.folder.path,
+                expected="the same Python and packages during a whole run",
+                remedy="go back to them (run.json has the versions), or run into another folder",
+            )
+
+    def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], _Run]:
+        """Every run of every check, `workers` at a time."""
+        jobs = dict(self._jobs())
+        runs: dict[tuple[str, Any], _Run] = {}
+        work = self.folder.work / "checks"
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir(parents=True)
+        base = prepare_base(self.manifest, self.folder.base)
+        engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
+        notify(Progress(stage="checks", total=len(jobs)))
+        pool = ThreadPoolExecutor(max(1, workers))
+        try:
+            futures: dict[Future[_Run], tuple[str, Any]] = {
+                pool.submit(self._run, engine, name, job): name for name, job in jobs.items()
+            }
+            for future in as_completed(futures):
+                name = futures[future]
+                runs[name] = future.result()
+                notify(Progress(stage="checks", detail=name[0], done=len(runs), total=len(jobs)))
+        finally:
+            pool.shutdown(cancel_futures=True)
+            shutil.rmtree(work, ignore_errors=True)
+        return runs
+
+    def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
+        null = mutant.build(self.manifest, self.models, None, always())
+        for key in self.keys:
+            scenario, changes = key
+            common: dict[str, Any] = {
+                "scenario": self.workspace.scenario(scenario),
+                "seed": self.seed,
+                "changes": changes,
+            }
+            name = golden_key(*key)
+            yield (_GOLDEN, key), Job(name=f"a-{name}", **common)
+            yield (_AGAIN, key), Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
+            yield (_NULL, key), Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
+        canary = self.canary
+        built = mutant.build(self.manifest, self.models, canary.fault, canary.trigger)
+        yield (
+            (_CANARY, None),
+            Job(
+                name="canary",
+                scenario=self.workspace.scenario(canary.scenario),
+                seed=canary.seed,
+                changes=canary.fault.changes,
+                files=built.files,
+                mutant=built.id,
+            ),
+        )
+
+    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> _Run:
+        scratch = engine.work / job.name
+        try:
+            execution = engine.execute(job, scratch)
+            run = self._look(execution)
+            if name[0] == _GOLDEN and not run.problem:
+                self._keep(execution.out, self.folder.golden(*name[1]))
+            return run
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+
+    def _look(self, execution: Execution) -> _Run:
+        if execution.status is not Status.OK:
+            log = execution.log.strip()
+            last = f" ({log.splitlines()[-1]})" if log else ""
+            return _Run(problem=f"{execution.status.value}: {execution.detail}{last}")
+        try:
+            record = golden.load_record(self.manifest, execution.out)
+            golden.load_trace(self.manifest, execution.out, [c.name for c in self.manifest.compared])
+        except BadOutput as err:
+            return _Run(problem=f"{Path(err.where or '').name}: {err.got}")
+        return _Run(
+            problem="",
+            digest=_digest_of(self.manifest, execution.out),
+            hazards=tuple(golden.hazards_of(record)),
+            triggered=bool(execution.probe and execution.probe["triggered"]),
+            cpu_s=execution.cpu_s,
+        )
+
+    def _keep(self, out: Path, place: Path) -> None:
+        place.parent.mkdir(exist_ok=True)
+        shutil.rmtree(place, ignore_errors=True)
+        out.rename(place)
+
+    def _judge(self, runs: dict[tuple[str, Any], _Run]) -> Iterator[CheckResult]:
+        for key in self.keys:
+            first, again, null = (runs[name, key] for name in (_GOLDEN, _AGAIN, _NULL))
+            detail = judge_golden(first, again)
+            yield _result(f"golden {golden_key(*key)}", detail, "the same bytes twice")
+            if not first.problem:
+                detail = judge_null(first, null)
+                yield _result(f"null mutant {golden_key(*key)}", detail, "the same bytes as golden")
+        canary = runs[_CANARY, None]
+        problem = canary.problem or (
+            "" if self.hazard in dict(canary.hazards) else f"did not reach {self.hazard}"
+        )
+        yield _result("canary", problem, f"reached {self.hazard}")
+
+    def _anchors(self) -> CheckResult:
+        """One mutant of each variant in the plan can be built."""
+        variants = {fault.spec: fault for fault in planfile.read_faults(self.folder.path).values()}
+        problems = []
+        for fault in variants.values():
+            try:
+                mutant.build(self.manifest, self.models, fault, always())
+            except MutatorError as err:
+                problems.append(f"{fault.spec}: {err}")
+        return _result("anchors", "; ".join(problems), f"{len(variants)} variants found their statements")
+
+
+def judge_golden(first: _Run, again: _Run) -> str:
+    """What is wrong with a pair of golden runs; empty if nothing."""
+    if first.problem or again.problem:
+        return first.problem or again.problem
+    if first.digest != again.digest:
+        return "two runs that differ in nothing but PYTHONHASHSEED gave different bytes"
+    if first.hazards:
+        name, time = first.hazards[0]
+        return f"reaches {name} at {time} s without any fault"
+    return ""
+
+
+def judge_null(first: _Run, null: _Run) -> str:
+    """What is wrong with a null mutant beside its golden run; empty if nothing."""
+    if null.problem:
+        return null.problem
+    if null.digest != first.digest:
+        return "the probe alone changes what the target does"
+    return "" if null.triggered else "its trigger never fired: the observation statement is not executed"
+
+
+def _result(name: str, problem: str, found: str) -> CheckResult:
+    return CheckResult(name=name, passed=not problem, detail=problem or found)
+
+
+def _digest_of(manifest: TargetManifest, out: Path) -> str:
+    """Digest of trace and record in an output folder; empty when they are not there."""
+    try:
+        return digest(
+            [digest((out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
+        )
+    except OSError:
+        return ""

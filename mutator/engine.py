@@ -24,7 +24,7 @@ from mutator.model import Status
 _CHILD = Path(__file__).with_name("child.py")
 _LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
 _LOG_TAIL = 4000
-_LEAST_FREE = 1 << 20  # a failed run on a disk with less room than this is not the target's failure
+_LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 

@@ -1,12 +1,32 @@
 """Plans: the frozen, ordered list of a campaign's experiments, and what running them will take."""
 
-from dataclasses import dataclass
+import csv
+import io
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
-from mutator.campaign import Campaign
+from mutator import planfile
+from mutator.campaign import Campaign, load_campaign
+from mutator.chunks import cut
+from mutator.columns import PLAN_COLUMNS, plan_row
+from mutator.errors import MutatorError
+from mutator.expansion import Expansion
+from mutator.filters import compile_filter
+from mutator.ids import digest, plain
+from mutator.jsonio import full_disk_told, write_atomic, write_json
+from mutator.locks import owned
 from mutator.model import Experiment
-from mutator.runfolder import RunFolder
+from mutator.provenance import check_sources, sources, versions
+from mutator.runfolder import HEAD, SCHEMA, RunFolder
+from mutator.sample import pick
 from mutator.workspace import Workspace
+
+RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
+_DEFAULT_CPU_S = 1.7  # one run on the reference engine, interpreter start included
+_START_S = 3.0  # of a campaign, before and after its runs
+_BYTES_PER_EXPERIMENT = 14_000  # a patch in whole blocks, its record, its rows
+_BYTES_PER_GOLDEN = 1_200_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +56,10 @@ class Cost:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Experiments in the order they are run, and how they are cut into chunks (lengths, in order)."""
+    """Experiments in the order they are run, and how they are cut into chunks (lengths, in order).
+
+    `run_cpu_s` is the measured CPU time of one run, if there is one.
+    """
 
     campaign: Campaign
     choices: Choices
@@ -44,15 +67,31 @@ class Plan:
     reading: str
     experiments: tuple[Experiment, ...]
     chunks: tuple[int, ...]
+    canary: Experiment
     digest: str  # same campaign, choices, library and scenarios: same digest on every machine
+    run_cpu_s: float | None = None
 
     def rows(self) -> list[dict[str, object]]:
         """One dict per experiment: the columns of the results table that are known before running."""
-        raise NotImplementedError
+        return [plan_row(experiment) for experiment in self.experiments]
+
+    def goldens(self) -> list[tuple[str, tuple[str, ...]]]:
+        """(scenario, changes) of every fault-free run that is needed, the canary's included."""
+        needed = dict.fromkeys((e.scenario, e.fault.changes) for e in (*self.experiments, self.canary))
+        return list(needed)
 
     def cost(self, workers: int = 2) -> Cost:
-        """Expected time and disk."""
-        raise NotImplementedError
+        """Expected time and disk of all of it."""
+        goldens = len(self.goldens())
+        runs = len(self.experiments) + RUNS_PER_GOLDEN * goldens + 1
+        cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
+        return Cost(
+            cpu_s=cpu_s,
+            wall_s=cpu_s / max(workers, 1) + _START_S,
+            disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + goldens * _BYTES_PER_GOLDEN,
+            workers=workers,
+            measured=self.run_cpu_s is not None,
+        )
 
 
 def make_plan(
@@ -70,18 +109,162 @@ def make_plan(
     `only`/`exclude` are filter expressions (`mutator.filters`) over the columns known before running;
     `limit` keeps that many experiments, picked like a campaign's `sample`.
     """
-    raise NotImplementedError
+    loaded = load_campaign(workspace.campaign(campaign))
+    choices = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    seed = loaded.seed if seed is None else seed
+    reading = reading or loaded.reading
+    _check(choices, loaded)
+    expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
+    experiments = _choose(expansion.experiments(), loaded, choices, seed)
+    canary = expansion.canary()
+    chunks = cut([(e.scenario, e.fault.changes) for e in experiments], loaded.chunk)
+    content = [[e.id for e in experiments], chunks, canary.id, plain(loaded.canary), plain(loaded.limits)]
+    return Plan(
+        campaign=loaded,
+        choices=choices,
+        seed=seed,
+        reading=reading,
+        experiments=experiments,
+        chunks=chunks,
+        canary=canary,
+        digest=digest([SCHEMA, *content]),
+    )
+
+
+def _check(choices: Choices, campaign: Campaign) -> None:
+    if choices.reading is not None and choices.reading not in campaign.armed_after_s:
+        known = " or ".join(campaign.armed_after_s)
+        raise MutatorError(f"reading '{choices.reading}'", expected=known, remedy="correct --reading")
+    for name in ("seed", "limit"):
+        value = getattr(choices, name)
+        if value is not None and value < (name == "limit"):
+            raise MutatorError(f"{name} {value}", expected="a positive number", remedy=f"correct --{name}")
+
+
+def _choose(
+    experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int
+) -> tuple[Experiment, ...]:
+    if campaign.sample is not None:
+        experiments = pick(experiments, campaign.sample, seed)
+    for text, wanted in ((choices.only, True), (choices.exclude, False)):
+        if text is not None:
+            accepts = compile_filter(text, PLAN_COLUMNS)
+            experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
+    if choices.limit is not None:
+        experiments = pick(experiments, choices.limit, seed)
+    if not experiments:
+        raise MutatorError(
+            "no experiment is left",
+            where=campaign.path,
+            expected="at least one",
+            remedy="widen --only, --exclude or the campaign's faults",
+        )
+    return experiments
 
 
 def freeze(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
     """Write the plan (and plan.csv) into the run folder `out`, made if missing.
 
     A folder that holds the same plan is left as it is; another plan, or other sources than it was frozen
-    with, is a MutatorError.
+    with, is a MutatorError, as is a folder in use or one that holds other things.
     """
-    raise NotImplementedError
+    make_folder(out)
+    with owned(out):
+        return freeze_owned(plan, out, workspace)
+
+
+def make_folder(out: Path) -> None:
+    """Make `out` unless it is a run folder; MutatorError when it holds anything else."""
+    if out.exists() and not RunFolder.exists(out):
+        strangers = [p.name for p in out.iterdir() if p.name not in _OURS] if out.is_dir() else [out.name]
+        if strangers:
+            raise MutatorError(
+                f"no run folder, and not empty ({', '.join(sorted(strangers)[:3])})",
+                where=out,
+                expected="a run folder, or a new or empty folder",
+                remedy="choose another --out",
+            )
+    with full_disk_told(out):
+        out.mkdir(parents=True, exist_ok=True)
+
+
+_OURS = ("owner.lock", "workers", "plan", "plan.csv", "campaign.yaml")  # what a killed freeze leaves
+
+
+def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
+    """As `freeze`, by who owns the folder already."""
+    if RunFolder.exists(out):
+        folder = RunFolder.open(out)
+        if folder.head["plan"] != plan.digest:
+            raise MutatorError(
+                "holds another plan",
+                where=out,
+                expected=f"plan {plan.digest[:16]}",
+                remedy="use another folder, or the campaign and options it was planned with",
+            )
+        check_sources(out, folder.head["sources"], _sources(plan, workspace))
+        return folder
+    write_atomic(out / "campaign.yaml", plan.campaign.source)
+    write_atomic(out / "plan.csv", _csv(plan))
+    chunks = planfile.write(out, plan.experiments, plan.chunks)
+    write_json(out / HEAD, _head(plan, workspace, chunks))
+    return RunFolder.open(out)
+
+
+def _sources(plan: Plan, workspace: Workspace) -> dict[str, str]:
+    scenarios = {scenario for scenario, _ in plan.goldens()}
+    return sources(workspace, workspace.manifest(plan.campaign.target), scenarios)
+
+
+def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dict[str, Any]:
+    manifest = workspace.manifest(plan.campaign.target)
+    canary = planfile.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
+    return {
+        "schema": SCHEMA,
+        "plan": plan.digest,
+        "campaign": plan.campaign.name,
+        "campaign_digest": digest(plan.campaign.source),
+        "target": plan.campaign.target,
+        "seed": plan.seed,
+        "reading": plan.reading,
+        "choices": asdict(plan.choices),
+        "experiments": len(plan.experiments),
+        "limits": asdict(plan.campaign.limits),
+        "hazards": list(manifest.hazards),
+        "compared": [channel.name for channel in manifest.compared],
+        "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "canary": canary,
+        "canary_hazard": plan.campaign.canary.hazard,
+        "sources": _sources(plan, workspace),
+        "provenance": versions(),
+        "chunks": chunks,
+    }
+
+
+def _csv(plan: Plan) -> bytes:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, PLAN_COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(plan.rows())
+    return text.getvalue().encode()
 
 
 def load_plan(out: Path) -> Plan:
     """The frozen plan of a run folder, complete (for reports; workers read single chunks instead)."""
-    raise NotImplementedError
+    from mutator.checks import measured_cpu_s
+
+    folder = RunFolder.open(out)
+    head = folder.head
+    canary = dict(head["canary"])
+    fault = planfile.fault_from(canary["fault"])
+    return Plan(
+        campaign=load_campaign(folder.path / "campaign.yaml"),
+        choices=Choices(**{f.name: head["choices"][f.name] for f in fields(Choices)}),
+        seed=head["seed"],
+        reading=head["reading"],
+        experiments=planfile.read_all(folder.path),
+        chunks=tuple(count for _, _, count in head["chunks"]),
+        canary=planfile.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
+        digest=head["plan"],
+        run_cpu_s=measured_cpu_s(folder),
+    )

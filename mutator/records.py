@@ -15,6 +15,7 @@ from mutator.jsonio import check_schema, full_disk_told
 from mutator.model import Activation, Outcome, Record, Status
 
 SCHEMA = "records/1"
+TIMINGS_SCHEMA = "timings/1"
 _BATCH = 32  # lines between two syncs
 _BATCH_S = 2.0  # and at most this long
 

@@ -1,44 +1,30 @@
 """The results table: a row per experiment, made from plan and records at any time, always the same bytes."""
 
+import csv
+import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
+from mutator import planfile
+from mutator.columns import COLUMNS, plan_row
+from mutator.jsonio import write_atomic
+from mutator.model import Experiment, Record, Status
+from mutator.records import TIMINGS_SCHEMA, read_lines, read_records
+from mutator.runfolder import RunFolder
+from mutator.verdict import reaction_time
 
-from mutator.model import Experiment, Record
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa  # type: ignore[import-untyped]
 
-COLUMNS = (
-    "experiment_id",
-    "fault_id",
-    "module",
-    "fault_type",
-    "reading",
-    "value",
-    "unit",
-    "scenario",
-    "method",
-    "trigger",
-    "seed",
-    "status",
-    "outcome",
-    "activated",
-    "t_activation",
-    "activations",
-    "manifested",
-    "t_manifest",
-    "h1",
-    "t_h1",
-    "h2",
-    "t_h2",
-    "h3",
-    "t_h3",
-    "alerts",
-    "t_alert",
-    "reaction_time",
-    "max_dev_gas",
-    "max_dev_brake",
-    "max_dev_steer",
-)
+_EXTRA = ("variant", "aim", "condition", "detail")
+_HAZARDS = ("H1", "H2", "H3")
+_FLAGS = ("activated", "manifested")
+_COUNTS = ("seed", "activations")
+_TIMES = ("value", "reaction_time")  # and all that begin with t_ or max_dev_
+_TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,15 +39,150 @@ class Results:
 
 
 def row(experiment: Experiment, record: Record) -> dict[str, object]:
-    """One row: `COLUMNS`, then `variant, aim, condition, detail`; None for nothing."""
-    raise NotImplementedError
+    """One row: `COLUMNS`, further hazards and channels of the target, `variant, aim, condition, detail`.
+
+    None for nothing; flags are 0 or 1; times are seconds of simulation since its start.
+    """
+    activation = record.activation
+    ok = record.status is Status.OK
+    known = ok or record.status is Status.CRASHED
+    cells: dict[str, object] = plan_row(experiment)
+    cells |= {
+        "status": record.status.value,
+        "outcome": record.outcome.value if record.outcome else None,
+        "activated": int(activation is not None) if known else None,
+        "t_activation": _time(activation.first) if activation else None,
+        "activations": activation.count if activation else (0 if known else None),
+        "manifested": int(record.t_manifest is not None) if ok else None,
+        "t_manifest": _time(record.t_manifest),
+        "alerts": ";".join(name for name, _ in record.alerts) or None,
+        "t_alert": _time(record.alerts[0][1]) if record.alerts else None,
+        "reaction_time": _time(reaction_time(record.hazards, record.alerts)),
+        "detail": record.detail or None,
+    }
+    times = dict(record.hazards)
+    for name in (*_HAZARDS, *times):
+        cells[name.lower()] = int(name in times) if ok else None
+        cells[f"t_{name.lower()}"] = _time(times.get(name))
+    columns = deviation_columns([name for name, _ in record.max_dev])
+    return cells | {columns[name]: value for name, value in record.max_dev}
+
+
+def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
+    """Column of each compared channel: `max_dev_` and its first word (`steer` of `steer_torque`), or its
+    whole name where another channel begins with the same word."""
+    words = [name.split("_")[0] for name in channels]
+    return {
+        name: f"max_dev_{word if words.count(word) == 1 else name}"
+        for name, word in zip(channels, words, strict=True)
+    }
+
+
+def _time(value: float | None) -> float | None:
+    return None if value is None else round(value, _TIME_DIGITS)
 
 
 def build(run: Path) -> Results:
     """Write results.csv, results.parquet and timings.parquet of a run folder from its plan and records."""
-    raise NotImplementedError
+    import pyarrow as pa
+
+    folder = RunFolder.open(run)
+    records = read_records(folder.path)
+    experiments = sorted(planfile.read_all(folder.path), key=lambda e: e.id)
+    rows = [row(e, records[e.id]) for e in experiments if e.id in records]
+    columns = _columns(folder)
+    write_atomic(folder.path / "results.csv", _csv(rows, columns))
+    schema = pa.schema([(name, _type(name, pa)) for name in columns])
+    write_atomic(folder.path / "results.parquet", _parquet(rows, schema))
+    write_atomic(folder.path / "timings.parquet", _timings(folder.path))
+    return _results(folder, len(rows))
 
 
-def load(run: Path) -> pd.DataFrame:
+def up_to_date(run: Path) -> Results | None:
+    """The built table, if it is not older than any record; else None."""
+    folder = RunFolder.open(run)
+    derived = [folder.path / name for name in ("results.csv", "results.parquet", "timings.parquet")]
+    if not all(path.is_file() for path in derived):
+        return None
+    sources = [path.stat().st_mtime_ns for path in (folder.path / "records").glob("*.jsonl")]
+    if max(sources, default=0) >= min(path.stat().st_mtime_ns for path in derived):
+        return None
+    with derived[0].open("rb") as file:
+        return _results(folder, sum(1 for _ in file) - 1)
+
+
+def load(run: Path) -> "pd.DataFrame":
     """The results table of a run folder, built first if it is older than the records."""
-    raise NotImplementedError
+    import pandas as pd
+
+    results = up_to_date(run) or build(run)
+    return pd.read_parquet(results.parquet)
+
+
+def _results(folder: RunFolder, rows: int) -> Results:
+    path = folder.path
+    return Results(
+        csv=path / "results.csv",
+        parquet=path / "results.parquet",
+        timings=path / "timings.parquet",
+        rows=rows,
+        planned=folder.planned,
+    )
+
+
+def _columns(folder: RunFolder) -> list[str]:
+    """All columns of a run's table, in order: those of every table, then the target's own, then the rest."""
+    hazards = [name.lower() for name in folder.head["hazards"] if name not in _HAZARDS]
+    own = [column for name in hazards for column in (name, f"t_{name}")]
+    own += deviation_columns(folder.head["compared"]).values()
+    return [*COLUMNS, *(name for name in own if name not in COLUMNS), *_EXTRA]
+
+
+def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n", restval="")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue().encode()
+
+
+def _type(name: str, pa: Any) -> "pa.DataType":
+    if name in _TIMES or name.startswith(("t_", "max_dev_")):
+        return pa.float64()
+    if name in _COUNTS:
+        return pa.int64()
+    if name in _FLAGS or (name[:1] == "h" and name[1:].isdigit()):
+        return pa.int8()
+    return pa.string()
+
+
+def _parquet(rows: list[dict[str, object]], schema: "pa.Schema") -> bytes:
+    """The rows as a Parquet file; nothing in it depends on when or where it was made."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    table = pa.table(
+        {field.name: pa.array([r.get(field.name) for r in rows], field.type) for field in schema}, schema
+    )
+    sink = io.BytesIO()
+    parquet.write_table(table, sink, compression="zstd")
+    return sink.getvalue()
+
+
+def _timings(run: Path) -> bytes:
+    """What each experiment cost, where: its newest line wins."""
+    import pyarrow as pa
+
+    newest: dict[str, dict[str, object]] = {}
+    for path in sorted((run / "timings").glob("*.jsonl")):
+        newest |= {line["experiment_id"]: line for line in read_lines(path, TIMINGS_SCHEMA)}
+    schema = pa.schema(
+        [
+            ("experiment_id", pa.string()),
+            ("cpu_s", pa.float64()),
+            ("wall_s", pa.float64()),
+            ("host", pa.string()),
+            ("worker", pa.string()),
+        ]
+    )
+    return _parquet([newest[name] for name in sorted(newest)], schema)

@@ -1,0 +1,43 @@
+"""Chunks: what one pytest item runs. Cut when a plan is frozen; what is left of them is found on a start."""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+from mutator import planfile
+from mutator.model import Record, Status
+from mutator.runfolder import RunFolder
+
+
+def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
+    """Lengths of the chunks of a plan: at most `size` experiments each, none across two neighbouring groups
+    (a group shares a golden run, so an engine can share work within a chunk)."""
+    lengths: list[int] = []
+    for i, group in enumerate(groups):
+        if i and group == groups[i - 1] and lengths[-1] < size:
+            lengths[-1] += 1
+        else:
+            lengths.append(1)
+    return tuple(lengths)
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """What is left of one chunk: its index, and the places within it that lack a record."""
+
+    chunk: int
+    places: tuple[int, ...]
+
+
+def pending(folder: RunFolder, records: dict[str, Record]) -> tuple[Pending, ...]:
+    """Every chunk that has experiments without a record, or with a harness error, which is tried again."""
+    done = {name for name, record in records.items() if record.status is not Status.HARNESS_ERROR}
+    names = planfile.ids(folder.path) if done else None
+    left: list[Pending] = []
+    for index, (_, _, count) in enumerate(folder.head["chunks"]):
+        if names is None:
+            places = tuple(range(count))
+        else:
+            places = tuple(i for i in range(count) if next(names) not in done)
+        if places:
+            left.append(Pending(index, places))
+    return tuple(left)

@@ -1,0 +1,157 @@
+"""From a campaign to its experiments: faults selected and expanded, triggers made, random times drawn."""
+
+from collections.abc import Iterator
+from fnmatch import fnmatchcase
+
+from mutator.campaign import Campaign
+from mutator.errors import MutatorError
+from mutator.expand import expand
+from mutator.ids import digest
+from mutator.manifest import TargetManifest
+from mutator.model import Experiment, Fault, Method, Trigger
+from mutator.sample import spread
+from mutator.trigger import at_time, draw_time
+from mutator.workspace import Workspace
+
+_Numbered = tuple[int, Fault]  # a fault and its place among the values of its variant
+
+
+class Expansion:
+    """Everything a campaign's experiments are made of, for one seed and one reading."""
+
+    def __init__(
+        self, workspace: Workspace, campaign: Campaign, manifest: TargetManifest, seed: int, reading: str
+    ) -> None:
+        self.workspace = workspace
+        self.campaign = campaign
+        self.manifest = manifest
+        self.seed = seed
+        self.reading = reading
+        self.armed_after_s = campaign.armed_after_s[reading]
+        self._digests: dict[str, str] = {}
+
+    def experiments(self) -> tuple[Experiment, ...]:
+        """All of them, runs of the same scenario and changes side by side (they share a golden run)."""
+        faults = self._selected()
+        triggers = self._triggers()
+        made = [
+            (order, changes, experiment)
+            for order, scenario in enumerate(self.campaign.scenarios)
+            for changes, experiment in self._of_scenario(scenario, faults, triggers)
+        ]
+        made.sort(key=lambda item: item[:2])
+        return tuple(experiment for _, _, experiment in made)
+
+    def canary(self) -> Experiment:
+        """The campaign's canary: the variant's largest value from a given time on."""
+        canary = self.campaign.canary
+        if canary.hazard not in self.manifest.hazards:
+            raise self.campaign.error(
+                ("canary", "hazard"),
+                f"hazard '{canary.hazard}'",
+                expected=f"one of {', '.join(self.manifest.hazards)}",
+                remedy="name a hazard of the target's manifest",
+            )
+        faults = [fault for _, fault in self._library() if fault.spec == canary.spec]
+        if not faults:
+            raise self._unmatched(("canary", "spec"), canary.spec)
+        worst = max(
+            faults, key=lambda fault: abs(fault.value) if isinstance(fault.value, int | float) else 0.0
+        )
+        trigger = at_time(canary.at_s, name="canary")
+        return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
+
+    def _library(self) -> list[_Numbered]:
+        """Every fault of the library with its number within its variant."""
+        numbered: list[_Numbered] = []
+        models = self.workspace.fault_models()
+        for spec in self.workspace.specs():
+            seen: dict[str, int] = {}
+            for fault in expand(spec, self.seed, self.reading, models=models, manifest=self.manifest):
+                number = seen.get(fault.spec, 0)
+                seen[fault.spec] = number + 1
+                numbered.append((number, fault))
+        return numbered
+
+    def _selected(self) -> list[_Numbered]:
+        library = self._library()
+        selected: dict[str, _Numbered] = {}
+        for i, selection in enumerate(self.campaign.faults):
+            variants: dict[str, list[_Numbered]] = {}
+            for numbered in library:
+                if fnmatchcase(numbered[1].spec, selection.spec):
+                    variants.setdefault(numbered[1].spec, []).append(numbered)
+            if not variants:
+                raise self._unmatched(("faults", i, "spec"), selection.spec)
+            for faults in variants.values():
+                wanted = spread(len(faults), selection.values or len(faults))
+                selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
+        return list(selected.values())
+
+    def _unmatched(self, keys: tuple[str | int, ...], pattern: str) -> MutatorError:
+        return self.campaign.error(
+            keys,
+            f"no fault in the library is named like '{pattern}'",
+            expected="<module>/<fault_type>/<variant>, with * for any text",
+            remedy="see `mutator list`",
+        )
+
+    def _triggers(self) -> tuple[Trigger, ...]:
+        """One for each row of the context table; random times are drawn for the same rows, as their pairs."""
+        try:
+            table = self.workspace.context_table(self.campaign.table)
+            return table.triggers(armed_after_s=self.armed_after_s, rows=self.campaign.rows)
+        except MutatorError as err:
+            key = "table" if err.where and "contexts" in err.where else "rows"
+            raise self.campaign.error(
+                ("triggers", key), err.got, expected=err.expected or "", remedy=err.remedy or ""
+            ) from None
+
+    def _of_scenario(
+        self, scenario: str, faults: list[_Numbered], triggers: tuple[Trigger, ...]
+    ) -> Iterator[tuple[tuple[str, ...], Experiment]]:
+        for number, fault in faults:
+            for method in self.campaign.methods:
+                for trigger in triggers:
+                    if method is Method.RANDOM:
+                        trigger = self._random(scenario, fault, number, trigger)
+                    yield fault.changes, self._experiment(fault, scenario, method, trigger)
+
+    def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
+        """The random partner of a row's trigger, the same in both readings but for when times begin."""
+        time = draw_time(
+            self.seed,
+            f"{scenario}/{fault.spec}/{number}/{row.name}",
+            first_s=self.armed_after_s,
+            last_s=self.campaign.random_until_s,
+            step_s=self.manifest.step_s,
+        )
+        return at_time(time, name=f"random/{row.name}")
+
+    def _experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
+        return Experiment(
+            fault=fault,
+            scenario=scenario,
+            scenario_digest=self._scenario_digest(scenario),
+            method=method,
+            trigger=trigger,
+            seed=self.seed,
+        )
+
+    def _scenario_digest(self, scenario: str) -> str:
+        if scenario not in self._digests:
+            try:
+                self._digests[scenario] = digest(self.workspace.scenario(scenario).read_bytes())
+            except MutatorError as err:
+                raise self.campaign.error(
+                    self._scenario_keys(scenario),
+                    err.got,
+                    expected=err.expected or "a scenario",
+                    remedy=err.remedy or "correct the name",
+                ) from None
+        return self._digests[scenario]
+
+    def _scenario_keys(self, scenario: str) -> tuple[str | int, ...]:
+        if scenario in self.campaign.scenarios:
+            return ("scenarios", self.campaign.scenarios.index(scenario))
+        return ("canary", "scenario")

@@ -1,0 +1,125 @@
+"""The process that runs chunks: an xdist worker, or the command itself when there are none."""
+
+import ctypes
+import os
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from mutator import planfile
+from mutator.chunks import Pending
+from mutator.engine import ReferenceEngine
+from mutator.jsonio import full_disk_told
+from mutator.model import Experiment, Status
+from mutator.provenance import check_sources, sources
+from mutator.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.runfolder import RunFolder
+from mutator.runner import Finished, Goldens, Runner
+from mutator.workspace import Workspace
+
+_PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assignment:
+    """Who a worker is: `name` makes its files in the run folder its own, `parent` is the process it must not
+    outlive (None: it is the command itself)."""
+
+    run: Path
+    name: str
+    parent: int | None = None
+
+
+class Worker:
+    """Runs chunks of a run folder and appends what came of them. Reads the plan only chunk by chunk."""
+
+    def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
+        self.folder = RunFolder.open(assignment.run)
+        self._name = assignment.name
+        head = self.folder.head
+        manifest = workspace.manifest(head["target"])
+        scenarios = {scenario for scenario, _ in head["goldens"]}
+        check_sources(self.folder.path, head["sources"], sources(workspace, manifest, scenarios))
+        with full_disk_told(self.folder.work):
+            self.folder.work.mkdir(exist_ok=True)
+        engine = ReferenceEngine(
+            manifest, self.folder.base, self.folder.work, self.folder.limits, assignment.parent
+        )
+        goldens = Goldens(manifest, self.folder.golden)
+        self._runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
+        self._faults = planfile.read_faults(self.folder.path)
+        plan = head["plan"]
+        self._records = LineWriter(self._file("records"), {"schema": SCHEMA, "plan": plan})
+        self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
+
+    def run(self, pending: Pending) -> list[tuple[str, str]]:
+        """Run what is left of a chunk; returns (experiment id, detail) of its harness errors."""
+        experiments = planfile.read_chunk(
+            self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
+        )
+        errors = []
+        for finished in self._runner.run([experiments[place] for place in pending.places]):
+            self._keep(finished)
+            if finished.record.status is Status.HARNESS_ERROR:
+                errors.append((finished.experiment.id, finished.record.detail))
+        return errors
+
+    def close(self) -> None:
+        """Sync and close this worker's files."""
+        self._records.close()
+        self._timings.close()
+
+    def _keep(self, finished: Finished) -> None:
+        """Patch first, record last: what has a record has everything."""
+        if finished.mutant is not None:
+            self._write_patch(finished.experiment, finished.mutant.patch_bytes)
+        self._timings.append(
+            {
+                "experiment_id": finished.experiment.id,
+                "cpu_s": finished.cpu_s,
+                "wall_s": finished.wall_s,
+                "host": socket.gethostname(),
+                "worker": self._name,
+            }
+        )
+        self._records.append(asdict(finished.record))
+
+    def _write_patch(self, experiment: Experiment, data: bytes) -> None:
+        path = self.folder.patch(experiment.id)
+        with full_disk_told(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+
+    def _file(self, kind: str) -> Path:
+        return self.folder.path / kind / f"{self._name}.jsonl"
+
+
+def bind_to_parent(parent: int) -> None:
+    """End with the process `parent`: the kernel kills this one when it dies, and Ctrl-C is its business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Within it, SIGTERM is answered as Ctrl-C is: stop in order, keep what finished."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread: signals are another's business
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
