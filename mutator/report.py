@@ -7,7 +7,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mutator import tables
 from mutator.jsonio import write_atomic
@@ -16,6 +15,7 @@ from mutator.runfolder import RunFolder
 from mutator.tables import Count, Row
 
 FOLDER = "report"
+PACKAGES = ("jinja2", "libcst", "numpy", "casadi", "cantools")  # run.json has all of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +75,7 @@ def write(run: Path) -> Report:
 def _content(folder: RunFolder, rows: Sequence[Row]) -> Content:
     failed = [r for r in rows if r.status is not Status.OK]
     return Content(
-        name=str(folder.head.get("campaign", folder.path.name)),
+        name=str(folder.head["campaign"]),
         facts=_facts(folder, rows),
         outcomes=tables.outcome_counts(rows),
         tables=_tables(rows),
@@ -87,19 +87,20 @@ def _content(folder: RunFolder, rows: Sequence[Row]) -> Content:
 
 
 def _facts(folder: RunFolder, rows: Sequence[Row]) -> list[tuple[str, str]]:
-    """Provenance, flattened: one line a fact."""
-    facts = [("experiments in the table", str(len(rows)))]
-    facts += _flat("", folder.head)
-    return facts
-
-
-def _flat(prefix: str, data: Any) -> list[tuple[str, str]]:
-    if isinstance(data, dict):
-        return [fact for key, value in data.items() for fact in _flat(f"{prefix} {key}".strip(), value)]
-    if isinstance(data, list) and len(data) > 8:
-        return []
-    text = ", ".join(map(str, data)) if isinstance(data, list) else str(data)
-    return [] if data is None or text == "" else [(prefix, text)]
+    """What the results come from, and what they could be made again with."""
+    head, versions = folder.head, folder.provenance
+    facts = {
+        "experiments": f"{len(rows)} of {folder.planned} planned",
+        "campaign": head["campaign"],
+        "plan": head["plan"],
+        "seed": head["seed"],
+        "reading": head["reading"],
+        **{f"chosen: {name}": value for name, value in head["choices"].items() if value is not None},
+        **{f"digest of {name}": value for name, value in head["sources"].items()},
+        **{name: versions[name] for name in ("mutator", "python", "machine")},
+        **{name: versions["packages"][name] for name in PACKAGES if name in versions["packages"]},
+    }
+    return [(name, str(value)) for name, value in facts.items()]
 
 
 def _tables(rows: Sequence[Row]) -> list[Table]:

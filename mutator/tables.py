@@ -161,11 +161,8 @@ def outcome_counts(rows: Iterable[Row]) -> dict[str, int]:
 
 
 def _row(line: dict[str, str]) -> Row:
-    hazards = [
-        (name.removeprefix("t_").upper(), float(text))
-        for name, text in line.items()
-        if name.startswith("t_h") and text
-    ]
+    # A hazard has a flag and a time of the same name: h1, t_h1.
+    hazards = [(name.upper(), float(line[f"t_{name}"])) for name in line if line.get(f"t_{name}")]
     return Row(
         experiment_id=line["experiment_id"],
         fault_id=line["fault_id"],
