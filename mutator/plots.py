@@ -130,7 +130,7 @@ def _decorate(figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mar
             color=MARK_COLOURS[mark.kind],
         )
     axes[-1].set_xlabel("time [s]", fontsize=8)
-    axes[-1].legend(loc="best", fontsize=7, ncols=2, frameon=False)
+    top.legend(loc="best", fontsize=7, ncols=2, frameon=False)
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
 
 

@@ -160,7 +160,7 @@ def _tell(terminal: Terminal, out: Path, summary: "Summary") -> None:
         for name, detail in summary.harness_errors[:5]:
             terminal.say(f"  {name}: {detail}", style="red")
     if summary.problem:
-        terminal.err.print(f"error: {summary.problem}", style="bold red", markup=False)
+        terminal.complain(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
         terminal.say(f"go on: {resume_command()}", style="bold")
 

@@ -57,6 +57,10 @@ class Terminal:
         """A remark beside the result: to standard error, so that a pipe gets the result alone."""
         self.err.print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
 
+    def complain(self, text: str) -> None:
+        """What went wrong, to standard error."""
+        self.err.print(f"error: {text}", style="bold red", markup=False, highlight=False, soft_wrap=True)
+
     def emit(self, data: Any) -> None:
         """The result as one JSON document; numbers JSON does not know (infinity, nan) become null."""
         json.dump(_jsonable(data), sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
@@ -130,15 +134,12 @@ class Terminal:
 def show_error(error: MutatorError) -> None:
     """An error of the user's, in one piece: place, what was got, expected, what to do."""
     terminal = Terminal()
-    place = f"{short_path(error.where)}:{error.line}" if error.line is not None else short_path(error.where)
-    terminal.err.print(f"error: {place + ': ' if place else ''}{error.got}", style="bold red", **_AS_IS)
+    place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
+    terminal.complain(f"{place}: {error.got}" if place else error.got)
     if error.expected:
-        terminal.err.print(f"  expected: {error.expected}", **_AS_IS)
+        terminal.note(f"  expected: {error.expected}")
     if error.remedy:
-        terminal.err.print(f"  to do: {error.remedy}", **_AS_IS)
-
-
-_AS_IS: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
+        terminal.note(f"  to do: {error.remedy}")
 
 
 def _rich_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool) -> "Table":

@@ -108,13 +108,14 @@ def rerun(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     found = view.find_experiment(workspace, run, experiment)
+    kept_before = (found.folder.path / "traces" / found.experiment.id).is_dir()
     with terminal.wait(f"driving {found.experiment.scenario} again"):
         single, same = run_again(workspace, found.folder.path, found.experiment.id)
     plot = None
     if trace:
         manifest = workspace.manifest(found.plan.campaign.target)
         plot = view.draw(manifest, single, plot_path(found.folder.path, found.experiment.id))
-    else:
+    elif not kept_before:
         shutil.rmtree(single.faulty.parent)
     recorded = found.record is not None
     if as_json:
