@@ -57,5 +57,5 @@ class Packer:
     def _encode(self, values: tuple[float, ...]) -> int:
         word = 0
         for field, value in zip(self._fields, values, strict=True):
-            word |= encode(field, value) << field[1]
+            word |= encode(field, value) << field.shift
         return word

@@ -3,8 +3,8 @@
 Steering: `J w' = T u - c w - trail * F_front / ratio`. `u` is the commanded torque (1 is all the
 EPS gives), `F_front` the lateral force of the front tyres, which pulls the wheel straight. The
 column is dominated by its damping (motor friction, gearing, the EPS' own return damping), as LKAS
-actuators are: at 60 mph full torque turns the wheel by at most half a radian a second, and holds
-2.8 m/s^2 of lateral acceleration. With the controller's loop around it, the wheel answers
+actuators are: from straight ahead full torque turns the wheel by half a radian a second, and at speed
+it holds 2.8 m/s^2 of lateral acceleration. With the controller's loop around it, the wheel answers
 a demand in about 0.1 s, the actuation delay the path planner assumes.
 
 Car: linear bicycle model in lateral speed and yaw rate, advanced by implicit Euler because its
@@ -23,6 +23,7 @@ COLUMN_DAMPING = 20.0  # N m s/rad
 TRAIL = 0.053  # m, caster and pneumatic trail
 LARGEST_ANGLE = 8.7  # rad, mechanical stop
 CREEP = 0.1  # m/s; below this the tyres take no side force
+NEAREST_TO_CENTRE = 0.1  # of a bend's radius; a car astray may reach its centre, where `along` has no meaning
 
 
 class LateralDynamics:
@@ -58,7 +59,7 @@ class LateralDynamics:
         self._move(speed)
         offset, v_lat = self.offset, self.lateral_speed
         cosine, sine = cos(self.heading), sin(self.heading)
-        along = (speed * cosine - v_lat * sine) / (1.0 - curvature * offset)
+        along = (speed * cosine - v_lat * sine) / max(1.0 - curvature * offset, NEAREST_TO_CENTRE)
         self.offset = offset + DT_CTRL * (speed * sine + v_lat * cosine)
         self.heading += DT_CTRL * (self.yaw_rate - curvature * along)
         return along

@@ -1,0 +1,86 @@
+"""One run from the command line: files, bytes, mistakes."""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+from selfdrive.sim.run import main
+
+
+@pytest.fixture
+def run(scenarios, tmp_path):
+    """Runs S1 for some steps; returns the folder."""
+
+    def go(name, *arguments, scenario="S1", steps=150):
+        folder = tmp_path / name
+        path = str(scenarios / f"{scenario}.yaml")
+        code = main(["--scenario", path, "--out", str(folder), "--max-steps", str(steps), *arguments])
+        assert code == 0
+        return folder
+
+    return go
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def test_what_is_written(run, scenarios):
+    """A trace with one row a step, and a record that says what was run and holds the trace's digest."""
+    folder = run("a", "--seed", "5")
+    trace = np.load(folder / "trace.npz")
+    record = json.loads((folder / "record.json").read_text())
+    assert len(trace["t"]) == 150
+    assert record["schema"] == "sim-record/1"
+    assert (record["scenario"], record["seed"], record["steps"], record["no_lead"]) == ("S1", 5, 150, False)
+    assert record["scenario_digest"] == hashlib.sha256((scenarios / "S1.yaml").read_bytes()).hexdigest()
+    assert record["trace_digest"] == hashlib.sha256((folder / "trace.npz").read_bytes()).hexdigest()
+    assert record["engaged_from"] == pytest.approx(1.31, abs=0.02)
+    assert record["engaged_to"] == 1.49
+    assert record["hazards"] == {"H1": None, "H2": None, "H3": None}
+    assert record["alerts"] == []
+
+
+def test_same_bytes_whatever_ran_before(run):
+    """The same run twice in one process, another scenario in between, gives the same files to the byte."""
+    first = contents(run("a"))
+    run("other", "--no-lead", scenario="S2")
+    assert contents(run("b")) == first
+
+
+def test_no_lead(run):
+    """Without the lead the road is free from the first step on, and the record says so."""
+    folder = run("a", "--no-lead")
+    assert set(np.load(folder / "trace.npz")["d_rel"]) == {200.0}
+    assert json.loads((folder / "record.json").read_text())["no_lead"] is True
+
+
+def test_a_wrong_scenario_is_answered(tmp_path, capsys):
+    """A user's mistake gives its place and a remedy on the error stream, exit code 2, and no files."""
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("schema: scenario/1\nnmae: x\n")
+    assert main(["--scenario", str(bad), "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert shown.err.startswith(f"error: {bad}:2: unknown key 'nmae', expected one of schema, name")
+    assert "did you mean 'name'?" in shown.err
+    assert shown.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
+    """An output folder in the way of a file is told by name."""
+    (tmp_path / "file").write_text("")
+    arguments = ["--scenario", str(scenarios / "S1.yaml"), "--max-steps", "1"]
+    assert main([*arguments, "--out", str(tmp_path / "file" / "out")]) == 2
+    assert "choose another --out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [[], ["--max-steps", "0"], ["--seed", "x"], ["--max-steps", "many"]])
+def test_wrong_arguments(scenarios, tmp_path, arguments, capsys):
+    """Missing or impossible arguments end with code 2."""
+    full = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), *arguments]
+    with pytest.raises(SystemExit) as caught:
+        main(full if arguments else [])
+    assert caught.value.code == 2
+    assert "error:" in capsys.readouterr().err
