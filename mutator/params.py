@@ -5,6 +5,7 @@ from mutator.draws import generator
 from mutator.errors import MutatorError
 from mutator.fault_models import TARGET_UNIT, FaultModel, ParamSchema
 from mutator.injections import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
+from mutator.locations import dotted_name
 from mutator.model import AnchorKind, Injection, Value
 from mutator.shape_errors import shown, suggestion
 from mutator.spec import Draw
@@ -111,7 +112,7 @@ class _Resolver:
     def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """The parameter's value in the template's unit, of the right type and in range."""
         if schema.type == "variable":
-            if not isinstance(param.value, str):
+            if not isinstance(param.value, str) or not dotted_name(param.value):
                 raise self._wrong(param, "a name as in the source")
             return param.value
         if schema.type == "boolean":
@@ -129,11 +130,9 @@ class _Resolver:
         above = schema.max is not None and not number <= schema.max
         if below or above:
             unit = self.unit(schema)
-            raise self._wrong(
-                param,
-                " and ".join(filter(None, (low, high))) + (f" {unit.symbol}" if unit else ""),
-                f"{number:g}",
-            )
+            written = param.value if isinstance(param.value, int | float) else number
+            expected = " and ".join(filter(None, (low, high))) + (f" {unit.symbol}" if unit else "")
+            raise self._wrong(param, expected, f"{written:g}")
         return number
 
     def _number(self, param: ParamSpec, schema: ParamSchema) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
-from jinja2 import StrictUndefined, TemplateError, TemplateSyntaxError
+from jinja2 import StrictUndefined, TemplateError, TemplateSyntaxError, Undefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from mutator.errors import MutatorError
@@ -29,8 +29,8 @@ def literal(value: object) -> str:
         return repr(value) if math.isfinite(value) else f"float('{value}')"
     if isinstance(value, int):
         return repr(value)
-    if isinstance(value, str):
-        return str(value)
+    if isinstance(value, str | Undefined):
+        return str(value)  # of an undefined name it raises UndefinedError
     raise MutatorError(f"a {type(value).__name__} in a template", expected="a number or a name")
 
 
@@ -123,7 +123,8 @@ def _check_lines(lines: tuple[str, ...], model: FaultModel) -> None:
             where=model.template_path,
             remedy="correct the template",
         ) from None
-    if ends != list(range(1, len(lines) + 1)) or any((len(x) - len(x.lstrip(" "))) % 4 for x in lines):
+    uneven = any((len(x) - len(x.lstrip(" "))) % 4 or "\t" in x for x in lines)
+    if uneven or ends != list(range(1, len(lines) + 1)):
         raise MutatorError(
             f"the template gives {text!r}",
             where=model.template_path,

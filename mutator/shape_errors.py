@@ -21,13 +21,9 @@ _TYPES = {
 
 
 def shown(value: Any) -> str:
-    """A value as an error shows it: short, and text told from numbers."""
+    """A value as an error shows it: at most 60 characters, text told from numbers by its quotes."""
     if value is None:
         return "nothing"
-    if isinstance(value, dict):
-        return "a mapping"
-    if isinstance(value, list):
-        return "a list"
     if isinstance(value, bool):
         return str(value).lower()
     text = repr(value)

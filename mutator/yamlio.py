@@ -193,6 +193,8 @@ def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
         return model.model_validate(body), source
     except ValidationError as error:
         problems = error.errors(include_url=False)
+        # a misspelt key also misses: the misspelling says more
+        problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
         got, expected, remedy, keys = shape_errors.explain(problems[0], model)
         if len(problems) > 1:
             remedy += f" ({len(problems) - 1} more after this one)"

@@ -73,7 +73,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
             3,
             ["1.5 for 'spokes'", "whole number"],
         ),
-        ("schema: car/2\nname: x\nspare: [1]\n", 3, ["a list for 'spare'", "expected a mapping"]),
+        ("schema: car/2\nname: x\nspare: [1]\n", 3, ["[1] for 'spare'", "expected a mapping"]),
         ("schema: car/2\nname: x\ntags: a\n", 3, ["'a' for 'tags'", "expected a list"]),
         ("schema: car/2\nspare: {radius: 1}\n", 1, ["key 'name' is missing", "add `name: ...`"]),
         ("schema: car/3\nname: x\n", 1, ["'car/3'", "expected car/2", "newer version"]),
