@@ -134,6 +134,6 @@ class Planner:
         oldest = t - MAX_AGE - AGE_ROUNDING
         model_lost = self._model is None or self._model.t < oldest
         radar_lost = self._radar is None or self._radar.t < oldest or bool(self._radar.errors)
-        if not model_lost and not radar_lost:
-            return ()
-        return (MODEL_ERROR,) * model_lost + (RADAR_ERROR,) * radar_lost
+        if model_lost:
+            return (MODEL_ERROR, RADAR_ERROR) if radar_lost else (MODEL_ERROR,)
+        return (RADAR_ERROR,) if radar_lost else ()

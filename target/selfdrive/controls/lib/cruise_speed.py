@@ -14,7 +14,7 @@ V_CRUISE_NONE = 255  # km/h, never engaged yet
 
 def initial_v_cruise(v_ego: float) -> int:
     """Set speed (km/h) when the driver engages at `v_ego` (m/s)."""
-    return round(max(v_ego * MS_TO_KPH, V_CRUISE_ENABLE_MIN))
+    return int(max(v_ego * MS_TO_KPH, V_CRUISE_ENABLE_MIN) + 0.5)
 
 
 def button_v_cruise(v_cruise: int, buttons: Iterable[ButtonEvent]) -> int:

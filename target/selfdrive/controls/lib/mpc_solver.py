@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-FEASIBILITY_TOL = 1e-4  # in the units of the bounded states; DAQP's own is 1e-6 on scaled rows
+FEASIBILITY_TOL = 1e-3  # in the units of the bounds; DAQP may miss them by 1e-6 of its scaled rows
 STATIONARITY_TOL = 1e-6  # relative to the gradient
 LARGEST = 1e100  # square sum of a trajectory that still means something
 LARGEST_GRADIENT = 1e300
