@@ -1,0 +1,100 @@
+"""CPU time of both model-predictive controllers: build, iteration, and the solver's share of it.
+
+`python benchmarks/mpc.py [--rounds N] [--json FILE]`. All are measured in turn in each round, so that what
+else the machine does falls on all of them; printed are the medians and the best rounds.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "target"))
+
+from selfdrive.car.honda.interface import get_params  # noqa: E402
+from selfdrive.controls.lib.lateral_mpc import Lanes, LateralMpc  # noqa: E402
+from selfdrive.controls.lib.long_mpc import LongitudinalMpc  # noqa: E402
+from selfdrive.messages import LeadData  # noqa: E402
+
+UPDATES = 200  # in each round
+GOALS = {  # microseconds of CPU
+    "longitudinal update": 150.0,
+    "lateral update": 250.0,
+    "longitudinal build": 60e3,
+    "lateral build": 60e3,
+}
+
+
+def follow(mpc: LongitudinalMpc) -> None:
+    """Come up on a slower lead, whose distance is measured in steps of 1/16 m."""
+    for k in range(UPDATES):
+        mpc.set_cur_state(26.0 - 0.02 * k, -0.4)
+        d_rel = int(16 * (80.0 - 0.2 * k)) / 16
+        mpc.update(26.0, -0.4, LeadData(status=True, d_rel=d_rel, v_lead=18.0, a_lead_k=-0.2))
+
+
+def steer(mpc: LateralMpc) -> None:
+    """Come back to the middle of a lane that bends slowly."""
+    for k in range(UPDATES):
+        y, bend = 0.4 * (1 - k / UPDATES), 2e-4
+        lines = [(0.0, bend, 0.01, y + side) for side in (1.85, -1.85, 0.0)]
+        mpc.update(Lanes(*lines, 0.95, 0.95, 3.7), 25.0, 0.02, 0.0, 0.2)
+
+
+def cpu_us(task: Callable[[], object], divisor: int = 1) -> float:
+    """CPU time of `task` in microseconds, for one of `divisor` parts."""
+    start = process_time()
+    task()
+    return (process_time() - start) / divisor * 1e6
+
+
+def measure(rounds: int) -> dict[str, list[float]]:
+    """Microseconds of each subject in each round; the first build also loads the solver's plug-in."""
+    first = cpu_us(lambda: LongitudinalMpc(1))
+    long_mpc, lateral_mpc = LongitudinalMpc(1), LateralMpc(get_params())
+    subjects = {
+        "longitudinal update": lambda: cpu_us(lambda: follow(long_mpc), UPDATES),
+        "longitudinal solver": lambda: cpu_us(lambda: repeat(long_mpc._iteration._evaluate), UPDATES),
+        "lateral update": lambda: cpu_us(lambda: steer(lateral_mpc), UPDATES),
+        "lateral solver": lambda: cpu_us(lambda: repeat(lateral_mpc._iteration._evaluate), UPDATES),
+        "longitudinal build": lambda: cpu_us(lambda: LongitudinalMpc(1)),
+        "lateral build": lambda: cpu_us(lambda: LateralMpc(get_params())),
+    }
+    times: dict[str, list[float]] = {"first build in the process": [first]} | {name: [] for name in subjects}
+    for _ in range(rounds):
+        for name, subject in subjects.items():
+            times[name].append(subject())
+    return times
+
+
+def repeat(task: Callable[[], object]) -> None:
+    """Do `task` as often as a round has updates."""
+    for _ in range(UPDATES):
+        task()
+
+
+def main() -> None:
+    """Measure and print; exit 1 where a median misses its goal."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--json", type=Path, help="file for the figures")
+    options = parser.parse_args()
+    times = measure(options.rounds)
+    print(f"{'CPU, microseconds':28}{'median':>10}{'best':>10}{'goal':>10}{'ratio':>8}")
+    missed = False
+    for name, values in times.items():
+        goal = GOALS.get(name)
+        tail = f"{goal:10.0f}{median(values) / goal:8.2f}" if goal else ""
+        print(f"{name:28}{median(values):10.1f}{min(values):10.1f}{tail}")
+        missed |= goal is not None and median(values) > goal
+    if options.json:
+        options.json.write_text(json.dumps({"unit": "us", "times": times}, indent=1) + "\n")
+    sys.exit(1 if missed else 0)
+
+
+if __name__ == "__main__":
+    main()

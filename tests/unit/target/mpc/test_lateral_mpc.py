@@ -1,0 +1,178 @@
+"""Lateral MPC: the plan it makes, its limits, and what happens when there is none."""
+
+import math
+import random
+
+import pytest
+from selfdrive.car.honda.interface import get_params
+from selfdrive.controls.lib.lateral_mpc import Lanes, LateralMpc
+
+RATIO = get_params().steer_ratio
+V = 20.0  # m/s
+CURVATURE_FACTOR = 0.24  # 1/m
+
+
+def drive(mpc, lanes, times=1, v=V, angle=0.0, offset=0.0):
+    """Update `times` times with the same input."""
+    for _ in range(times):
+        mpc.update(lanes, v, angle, offset, CURVATURE_FACTOR)
+
+
+def settle(mpc, lanes, times=60):
+    """Update until the plan no longer changes, always from the straight-ahead wheel."""
+    for _ in range(times):
+        mpc._delta = 0.0
+        drive(mpc, lanes)
+
+
+def results(mpc):
+    """All that others read, to the last bit."""
+    scalars = (mpc.angle_desired, mpc.delta_desired, mpc.nans)
+    return [repr(value) for value in scalars] + [mpc.delta_plan.tobytes()]
+
+
+def test_middle_of_a_straight_lane_needs_no_steering(lateral_mpc, lanes):
+    """In the middle of the lane the plan is straight ahead."""
+    settle(lateral_mpc, lanes())
+    assert lateral_mpc.angle_desired == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_steers_towards_the_path(lateral_mpc, lanes, side):
+    """A path to the left (positive) is followed by steering left, and the same mirrored."""
+    settle(lateral_mpc, lanes(0.5))
+    left = list(lateral_mpc.delta_plan)
+    assert left[1] > 1e-4
+    lateral_mpc.reset()
+    settle(lateral_mpc, lanes(side * 0.5))
+    assert list(lateral_mpc.delta_plan) == pytest.approx([side * x for x in left], abs=1e-6)
+
+
+def test_curve_ends_in_the_curves_wheel_angle(lateral_mpc):
+    """Along a curve of 500 m radius the plan holds the wheel angle of that curvature."""
+    curve = (0.0, 1 / 1000, 0.0)
+    road = Lanes((*curve, 1.85), (*curve, -1.85), (*curve, 0.0), 1.0, 1.0, 3.7)
+    for _ in range(100):
+        drive(lateral_mpc, road, angle=lateral_mpc.angle_desired)
+    assert lateral_mpc.delta_desired * CURVATURE_FACTOR == pytest.approx(1 / 500, rel=0.1)
+
+
+def test_without_lanes_the_models_path_counts(lateral_mpc, lanes):
+    """Lines that are not seen have no influence."""
+    nowhere = lanes(0.5, left_prob=0.0, right_prob=0.0)
+    nowhere.left_poly, nowhere.right_poly = (0.0, 0.0, 0.3, 9.0), (0.0, 0.0, -0.3, 9.0)
+    settle(lateral_mpc, nowhere)
+    with_odd_lines = results(lateral_mpc)
+    lateral_mpc.reset()
+    settle(lateral_mpc, lanes(0.5, left_prob=0.0, right_prob=0.0))
+    assert results(lateral_mpc) == with_odd_lines
+    assert lateral_mpc.delta_desired > 1e-4
+
+
+def test_one_line_gives_the_lane_by_its_width(lateral_mpc, lanes):
+    """With the left line alone the middle is half a lane's width to its right."""
+    one = lanes(0.4, right_prob=0.0)
+    one.path_poly = (0.0, 0.0, 0.0, -5.0)
+    settle(lateral_mpc, one)
+    assert lateral_mpc.delta_desired > 1e-4
+
+
+def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
+    """A car that hardly turns is steered to 25 degrees at 0.1 rad/s at the road wheels, never beyond."""
+    for _ in range(120):
+        lateral_mpc.update(lanes(8.0), V, 0.0, 0.0, 0.02)
+        plan = lateral_mpc.delta_plan
+        steps = [0.05] * 5 + [0.15] * 15
+        rates = [(b - a) / dt for a, b, dt in zip(plan, plan[1:], steps, strict=False)]
+        assert max(map(abs, rates)) < 0.1 + 1e-4
+        assert max(map(abs, plan)) < math.radians(25.0) + 1e-4
+    assert lateral_mpc.unsolved == 0
+    assert max(plan) == pytest.approx(math.radians(25.0), abs=1e-4)
+
+
+def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
+    """The plan starts where the car will be, and point, when a command acts."""
+    drive(lateral_mpc, lanes(), angle=0.26)
+    delay = get_params().steer_actuator_delay
+    x, y, heading, delta = lateral_mpc._iteration.solution[:4]
+    assert (x, y, delta) == (V * delay, 0.0, 0.0)
+    assert heading == pytest.approx(V * CURVATURE_FACTOR * 0.26 / RATIO * delay)
+
+
+def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
+    """The wheel angle measured does not enter the plan's own; the offset is added to the result."""
+    drive(lateral_mpc, lanes(1.0), offset=0.01)
+    wanted = lateral_mpc.delta_desired
+    assert lateral_mpc.angle_desired == pytest.approx(wanted * RATIO + 0.01)
+    drive(lateral_mpc, lanes(1.0), offset=0.01)
+    assert lateral_mpc.delta_plan[0] == pytest.approx(wanted, abs=1e-15)
+
+
+def test_low_speed_is_planned_as_5_mps(lateral_mpc, lanes):
+    """Under 5 m/s the plan is that for 5 m/s, but for the way driven until a command acts."""
+    drive(lateral_mpc, lanes(0.3), v=0.0)
+    assert lateral_mpc._iteration.solution[4] == pytest.approx(5.0 * 0.05, abs=1e-3)
+
+
+@pytest.mark.parametrize("where", ["lane", "speed", "angle", "lanes too far"])
+def test_no_number_resets(lateral_mpc, lanes, where):
+    """Without a finite solution the angle is NaN once, and the next plan starts at the angle measured."""
+    drive(lateral_mpc, lanes(0.5), times=3)
+    broken = lanes(400.0) if where == "lanes too far" else lanes()
+    if where == "lane":
+        broken.left_poly = (0.0, 0.0, math.nan, 1.0)
+    speed = math.nan if where == "speed" else V
+    drive(lateral_mpc, broken, v=speed, angle=math.nan if where == "angle" else 0.13)
+    assert lateral_mpc.nans
+    assert math.isnan(lateral_mpc.angle_desired)
+    assert lateral_mpc.resets == 1
+    if where != "angle":
+        drive(lateral_mpc, lanes(), angle=0.2)
+        assert not lateral_mpc.nans
+        assert lateral_mpc.delta_plan[0] == 0.13 / RATIO
+
+
+def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
+    """A plan thrown away leaves nothing behind: two pasts, the same bytes afterwards."""
+    outcomes = []
+    for past in (lanes(1.0), lanes(-3.0)):
+        lateral_mpc.reset()
+        drive(lateral_mpc, past, times=4)
+        drive(lateral_mpc, lanes(400.0), angle=0.05)
+        drive(lateral_mpc, lanes(0.2), times=5)
+        outcomes.append(results(lateral_mpc))
+    assert outcomes[0] == outcomes[1]
+
+
+def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
+    """A heading beyond 90 degrees has no solution: the plan goes on as it was, and is counted."""
+    drive(lateral_mpc, lanes(2.0), times=3)
+    planned = list(lateral_mpc._iteration.guess[84:])
+    delta = lateral_mpc.delta_desired
+    drive(lateral_mpc, lanes(2.0), angle=60.0)
+    assert lateral_mpc.unsolved == 1
+    assert not lateral_mpc.nans
+    assert lateral_mpc.delta_desired == pytest.approx(delta + 0.05 * planned[0], abs=1e-12)
+
+
+def test_reset_forgets_everything(lateral_mpc, lanes):
+    """After a reset, also from an unsolvable problem, an instance computes the bytes of a new one."""
+    fresh = LateralMpc(get_params())
+    drive(lateral_mpc, lanes(-3.0), times=5, angle=60.0)
+    drive(lateral_mpc, lanes(math.nan))
+    lateral_mpc.reset()
+    assert results(lateral_mpc) == results(fresh)
+    for k in range(20):
+        for mpc in (lateral_mpc, fresh):
+            drive(mpc, lanes(0.3 - 0.01 * k, 0.002 * k), angle=0.01 * k)
+        assert results(lateral_mpc) == results(fresh)
+
+
+def test_any_input_is_answered(lateral_mpc, lanes):
+    """Wild but finite input never raises."""
+    rng = random.Random(2)
+    for _ in range(300):
+        road = lanes(rng.gauss(0, 30), rng.gauss(0, 1), rng.random(), rng.random())
+        road.left_poly = tuple(rng.gauss(0, s) for s in (1e-3, 1e-2, 0.3, 30))
+        lateral_mpc.update(road, rng.uniform(0, 90), rng.gauss(0, 5), rng.gauss(0, 0.1), rng.uniform(0, 0.4))
+        assert lateral_mpc.nans == math.isnan(lateral_mpc.angle_desired)

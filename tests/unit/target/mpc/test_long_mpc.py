@@ -1,0 +1,246 @@
+"""Longitudinal MPC: the plan it makes, and the rules of leads, first guesses and resets."""
+
+import csv
+import math
+import random
+from pathlib import Path
+
+import pytest
+from selfdrive.controls.lib.long_mpc import LEAD_DECAY, NODE_STEPS, LongitudinalMpc
+from selfdrive.messages import LeadData
+
+DT_PLAN = 0.05  # s
+HORIZON = 0.2  # s, of v_mpc and a_mpc
+
+
+def drive(mpc, v, a, lead, times):
+    """Update `times` times at the same state."""
+    for _ in range(times):
+        mpc.set_cur_state(v, a)
+        mpc.update(v, a, lead)
+
+
+def results(mpc):
+    """All that others read, to the last bit."""
+    scalars = (mpc.v_mpc, mpc.a_mpc, mpc.v_mpc_future, mpc.prev_lead_status, mpc.new_lead)
+    plans = (mpc.x_plan, mpc.v_plan, mpc.a_plan, mpc.x_lead_plan)
+    return [repr(value) for value in scalars] + [plan.tobytes() for plan in plans]
+
+
+def test_plan_follows_the_recorded_original(long_mpc, lead):
+    """Fed with the leads it saw, our plan is the original's through a whole stop (openpilot v0.4.2)."""
+    with (Path(__file__).parent / "stop_behind_lead.csv").open() as f:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(f)]
+    a = rows[0]["a_target_mps2"] - 0.2 * (rows[1]["a_target_mps2"] - rows[0]["a_target_mps2"])
+    v = rows[0]["v_target_mps"] - 0.01 * a  # the record is 10 ms into each plan
+    leads = [lead(row["d_rel_m"], row["v_lead_mps"], row["a_lead_mps2"]) for row in rows]
+    drive(long_mpc, v, a, leads[0], 10)  # it had followed this lead for some time
+    off_v, off_a = 0.0, 0.0
+    for row, seen in zip(rows, leads, strict=True):
+        drive(long_mpc, v, a, seen, 1)
+        rate = (long_mpc.a_mpc - a) / HORIZON
+        a_now = a + 0.01 * rate
+        off_v = max(off_v, abs(v + 0.005 * (a + a_now) - row["v_target_mps"]))
+        off_a = max(off_a, abs(a_now - row["a_target_mps2"]))
+        v += DT_PLAN * (a + DT_PLAN * rate / 2)
+        a += DT_PLAN * rate
+    assert rows[-1]["v_target_mps"] == pytest.approx(0.0, abs=0.01)
+    assert off_v < 0.005
+    assert off_a < 0.005
+
+
+@pytest.mark.parametrize("v", [0.0, 5.0, 15.0, 30.0])
+def test_steady_gap(long_mpc, lead, v):
+    """Behind a lead of its own speed, at 4 m + 1.8 s of its way, the plan is to change nothing."""
+    drive(long_mpc, v, 0.0, lead(4.0 + 1.8 * v, v), 20)
+    assert long_mpc.a_mpc == pytest.approx(0.0, abs=1e-6)
+    assert list(long_mpc.v_plan) == pytest.approx([v] * 21, abs=1e-4)
+
+
+@pytest.mark.parametrize(("gap", "sign"), [(30.0, -1), (60.0, 1)])
+def test_plan_closes_the_error_of_the_gap(long_mpc, lead, gap, sign):
+    """Too close means braking, too far means accelerating."""
+    drive(long_mpc, 20.0, 0.0, lead(gap, 20.0), 20)
+    assert long_mpc.a_mpc * sign > 0.01
+    assert (long_mpc.v_mpc_future - 20.0) * sign > 0.1
+
+
+def test_no_lead_never_limits(long_mpc):
+    """Without a lead the plan accelerates, and does not compete."""
+    drive(long_mpc, 20.0, 0.0, None, 20)
+    assert not long_mpc.prev_lead_status
+    assert long_mpc.v_mpc_future > 20.0
+    drive(long_mpc, 20.0, 0.0, LeadData(), 1)
+    assert not long_mpc.prev_lead_status
+
+
+def test_new_lead_when_it_appears_or_jumps(long_mpc, lead):
+    """A lead is new when there was none, or when it moved by more than 2.5 m in one update."""
+    seen = []
+    for d_rel in (50.0, 49.0, 51.5, 54.1, 54.1):
+        drive(long_mpc, 20.0, 0.0, lead(d_rel, 18.0), 1)
+        seen.append(long_mpc.new_lead)
+    drive(long_mpc, 20.0, 0.0, None, 1)
+    assert not long_mpc.new_lead
+    drive(long_mpc, 20.0, 0.0, lead(54.1, 18.0), 1)
+    assert [*seen, long_mpc.new_lead] == [True, False, False, True, False, True]
+
+
+@pytest.mark.parametrize(("v", "a"), [(0.09, 0.0), (2.0, -4.1), (-3.0, 0.0)])
+def test_slow_or_hard_braking_lead_counts_as_stopped(long_mpc, lead, v, a):
+    """A lead under 0.1 m/s, or one that stops within two seconds, is planned to stand where it is."""
+    drive(long_mpc, 5.0, 0.0, lead(30.0, v, a), 1)
+    assert list(long_mpc.x_lead_plan) == [30.0] * 21
+
+
+def test_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
+    """The lead's deceleration fades fast enough that its planned speed ends at zero."""
+    drive(long_mpc, 5.0, 0.0, lead(30.0, 2.0, -3.9), 1)
+    steps = [b - a for a, b in zip(long_mpc.x_lead_plan, long_mpc.x_lead_plan[1:], strict=False)]
+    assert min(steps) > -0.01
+    assert steps[-1] == pytest.approx(0.0, abs=0.01)
+
+
+def test_decay_of_the_leads_acceleration(long_mpc, lead):
+    """It is 1.5/s while the lead is steady and falls by a tenth with each update while it is not."""
+
+    def travelled(decay):
+        """RK4 of a decaying acceleration of 1 m/s^2, as the plan integrates it."""
+        x, v, a, h = 0.0, 10.0, 1.0, 0.2
+        for _ in range(50):
+            z = decay * h
+            x += h * v + h * h * a * (1 / 2 - z / 6 + z * z / 24)
+            v += h * a * (1 - z / 2 + z * z / 6 - z**3 / 24)
+            a *= 1 - z + z * z / 2 - z**3 / 6 + z**4 / 24
+        return x
+
+    drive(long_mpc, 10.0, 0.0, lead(40.0, 10.0, 0.49), 3)
+    for k in range(1, 4):
+        drive(long_mpc, 10.0, 0.0, lead(40.0, 10.0, 1.0), 1)
+        assert long_mpc.x_lead_plan[-1] - 40.0 == pytest.approx(travelled(LEAD_DECAY * 0.9**k), abs=1e-9)
+    drive(long_mpc, 10.0, 0.0, lead(40.0, 10.0, 0.0), 1)
+    drive(long_mpc, 10.0, 0.0, lead(40.0, 10.0, 1.0), 1)
+    assert long_mpc.x_lead_plan[-1] - 40.0 == pytest.approx(travelled(LEAD_DECAY * 0.9), abs=1e-9)
+
+
+def test_first_guess_for_a_new_lead_brakes_to_its_speed(make_long, lead):
+    """Two instances with different pasts but equal planned speed plan alike for a new lead."""
+    one, other = make_long(), make_long()
+    drive(one, 20.0, 0.0, lead(20.0, 5.0), 5)
+    drive(other, 25.0, 0.0, None, 3)
+    one.v_mpc = other.v_mpc = 21.0
+    for mpc in (one, other):
+        drive(mpc, 20.0, 0.0, lead(80.0, 10.0), 1)
+    assert results(one) == results(other)
+
+
+def test_plan_through_the_lead_is_thrown_away(long_mpc, lead):
+    """50 m beyond the lead the plan is dropped: the car's own motion counts, the next lead is new."""
+    drive(long_mpc, 20.0, 0.0, lead(30.0, 20.0), 3)
+    long_mpc.set_cur_state(20.0, 0.0)
+    long_mpc.update(19.5, -0.3, lead(-51.0, 20.0))
+    assert long_mpc.resets == 1
+    assert (long_mpc.v_mpc, long_mpc.a_mpc) == (19.5, -0.3)
+    assert not long_mpc.prev_lead_status
+    drive(long_mpc, 20.0, 0.0, lead(30.0, 20.0), 1)
+    assert long_mpc.new_lead
+    assert long_mpc.prev_lead_status
+
+
+def test_plan_backwards_is_thrown_away_only_with_a_lead(long_mpc, lead):
+    """A speed under -0.01 m/s anywhere in the plan drops it; without a lead nobody looks."""
+    drive(long_mpc, -0.02, 0.0, None, 1)
+    assert long_mpc.resets == 0
+    drive(long_mpc, -0.009, 0.0, lead(10.0, 0.0), 1)
+    assert long_mpc.resets == 0
+    drive(long_mpc, -0.02, 0.0, lead(10.0, 0.0), 1)
+    assert long_mpc.resets == 1
+
+
+@pytest.mark.parametrize("v", [-0.009, 0.0, 0.05])
+@pytest.mark.parametrize("a", [-3.0, -0.5, 0.0])
+@pytest.mark.parametrize("d_rel", [0.0, 3.0, 6.0])
+def test_standstill_is_feasible(long_mpc, lead, v, a, d_rel):
+    """Braking at standstill still has a plan, and it does not go backwards after its first node."""
+    drive(long_mpc, v, a, lead(d_rel, 0.0), 10)
+    assert long_mpc.unsolved == long_mpc.resets == 0
+    assert min(long_mpc.v_plan[1:]) > -1e-5
+
+
+@pytest.mark.parametrize("field", ["d_rel", "v_lead", "a_lead_k"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_lead_that_is_no_number_never_raises(long_mpc, lead, field, value):
+    """The solution is used or thrown away, never an exception, and good leads work again at once."""
+    broken = lead(30.0, 20.0)
+    setattr(broken, field, value)
+    drive(long_mpc, 20.0, 0.0, broken, 3)
+    assert math.isfinite(long_mpc.v_mpc)
+    drive(long_mpc, 20.0, 0.0, lead(40.0, 20.0), 2)
+    assert long_mpc.prev_lead_status
+    assert math.isfinite(long_mpc.a_mpc)
+
+
+def test_solution_that_is_no_number_is_thrown_away(long_mpc, lead):
+    """NaN in the distance costs one reset an update; speed and acceleration are then the car's own."""
+    drive(long_mpc, 20.0, 0.0, lead(40.0, 20.0), 2)
+    before = long_mpc.a_plan.tobytes()
+    long_mpc.update(19.0, 0.1, lead(math.nan, 20.0))
+    assert long_mpc.resets == 1
+    assert (long_mpc.v_mpc, long_mpc.a_mpc) == (19.0, 0.1)
+    assert long_mpc.a_plan.tobytes() == before
+    assert not long_mpc.prev_lead_status
+
+
+def test_any_input_is_answered(make_long, lead):
+    """Wild but finite input never raises, and leaves finite results."""
+    rng = random.Random(1)
+    mpc = make_long()
+    for _ in range(500):
+        mpc.set_cur_state(rng.uniform(-20, 90), rng.uniform(-30, 30))
+        seen = lead(rng.uniform(-300, 300), rng.uniform(-100, 100), rng.uniform(-50, 50))
+        mpc.update(rng.uniform(0, 90), rng.uniform(-9, 9), rng.choice((seen, None)))
+        assert math.isfinite(mpc.v_mpc + mpc.a_mpc + mpc.v_mpc_future)
+
+
+def test_reset_forgets_everything(make_long, lead):
+    """After a reset, whatever came before, an instance computes the bytes of a new one."""
+    used, fresh = make_long(), make_long()
+    drive(used, 20.0, -1.0, lead(15.0, 5.0, -4.0), 5)
+    drive(used, math.nan, 0.0, lead(15.0, 5.0), 1)
+    drive(used, -5.0, -9.0, lead(1.0, 0.0), 2)
+    used.reset()
+    assert results(used) == results(fresh)
+    for k in range(40):
+        for mpc in (used, fresh):
+            drive(mpc, 20.0 - 0.1 * k, -2.0, lead(40.0 - k, 15.0, -1.0), 1)
+        assert results(used) == results(fresh)
+
+
+def test_thrown_away_is_forgotten(make_long, lead):
+    """After it was thrown away, a plan leaves nothing behind: two causes, the same bytes afterwards."""
+    one, other = make_long(), make_long()
+    one.update(20.0, 0.0, lead(math.nan, 20.0))
+    drive(other, 20.0, 0.0, lead(40.0, 20.0), 5)
+    other.update(20.0, 0.0, lead(-100.0, 20.0))
+    assert one.resets == other.resets == 1
+    for _ in range(5):
+        for mpc in (one, other):
+            drive(mpc, 20.0, 0.0, lead(40.0, 20.0), 1)
+        assert results(one) == results(other)
+
+
+def test_shared_solver_carries_no_state(long_solver, lead):
+    """Two instances on one solver, called in turn, compute what each computes alone."""
+    together = [LongitudinalMpc(i, long_solver) for i in (1, 2)]
+    alone = [LongitudinalMpc(i) for i in (1, 2)]
+    leads = (lead(30.0, 15.0), lead(60.0, 25.0, -1.0))
+    for _ in range(5):
+        for mpcs in (together, alone):
+            for mpc, seen in zip(mpcs, leads, strict=True):
+                drive(mpc, 20.0, 0.0, seen, 1)
+    assert [results(mpc) for mpc in together] == [results(mpc) for mpc in alone]
+
+
+def test_nodes():
+    """Five intervals of 0.2 s and fifteen of 0.6 s make 10 s."""
+    assert pytest.approx((0.2,) * 5 + (0.6,) * 15) == NODE_STEPS
