@@ -75,23 +75,33 @@ def _integrator(ocp: Ocp, step: ca.Function, n_steps: int) -> ca.Function:
     return ca.Function("integrate", [zu, p], [end, m])
 
 
-def _stage_terms(ocp: Ocp) -> tuple[ca.Function, ca.Function]:
-    """Gauss-Newton Hessian and gradient, by state and control, of a stage and of the terminal cost.
+def _gauss_newton(r: ca.SX, zu: ca.SX, change: ca.SX, weights: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Hessian and gradient of a cost by state and control; the gradient after `change` of the state."""
+    c = ca.jacobian(r, zu)
+    cw = c.T @ ca.diag(weights)
+    return cw @ c, cw @ (r + c[:, :-1] @ change)
 
-    Both are functions of (state and control, p, the state's change, factor on the weights); the
-    gradient is that at the changed state, for linearised residuals.
+
+def _backward(ocp: Ocp) -> tuple[ca.Function, ca.Function]:
+    """Costs from a node on, as Hessian and gradient by that node's state: at the end, and one node back.
+
+    End: (state, p, change of the state) -> (Hessian, gradient). One node back: (those of the next node,
+    derivative of the next state by state and control, state and control, p, change, factor on the
+    weights) -> (Hessian, gradient, second derivatives by control and all, derivative by the control).
     """
-    zu, p = ca.SX.sym("zu", ocp.n_state + 1), ca.SX.sym("p", ocp.n_param)
-    change, factor = ca.SX.sym("change", ocp.n_state), ca.SX.sym("factor")
-    functions = []
-    costs = zip(ocp.residuals(zu[:-1], zu[-1], p), (ocp.weights, ocp.terminal_weights), strict=True)
-    for r, weights in costs:
-        c = ca.jacobian(r, zu)
-        cw = c.T @ (factor * ca.diag(ca.DM(weights)))
-        functions.append(
-            ca.Function("stage", [zu, p, change, factor], [cw @ c, cw @ (r + c[:, :-1] @ change)])
-        )
-    return tuple(functions)
+    nx = ocp.n_state
+    zu, p, change = ca.SX.sym("zu", nx + 1), ca.SX.sym("p", ocp.n_param), ca.SX.sym("change", nx)
+    hess, grad, m = ca.SX.sym("hess", nx, nx), ca.SX.sym("grad", nx), ca.SX.sym("m", nx, nx + 1)
+    factor = ca.SX.sym("factor")
+    stage, terminal = ocp.residuals(zu[:-1], zu[-1], p)
+
+    block, slope = _gauss_newton(terminal, zu, change, ca.SX(ocp.terminal_weights))
+    end = ca.Function("end", [zu[:-1], p, change], [block[:nx, :nx], slope[:nx]])
+    block, slope = _gauss_newton(stage, zu, change, factor * ca.SX(ocp.weights))
+    block = ca.triu2symm(ca.triu(block + m.T @ (hess @ m)))
+    slope += m.T @ grad
+    outputs = [block[:nx, :nx], slope[:nx], block[:, nx], slope[nx]]
+    return end, ca.Function("back", [hess, grad, m, zu, p, change, factor], outputs)
 
 
 def _linearise(
@@ -109,9 +119,8 @@ def _condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     """(trajectory, first state, p) -> the program in the change of the controls.
 
     Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their
-    derivative by all controls. With E_k that derivative at node k, M that of an interval by its state
-    and control, and T_k the Hessian, by node k's state, of all costs from there on, column k of the
-    program's Hessian is made of E_k and M' T_{k+1} M: no large matrices are ever multiplied.
+    derivative by all controls. A column of the Hessian is made of that derivative at its node and of
+    the second derivatives of all costs from there on: no large matrices are ever multiplied.
     """
     n, nx = ocp.n_control, ocp.n_state
     old, z0, p = ca.SX.sym("old", ocp.n_trajectory), ca.SX.sym("z0", nx), ca.SX.sym("p", ocp.n_param)
@@ -120,20 +129,19 @@ def _condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
 
     change, sensitivity = [z0 - z[0]], [ca.SX(nx, 0)]
     intervals = _linearise(ocp, integrators, zu, p)
-    for k, (end, m) in enumerate(intervals):
+    for k, (following, m) in enumerate(intervals):
         a, b = m[:, :nx], m[:, nx]
-        change.append(end + a @ change[k] - z[k + 1])
+        change.append(following + a @ change[k] - z[k + 1])
         sensitivity.append(ca.horzcat(a @ sensitivity[k], b))
 
-    stage, terminal = _stage_terms(ocp)
+    end, back = _backward(ocp)
     columns, gradient = [], []
-    block, slope = terminal(ca.vertcat(z[n], 0), p, change[n], 1)
+    hess, grad = end(z[n], p, change[n])
     for k in reversed(range(n)):
-        m = intervals[k][1]
-        here, slope_here = stage(zu[k], p, change[k], ocp.intervals[k][1])
-        block, slope = m.T @ block[:nx, :nx] @ m + here, m.T @ slope[:nx] + slope_here
-        columns.append(ca.vertcat(sensitivity[k].T @ block[:nx, nx], block[nx, nx], ca.SX(n - 1 - k, 1)))
-        gradient.append(slope[nx])
+        factor = ocp.intervals[k][1]
+        hess, grad, by_u, slope = back(hess, grad, intervals[k][1], zu[k], p, change[k], factor)
+        columns.append(ca.vertcat(sensitivity[k].T @ by_u[:nx], by_u[nx], ca.SX(n - 1 - k, 1)))
+        gradient.append(slope)
 
     states = ca.vertcat(*z) + ca.vertcat(*change)
     derivative = ca.vertcat(*(ca.horzcat(e, ca.SX(nx, n - k)) for k, e in enumerate(sensitivity)))
