@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from mutator.cli.main import main
+from mutator.workspace import Workspace
 
-CLONE = Path(__file__).parents[2]
-TOY = CLONE / "tests" / "unit" / "mutator" / "toy"
+TOY = Path(__file__).parents[1] / "toy"
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,16 @@ def cli(capfd: pytest.CaptureFixture[str]) -> Cli:
 
 
 @pytest.fixture
-def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with library and target of the toy, named by the environment; the current one is another."""
-    root = tmp_path / "toy"
-    shutil.copytree(TOY, root, ignore=shutil.ignore_patterns("__pycache__"))
+def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The toy's root, named by the environment, without what is broken on purpose; one works elsewhere."""
+    root = toy.library.parent
+    shutil.rmtree(toy.library / "faults" / "hostile")
+    for template in (TOY / "templates").iterdir():
+        (toy.templates / template.name).unlink()
     here = tmp_path / "here"
     here.mkdir()
     monkeypatch.chdir(here)
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
-    monkeypatch.setenv("MUTATOR_TEMPLATES", str(CLONE / "templates"))
     return root
 
 

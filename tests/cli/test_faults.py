@@ -14,37 +14,37 @@ from mutator.mutant import unsplice
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 
 
-def test_diff_shows_one_diff_for_each_variant(cli: Cli, toy: Path) -> None:
+def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
     """Values of a variant share a diff, so each variant is shown once, without the probe's file."""
     answer = cli("diff", "sensor/distance")
     assert answer.code == 0
     headings = [line for line in answer.out.splitlines() if line.startswith("# ")]
-    assert len(headings) == 3
-    assert "sensor/distance/silent" in answer.out
+    assert len(headings) == 2
+    assert "sensor/distance/nearer" in answer.out
     assert "+++ b/toycar/_fi.py" not in answer.out
     assert "not shown: toycar/_fi.py" in answer.err
 
 
-def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, toy: Path) -> None:
+def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, root: Path) -> None:
     """`--value` replaces the drawn values."""
     answer = cli("diff", "sensor/distance", "--variant", "longer", "--value", "12.5")
     assert "sensor/distance/longer 12.5 m\n" in answer.out
     assert "gap = gap + 12.5  # fi:" in answer.out
 
 
-def test_a_whole_diff_can_be_applied(cli: Cli, toy: Path) -> None:
+def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
     """With `--patch` what is printed is a patch for the target's root, heading or not."""
-    answer = cli("diff", "sensor/distance", "--variant", "silent", "--trigger", "near", "--patch")
-    tree = toy / "target"
+    answer = cli("diff", "sensor/silence", "--trigger", "near", "--patch")
+    tree = root / "tree"
     subprocess.run(["patch", "-p1", "-s"], input=answer.out, text=True, cwd=tree, check=True)
     assert "return hwt <= 2.0" in (tree / "toycar" / "_fi.py").read_text()
 
 
-def test_a_spec_file_need_not_be_in_the_library(cli: Cli, toy: Path) -> None:
+def test_a_spec_file_need_not_be_in_the_library(cli: Cli, root: Path) -> None:
     """A spec file from anywhere is as good as a name."""
     own = Path("own.yaml")
-    shutil.move(toy / "fault_library" / "faults" / "sensor" / "distance.yaml", own)
-    assert cli("diff", own, "--variant", "silent").code == 0
+    shutil.move(root / "fault_library" / "faults" / "sensor" / "distance.yaml", own)
+    assert cli("diff", own).code == 0
 
 
 @pytest.mark.parametrize(
@@ -52,8 +52,8 @@ def test_a_spec_file_need_not_be_in_the_library(cli: Cli, toy: Path) -> None:
     [
         (["sensor/distanc"], "sensor/distance"),
         (["missing.yaml"], "missing.yaml"),
-        (["sensor/distance", "--variant", "shorter"], "longer, silent, both"),
-        (["sensor/distance", "--variant", "silent", "--value", "3"], "takes no value"),
+        (["sensor/distance", "--variant", "shorter"], "longer, nearer"),
+        (["sensor/silence", "--value", "3"], "takes no value"),
         (["sensor/distance", "--trigger", "hwt <"], "near, far"),
         (["sensor/distance", "--trigger", "__import__('os')"], "--trigger"),
         (["sensor/distance", "--reading", "as_guessed"], "as_described"),
@@ -61,7 +61,7 @@ def test_a_spec_file_need_not_be_in_the_library(cli: Cli, toy: Path) -> None:
         (["abcd"], "runs/"),
     ],
 )
-def test_wrong_choices_are_answered(cli: Cli, toy: Path, words: list[str], said: str) -> None:
+def test_wrong_choices_are_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
     """What does not exist is refused with 2 and the choices there are; no traceback."""
     answer = cli("diff", *words)
     assert answer.code == 2
@@ -74,30 +74,30 @@ def read_index(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_generate_writes_patches_that_apply(cli: Cli, toy: Path) -> None:
+def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
     """Every patch of the index applies to the pristine target and un-splices to it again."""
     out = Path("mutants")
     assert cli("generate", "sensor/*", "--out", out).code == 0
     index = read_index(out)
-    assert len(index) == 6 * 2  # faults x contexts
-    pristine = (toy / "target" / "toycar" / "sensor.py").read_bytes()
+    assert len(index) == 11 * 2  # faults x contexts
+    pristine = (root / "tree" / "toycar" / "sensing.py").read_bytes()
     for line in index:
         tree = Path("tree")
-        shutil.copytree(toy / "target", tree)
+        shutil.copytree(root / "tree", tree)
         patch = (out / line["patch"]).read_bytes()
         subprocess.run(["patch", "-p1", "-s"], input=patch, cwd=tree, check=True)
-        changed = (tree / "toycar" / "sensor.py").read_bytes()
+        changed = (tree / "toycar" / "sensing.py").read_bytes()
         assert changed != pristine
         assert unsplice(changed) == pristine
         shutil.rmtree(tree)
 
 
-def test_generated_trees_are_the_patched_ones(cli: Cli, toy: Path) -> None:
+def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
     """With `--trees` each mutant's whole tree stands beside its patch, and equals the patched target."""
     out = Path("mutants")
     cli("generate", "sensor/distance", "--out", out, "--trees", "--trigger", "near", "--trigger", "3")
     for line in read_index(out):
-        shutil.copytree(toy / "target", "tree")
+        shutil.copytree(root / "tree", "tree")
         subprocess.run(
             ["patch", "-p1", "-s"], input=(out / line["patch"]).read_bytes(), cwd="tree", check=True
         )
@@ -106,16 +106,16 @@ def test_generated_trees_are_the_patched_ones(cli: Cli, toy: Path) -> None:
         shutil.rmtree("tree")
 
 
-def test_the_index_tells_what_each_mutant_is(cli: Cli, toy: Path) -> None:
+def test_the_index_tells_what_each_mutant_is(cli: Cli, root: Path) -> None:
     """`--json` gives the index: ids, fault, value, trigger, files."""
     [near] = cli("generate", "sensor/distance", "--out", "m", "--trigger", "near", "--json").json[:1]
     assert near["spec"] == "sensor/distance/longer"
     assert near["condition"] == "hwt <= 2.0"
     assert near["unit"] == "m"
-    assert near["files"] == "toycar/_fi.py;toycar/sensor.py;toycar/world.py"
+    assert near["files"] == "toycar/_fi.py;toycar/go.py;toycar/sensing.py"
 
 
-def test_ids_are_stable(cli: Cli, toy: Path) -> None:
+def test_ids_are_stable(cli: Cli, root: Path) -> None:
     """The same input gives the same mutants with the same ids, byte for byte."""
     for out in ("a", "b"):
         cli("generate", "sensor/distance", "--out", out)
@@ -130,14 +130,14 @@ def test_ids_are_stable(cli: Cli, toy: Path) -> None:
         (["sensor/distance", "--campaign", "x"], "one or the other"),
     ],
 )
-def test_generate_refuses_what_it_cannot_do(cli: Cli, toy: Path, words: list[str], said: str) -> None:
+def test_generate_refuses_what_it_cannot_do(cli: Cli, root: Path, words: list[str], said: str) -> None:
     """Nothing to generate, or two sources at once, is wrong input."""
     answer = cli("generate", *words, "--out", "m")
     assert answer.code == 2
     assert said in answer.err
 
 
-def test_generate_does_not_mix_with_older_files(cli: Cli, toy: Path) -> None:
+def test_generate_does_not_mix_with_older_files(cli: Cli, root: Path) -> None:
     """A folder with something in it is refused and left as it was."""
     Path("m").mkdir()
     (Path("m") / "mine.txt").write_text("keep")

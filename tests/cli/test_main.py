@@ -106,10 +106,9 @@ def test_outside_a_clone_the_way_in_is_told(cli: Cli, nowhere: Path) -> None:
     assert "Traceback" not in answer.err
 
 
-def test_library_and_templates_are_found_by_options(cli: Cli, toy: Path, nowhere: Path) -> None:
+def test_library_and_templates_are_found_by_options(cli: Cli, root: Path, nowhere: Path) -> None:
     """The options that name the place work before and after the verb."""
-    clone = Path(__file__).parents[2]
-    place = ["--root", toy, "--templates", clone / "templates"]
+    place = ["--root", root.parent, "--library", root / "fault_library", "--templates", root / "templates"]
     before, after = cli(*place, "list", "specs"), cli("list", "specs", *place)
     assert before.code == after.code == 0
     assert "sensor/distance" in before.out
@@ -126,7 +125,7 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
 
 
 def test_an_error_shows_place_expectation_and_remedy(
-    cli: Cli, toy: Path, monkeypatch: pytest.MonkeyPatch
+    cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A MutatorError is told in one piece: file:line, what was got, what was expected, what to do."""
     here = Path.cwd() / "spec.yaml"
@@ -146,7 +145,7 @@ def test_an_error_shows_place_expectation_and_remedy(
     ],
 )
 def test_exit_codes(
-    cli: Cli, toy: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
+    cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
 ) -> None:
     """A failed check is 1, a full disk is the user's to mend (2), an interruption is 130; no traceback."""
     fail_with(monkeypatch, error)
@@ -156,7 +155,7 @@ def test_exit_codes(
     assert "Traceback" not in answer.err
 
 
-def test_a_defect_is_shown_in_full(cli: Cli, toy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An error nobody foresaw keeps its traceback, says that it is a defect, and exits with 3."""
     fail_with(monkeypatch, ZeroDivisionError("oops"))
     answer = cli("list", "specs")
@@ -173,6 +172,6 @@ def test_a_closed_pipe_is_no_error() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "{", "")
 
 
-def test_main_returns_the_code_of_a_verb(toy: Path) -> None:
+def test_main_returns_the_code_of_a_verb(root: Path) -> None:
     """`main` returns instead of exiting, so that a program may call it."""
     assert main(["list", "targets"]) == 0

@@ -1,0 +1,316 @@
+"""What runs something: `plan`, `run`, `report`, `show`, `rerun`, `clean`, `try`, on the toy target."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+TESTS = Path(__file__).parents[1]
+LIMIT = ["--limit", "8"]
+
+
+def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    """A `mutator` of its own, as a user starts it."""
+    command = [sys.executable, "-m", "mutator", *map(str, words)]
+    environment = os.environ | {"MUTATOR_ROOT": str(root)}
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=root)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """A root with runs/first, a finished run of eight experiments, and what the command said."""
+    root = tmp_path_factory.mktemp("finished") / "toy"
+    shutil.copytree(TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates", "hostile"))
+    shutil.copytree(TESTS.parent / "templates", root / "templates")
+    said = mutator(root, "run", "toy", "--out", "runs/first", "-n", "2", *LIMIT)
+    assert said.returncode == 0, said.stderr
+    return root, said
+
+
+@pytest.fixture
+def run(finished: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The finished run's folder; one works in its root."""
+    root, _ = finished
+    monkeypatch.chdir(root)
+    monkeypatch.setenv("MUTATOR_ROOT", str(root))
+    return root / "runs" / "first"
+
+
+def results(run: Path) -> list[str]:
+    return (run / "results.csv").read_text().splitlines()
+
+
+def experiment_with(run: Path, word: str) -> str:
+    """Id of the first experiment in whose row `word` stands."""
+    return next(line.split(",")[0] for line in results(run) if f",{word}," in line)
+
+
+def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
+    """A plan is written with its table, expected time and disk, and the command that runs it."""
+    answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
+    assert answer.code == 0
+    for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
+        assert wanted in answer.out
+    assert "run it: mutator run toy --out p -n 4" in answer.out
+    assert "sensor/lane" not in answer.out
+    assert (Path("p") / "plan.csv").read_text().startswith("experiment_id,")
+    assert not (Path("p") / "records").exists()
+
+
+def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
+    """The same campaign and seed give the same digest; another seed gives another."""
+    one, two = (cli("plan", "toy", "--out", out, "--json").json for out in "ab")
+    other = cli("plan", "toy", "--out", "c", "--seed", "8", "--json").json
+    assert one["digest"] == two["digest"] != other["digest"]
+    assert one["experiments"] == sum(group["experiments"] for group in one["groups"]) == 24
+    assert one["cost"]["wall_s"] > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["toys", "--out", "p"], "toy"),
+        (["toy", "--out", "p", "--only", "fault_typ == 'x'"], "fault_type"),
+        (["toy", "--out", "p", "--only", "value >"], "value >"),
+        (["toy", "--out", "p", "--exclude", "value >= 0 or trigger != ''"], "no experiment is left"),
+        (["toy", "--out", "p", "--reading", "as_read"], "as_described"),
+        (["toy", "--out", "full"], "not empty"),
+    ],
+)
+def test_what_cannot_be_planned_is_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
+    """A wrong name, expression, reading or folder is refused with 2 before anything is written."""
+    Path("full").mkdir()
+    Path("full/mine.txt").touch()
+    answer = cli("plan", *words)
+    assert answer.code == 2
+    assert said in answer.err
+    assert "Traceback" not in answer.err
+    assert not Path("p/run.json").exists()
+
+
+def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> None:
+    """The last lines are the counts for each fault type, and where the report is."""
+    root, said = finished
+    lines = said.stdout.splitlines()
+    assert lines[0].split()[:5] == ["fault", "type", "injected", "activated", "manifested"]
+    assert any(line.startswith("total ") for line in lines)
+    assert "8 of 8 experiments done, 8 now" in said.stdout
+    [report] = [line for line in lines if line.startswith("report: ")]
+    assert (root / "runs/first/report/REPORT.md").exists()
+    assert "runs/first/report/REPORT.md" in report
+    assert "experiments " in said.stderr  # progress goes beside, not into the result
+
+
+def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
+    """The same command on a complete run changes nothing and is fine."""
+    before = results(run)
+    answer = cli("run", "toy", "--out", run, *LIMIT)
+    assert answer.code == 0
+    assert "8 of 8 experiments done, 0 now" in answer.out
+    assert results(run) == before
+
+
+def test_run_as_json(cli: Cli, run: Path) -> None:
+    """A program gets numbers and paths, and nothing else on standard output."""
+    answer = cli("run", "toy", "--out", run, *LIMIT, "--json").json
+    assert (answer["planned"], answer["done"], answer["ran"]) == (8, 8, 0)
+    assert sum(answer["outcomes"].values()) == 8
+    assert Path(answer["report"]).exists()
+
+
+def test_other_choices_need_another_folder(cli: Cli, run: Path) -> None:
+    """A run folder goes on with the options it was planned with, or not at all."""
+    answer = cli("run", "toy", "--out", run, "--limit", "9")
+    assert answer.code == 2
+    assert "--limit" in answer.err
+
+
+def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
+    """Ctrl-C ends with 130, what is done, and the command that goes on; that command completes the run."""
+    words = ["run", "toy", "--out", "runs/cut", "--limit", "20"]
+    command = [sys.executable, "-m", "mutator", *words]
+    environment = os.environ | {"MUTATOR_ROOT": str(root)}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment, cwd=root
+    ) as process:
+        deadline = time.monotonic() + 60
+        while not any((root / "runs/cut").glob("records/*.jsonl")) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "go on: mutator run toy --out runs/cut --limit 20" in out + err
+    assert "Traceback" not in err
+    again = mutator(root, *words)
+    assert again.returncode == 0
+    assert "20 of 20 experiments done" in again.stdout
+
+
+def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
+    """Deleted results and report come back byte for byte."""
+    files = [run / "results.csv", run / "report/REPORT.md", run / "report/index.html"]
+    assert cli("report", run).code == 0
+    before = [file.read_bytes() for file in files]
+    for file in files:
+        file.unlink()
+    answer = cli("report", run)
+    assert answer.code == 0
+    assert [file.read_bytes() for file in files] == before
+    assert "report/REPORT.md" in answer.out
+
+
+def test_the_page_needs_nothing_from_elsewhere(cli: Cli, run: Path) -> None:
+    """The page is well-formed, loads nothing over the net, and its links lead to files of the run."""
+    page = Path(cli("report", run, "--json").json["page"])
+    text = page.read_text()
+    assert "http" not in text
+    assert "<script" not in text
+    links = [part.split('"')[0] for part in text.split('href="')[1:]]
+    assert len(links) >= 8
+    assert all((page.parent / link).is_file() for link in links)
+
+
+def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
+    """Diff, times and verdict are shown, and a plot is drawn where it says."""
+    name = experiment_with(run, "hazard")
+    answer = cli("show", name)
+    assert answer.code == 0
+    for wanted in (name, "# fi:", "verdict: hazard", "fault active first", "hazard H", "largest difference"):
+        assert wanted in answer.out
+    [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
+    assert ET.parse(plot).getroot().tag.endswith("svg")
+    assert "plot</a>" in Path(cli("report", run, "--json").json["page"]).read_text()
+
+
+def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
+    """As many digits as needed are enough; the newest run is taken unless one is named."""
+    name = experiment_with(run, "hazard")
+    answer = cli("show", name[:8], "--json", "--no-plot").json
+    assert answer["experiment"] == name
+    assert answer["outcome"] == "hazard"
+    assert answer["plot"] is None
+    assert cli("show", name[:8], "--run", run, "--no-plot").code == 0
+    assert cli("diff", name[:8]).code == 0
+
+
+@pytest.mark.parametrize("name", ["", "0123456789abcdef", "xyz"])
+def test_an_experiment_that_is_not_one_is_answered(cli: Cli, run: Path, name: str) -> None:
+    """No experiment, or too many, for an id is wrong input."""
+    answer = cli("show", name)
+    assert answer.code == 2
+    assert "Traceback" not in answer.err
+
+
+def test_show_before_the_run(cli: Cli, root: Path) -> None:
+    """A planned experiment can be looked at; it says that it has not run, and how to run it."""
+    cli("plan", "toy", "--out", "runs/p", "--limit", "2")
+    name = results_id(Path("runs/p/plan.csv"))
+    answer = cli("show", name)
+    assert answer.code == 0
+    assert "has not run yet" in answer.out
+    assert "# fi:" in answer.out
+
+
+def results_id(table: Path) -> str:
+    return table.read_text().splitlines()[1].split(",")[0]
+
+
+def test_rerun_gives_the_same_again(cli: Cli, run: Path) -> None:
+    """A second run of an experiment equals its record; without --trace nothing is left behind."""
+    name = experiment_with(run, "sdc")
+    answer = cli("rerun", name)
+    assert answer.code == 0
+    assert "the same as the campaign's record" in answer.out
+    assert not (run / "traces" / name).exists()
+
+
+def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
+    """With --trace the trace and a plot stay in the run folder."""
+    name = experiment_with(run, "sdc")
+    answer = cli("rerun", name, "--trace", "--json").json
+    assert answer["same_as_record"] is True
+    assert (Path(answer["traces"]) / "log.npz").is_file()
+    assert Path(answer["plot"]).is_file()
+
+
+def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path) -> None:
+    """A record that the run does not reproduce is a failed check."""
+    copy = tmp_path / "copy"
+    shutil.copytree(run, copy)
+    name = experiment_with(run, "hazard")
+    for file in (copy / "records").iterdir():
+        lines = [json.loads(line) for line in file.read_text().splitlines()]
+        for line in lines:
+            if line.get("experiment_id") == name:
+                line["t_manifest"] += 1.0
+        file.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    answer = cli("rerun", name, "--run", copy)
+    assert answer.code == 1
+    assert "DIFFERS" in answer.out
+
+
+def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
+    """A run folder goes; a folder that is none stays, and so does a run when nobody says yes."""
+    cli("plan", "toy", "--out", "runs/p", "--limit", "2")
+    Path("mine").mkdir()
+    assert cli("clean", "mine", "--yes").code == 2
+    assert cli("clean", "runs/p").code == 2  # nobody to ask
+    assert Path("runs/p/run.json").exists()
+    assert cli("clean", "runs/p", "--yes").code == 0
+    assert not Path("runs/p").exists()
+    assert Path("mine").exists()
+
+
+def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
+    """One fault from a file of one's own: diff, verdict, plot and traces, none of it in the library."""
+    shutil.move(root / "fault_library/faults/sensor/silence.yaml", "own.yaml")
+    answer = cli("try", "own.yaml", "--scenario", "A", "--trigger", "2")
+    assert answer.code == 0
+    for wanted in ("sensor/silence/no_data", "t >= 2.0", "if not _fi.active", "verdict: "):
+        assert wanted in answer.out
+    [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
+    assert Path(plot).is_file()
+
+
+def test_try_as_json(cli: Cli, root: Path) -> None:
+    """A program gets verdict, times and paths; the same fault has the same id each time."""
+    words = ("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1", "--json")
+    one, two = cli(*words).json, cli(*words).json
+    assert one == two
+    assert one["fault"] == "sensor/lane/shifted 2.4 m"
+    assert one["outcome"] == "hazard"
+    assert one["hazards_s"]["H3"] > one["activated_s"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["sensor/distance", "-s", "Z"], "one of A, B"),
+        (["sensor/distance"], "--scenario"),
+        (["sensor/distance", "-s", "A", "--value", "many"], "--value"),
+    ],
+)
+def test_what_cannot_be_tried_is_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
+    """A wrong scenario or value is refused with 2 and the choices."""
+    answer = cli("try", *words)
+    assert answer.code == 2
+    assert said in answer.err
+
+
+def test_generate_gives_the_mutants_of_a_campaign(cli: Cli, root: Path) -> None:
+    """Each mutant of the plan is written once, however many scenarios share it."""
+    index = cli("generate", "--campaign", "toy", "--out", "m", "--json").json
+    assert 0 < len(index) <= 24
+    assert len({line["mutant_id"] for line in index}) == len(index)
+    assert all((Path("m") / line["patch"]).is_file() for line in index)
