@@ -65,9 +65,8 @@ class Controlsd:
         car = self._car.update(frames, t)
         self.plan = self._make_plan(t, car, radar_state, model)
         events = self._collect_events(car)
-        v_cruise_before = self._v_cruise
         self._transition(t, car, events)
-        actuators = self._control(t, car, events, self._v_cruise != v_cruise_before)
+        actuators = self._control(t, car, events)
         self._alerts.process(t)
         self.state = self._publish(t, car, events)
         sent = self._car.apply(self._car_control(actuators), self._frame)
@@ -96,7 +95,7 @@ class Controlsd:
         if self._machine.update(events, self._alerts, t):
             self._v_cruise = initial_v_cruise(car.v_ego)
 
-    def _control(self, t: float, car: CarState, events: tuple[Event, ...], speed_set: bool) -> Actuators:
+    def _control(self, t: float, car: CarState, events: tuple[Event, ...]) -> Actuators:
         active = self._machine.active
         if self.plan.fcw:
             self._alerts.add("fcw", t)
@@ -108,7 +107,7 @@ class Controlsd:
         self._learn(car, active)
         gas, brake = self._longitudinal.update(active, car, self.plan)
         steer = self._lateral.update(t, car, active)
-        if not active or car.buttons or car.steering_pressed or speed_set:
+        if not active or car.buttons or car.steering_pressed:
             self._awareness.reset()
         if self._lateral.saturated and self._params.steer_limit_alert:
             self._alerts.add("steer_saturated", t)

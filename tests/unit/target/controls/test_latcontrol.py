@@ -46,6 +46,19 @@ def test_torque_is_that_of_the_degree_gains(params: CarParams) -> None:
     assert lateral.update(0.09, car, True) == pytest.approx(0.8 + 0.0024)
 
 
+def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
+    """While the driver steers, the integral does not grow and no saturation is told."""
+    lateral, _ = control(params, 5.0, 5.0)
+    car = CarState(v_ego=20.0, steering_pressed=True)
+    for k in range(100):
+        lateral.update(0.05 + k * 0.01, car, True)
+    assert not lateral.saturated
+    lateral.mpc.angles = [0.0, 0.0]
+    lateral.plan(1.1, car, LANES, 0.0)
+    lateral.plan(1.15, car, LANES, 0.0)
+    assert lateral.update(1.15, car, True) == 0.0
+
+
 @pytest.mark.parametrize(("v_ego", "active"), [(0.29, True), (20.0, False)])
 def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, active: bool) -> None:
     """Nearly at rest and out of control there is no torque and no history."""

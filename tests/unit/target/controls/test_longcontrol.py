@@ -83,6 +83,8 @@ def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
     start = control.output
     follow(control, at(0.3), plan(0.2), 101)
     assert control.output == pytest.approx(start - 0.2, abs=0.003)
+    follow(control, at(0.3), plan(0.2), 250)
+    assert control.output == pytest.approx(start - 0.7, abs=0.003)
     assert follow(stopped(params), at(0.0, standstill=True), plan(0.0)) == pytest.approx(
         (0.0, 0.5), abs=0.003
     )

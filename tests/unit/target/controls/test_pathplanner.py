@@ -42,6 +42,13 @@ def test_without_lines_the_model_path_is_followed() -> None:
     assert planner.c_prob == 0.0
 
 
+def test_unsure_lines_count_together() -> None:
+    """Two lines of 50 % make the middle 75 % sure, which is weighed against the model's path."""
+    planner = planned(model(path=0.7, probs=(0.5, 0.5)))
+    assert planner.c_prob == pytest.approx(0.75)
+    assert planner.d_poly[3] == pytest.approx(0.7 / 1.75)
+
+
 def test_one_line_is_enough() -> None:
     """With the left line alone the middle is half a width to its right."""
     planner = planned(model(left=2.0, right=-5.0, path=0.0, probs=(1.0, 0.0)))
@@ -65,6 +72,7 @@ def test_width_is_learnt_slowly() -> None:
 def test_width_unseen_is_that_of_usual_roads() -> None:
     """Without lines the certainty falls by 5 % a message and the width goes to the speed's usual one."""
     blind = [model(probs=(0.0, 0.0)) for _ in range(200)]
+    assert planned(*blind[:10], v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
     assert planned(*blind, v_ego=31.0).lane_width == pytest.approx(3.8, abs=1e-3)
     assert planned(*blind, v_ego=0.0).lane_width == pytest.approx(3.0, abs=1e-3)
 
