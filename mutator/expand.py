@@ -15,6 +15,8 @@ from mutator.paths import check_location
 from mutator.spec import AS_DESCRIBED, READINGS, Draw, FaultSpec, Variant
 from mutator.yamlio import Keys
 
+_REDRAWS = 100
+
 
 def expand(
     spec: FaultSpec,
@@ -40,22 +42,32 @@ def expand(
 def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
     """The values of `draw` for `seed`, in its own unit: one from each range, or the list as it is.
 
-    Each is low + u * width for one uniform number u of the generator's stream, so it depends on nothing but
-    seed, key and range.
+    The value of a range depends on nothing but seed, key, its place and the values before it: a value that
+    came before is drawn again (two equal faults would be one), and so is a real 0 (no error is no fault).
     """
     if draw.kind == "list":
         return draw.values
     stream = generator(seed, draw.key).random(len(draw.ranges))
-    values = []
-    for (low, high), u in zip(draw.ranges, map(float, stream), strict=True):
-        value: int | float
-        if draw.kind == "integers":
-            value = int(low) + math.floor(u * (int(high) - int(low) + 1))
-        else:
-            value = low + u * (high - low)
-            value = value if draw.decimals is None else round(value, draw.decimals)
-        values.append(value if draw.cap is None else type(value)(min(value, draw.cap)))
+    values: list[int | float] = []
+    for i, u in enumerate(map(float, stream)):
+        value = _value(draw, i, u)
+        for attempt in range(_REDRAWS):
+            if value not in values and not (value == 0 and draw.kind == "reals"):
+                break
+            value = _value(draw, i, float(generator(seed, f"{draw.key}/{i}/{attempt}").random()))
+        values.append(value)
     return tuple(values)
+
+
+def _value(draw: Draw, index: int, u: float) -> int | float:
+    """The value at `u` (0 to 1) of one range, rounded and capped as the draw says."""
+    low, high = draw.ranges[index]
+    if draw.kind == "integers":
+        whole = int(low) + math.floor(u * (int(high) - int(low) + 1))
+        return whole if draw.cap is None else min(whole, int(draw.cap))
+    value = low + u * (high - low)
+    value = value if draw.decimals is None else round(value, draw.decimals)
+    return value if draw.cap is None else float(min(value, draw.cap))
 
 
 class _Expander:

@@ -39,11 +39,10 @@ def test_a_spec_is_read(toy: Workspace) -> None:
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
     """Integers from whole ranges stay integers, in the order of the ranges, with the unit of the key."""
     found = of(faults(toy), "longer")
-    assert [f.value // 10 for f in found] == [1, 2, 3]  # type: ignore[operator]
+    assert [f.value // 10 for f in found] == [1, 2, 3]
     assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
     assert [dict(f.injections[0].params) for f in found] == [
-        {"by": float(f.value), "target": "gap"}  # type: ignore[arg-type]
-        for f in found
+        {"by": float(f.value), "target": "gap"} for f in found
     ]
 
 
@@ -51,9 +50,9 @@ def test_expansion_converts_units(toy: Workspace) -> None:
     """A value in km/h reaches a variable in m/s as m/s, its sign as the spec says; the table keeps km/h."""
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
-        assert by == pytest.approx(-float(fault.value) / 3.6)  # type: ignore[arg-type]
+        assert by == pytest.approx(-float(fault.value) / 3.6)
         assert fault.unit == "km/h"
-        assert fault.value == round(float(fault.value), 1)  # type: ignore[arg-type]
+        assert fault.value == round(float(fault.value), 1)
 
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
@@ -62,7 +61,7 @@ def test_both_readings_share_their_draws(toy: Workspace) -> None:
     assert [f.value for f in described] == [f.value for f in coded]
     assert all(f.reading == AS_CODED for f in coded)
     for fault in of(coded, "both"):
-        assert dict(fault.injections[1].params)["by"] == -float(fault.value)  # type: ignore[arg-type]
+        assert dict(fault.injections[1].params)["by"] == -float(fault.value)
     assert of(coded, "longer")[0].injections == of(described, "longer")[0].injections
 
 

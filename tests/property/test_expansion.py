@@ -1,0 +1,84 @@
+"""Expansion: values depend on seed, key and range, and on nothing else."""
+
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mutator.expand import draw_values, expand
+from mutator.model import Fault
+from mutator.spec import AS_CODED, AS_DESCRIBED, READINGS, Draw
+from mutator.workspace import Workspace
+
+CLONE = Workspace.find(root=Path(__file__).parents[2])
+MANIFEST, MODELS, SPECS = CLONE.manifest(), CLONE.fault_models(), CLONE.specs()
+SEEDS = st.integers(0, 2**63 - 1)
+RANGES = st.lists(
+    st.tuples(st.integers(-1000, 1000), st.integers(0, 100)).map(lambda p: (float(p[0]), float(p[0] + p[1]))),
+    min_size=1,
+    max_size=30,
+).map(tuple)
+
+
+def library(seed: int, reading: str) -> list[Fault]:
+    return [f for s in SPECS for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)]
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    SEEDS,
+    st.text(max_size=20),
+    RANGES,
+    st.sampled_from(["integers", "reals"]),
+    st.none() | st.integers(-5, 5),
+)
+def test_draws_lie_in_their_ranges(
+    seed: int, key: str, ranges: tuple[tuple[float, float], ...], kind: str, cap: int | None
+) -> None:
+    """One value from each range, whole where the ranges are, at most the cap, the same when asked again."""
+    draw = Draw(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
+    values = draw_values(draw, seed)
+    assert len(values) == len(ranges)
+    for value, (low, high) in zip(values, ranges, strict=True):
+        assert value == cap or low <= value <= high
+        assert cap is None or value <= cap
+        assert isinstance(value, int) == (kind == "integers")
+    assert values == draw_values(draw, seed)
+
+
+@settings(max_examples=100, deadline=None)
+@given(SEEDS, st.integers(1, 4))
+def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
+    """From overlapping ranges that hold enough values every value is another, and none is 0."""
+    ranges = tuple((-2.5 + 0.5 * i, -1.5 + 0.5 * i) for i in range(10))
+    draw = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges, decimals=decimals)
+    values = draw_values(draw, seed)
+    assert len(set(values)) == 10 and 0.0 not in values
+
+
+@settings(max_examples=50, deadline=None)
+@given(SEEDS, RANGES, st.integers(1, 29))
+def test_more_ranges_leave_earlier_values_alone(
+    seed: int, ranges: tuple[tuple[float, float], ...], count: int
+) -> None:
+    """A spec that grows at its end keeps the values it had."""
+    whole = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges)
+    part = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges[:count])
+    assert draw_values(part, seed) == draw_values(whole, seed)[:count]
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS)
+def test_readings_are_matched(seed: int) -> None:
+    """Whatever the seed, both readings have the same specs and values in the same order, and unique ids."""
+    described, coded = library(seed, AS_DESCRIBED), library(seed, AS_CODED)
+    assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
+    assert len({f.id for f in (*described, *coded)}) == 2 * 213
+
+
+@settings(max_examples=10, deadline=None)
+@given(SEEDS, st.permutations(SPECS), st.sampled_from(READINGS))
+def test_order_does_not_matter(seed: int, specs: list, reading: str) -> None:
+    """A fault is the same in whatever order, and in whatever company, its spec is expanded."""
+    found = {f.id for s in specs for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)}
+    assert found == {f.id for f in library(seed, reading)}

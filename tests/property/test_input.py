@@ -1,0 +1,105 @@
+"""Whatever stands in a file, it is read or refused; nothing else happens."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mutator import yamlio
+from mutator.anchors import parse_file
+from mutator.errors import MutatorError
+from mutator.render import literal, signed
+from mutator.spec import load_spec
+
+QUIET = [HealthCheck.function_scoped_fixture]
+SPEC = Path(__file__).parents[2] / "fault_library" / "faults" / "car_sensors" / "speed.yaml"
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=10,
+)
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=QUIET)
+@given(
+    st.binary(max_size=200)
+    | st.text(max_size=200).map(str.encode)
+    | st.text("a: -[]{}#&*!|>'\"\n\t%@", max_size=60).map(str.encode)
+)
+def test_any_bytes(tmp_path: Path, data: bytes) -> None:
+    """Arbitrary bytes are YAML of the strict kind, or a MutatorError that names the file."""
+    path = tmp_path / "x.yaml"
+    path.write_bytes(data)
+    try:
+        yamlio.load(path)
+    except MutatorError as error:
+        assert str(error).startswith(str(path))
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=QUIET)
+@given(PLAIN)
+def test_plain_data_survives(tmp_path: Path, value: object) -> None:
+    """What a YAML writer made of plain data is read back as it was, each part with a line."""
+    path = tmp_path / "x.yaml"
+    path.write_text(yaml.safe_dump(value, allow_unicode=True, default_style='"'), encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    if "!!" in text or "\x85" in text or "\u2028" in text or "\u2029" in text:
+        return
+    source = yamlio.load(path)
+    assert source.data == value
+    assert source.lines[()] == 1
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=QUIET)
+@given(st.data())
+def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
+    """A spec with a line dropped, doubled or garbled is read or refused with a MutatorError."""
+    lines = SPEC.read_text().splitlines()
+    i = data.draw(st.integers(0, len(lines) - 1))
+    how = data.draw(st.sampled_from(["drop", "double", "garble", "indent"]))
+    if how == "drop":
+        del lines[i]
+    elif how == "double":
+        lines.insert(i, lines[i])
+    elif how == "indent":
+        lines[i] = "  " + lines[i]
+    else:
+        j = data.draw(st.integers(0, len(lines[i])))
+        lines[i] = lines[i][:j] + data.draw(st.text(max_size=3)) + lines[i][j + 1 :]
+    path = tmp_path / "x.yaml"
+    path.write_text("\n".join(lines), encoding="utf-8", errors="surrogatepass")
+    try:
+        spec = load_spec(path)
+    except MutatorError as error:
+        assert str(error).startswith(str(path)) and error.got
+    else:
+        assert spec.count > 0
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
+def test_any_source(data: bytes) -> None:
+    """Arbitrary bytes are Python that can be spliced into, or a MutatorError."""
+    try:
+        file = parse_file("x.py", data, Path("root"))
+    except MutatorError as error:
+        assert "x.py" in str(error)
+    else:
+        assert b"".join(file.lines) == data
+
+
+@given(st.floats() | st.integers(-(10**30), 10**30))
+def test_numbers_survive_rendering(value: float) -> None:
+    """A rendered number is the number, to the last bit, also as a signed term."""
+    assert repr(eval(literal(value))) == repr(value)
+    if value == value:
+        assert eval(f"0 {signed(value)}") == value
+
+
+@pytest.mark.parametrize("value", [[1], {"a": 1}, object()])
+def test_only_numbers_and_names_are_rendered(value: object) -> None:
+    """Anything else in a template is an error."""
+    with pytest.raises(MutatorError):
+        literal(value)

@@ -1,0 +1,205 @@
+"""The check of library, templates and target; and the library that ships."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mutator import mutant
+from mutator.expand import expand
+from mutator.library_check import check_library
+from mutator.model import Fault, Hold
+from mutator.spec import READINGS
+from mutator.workspace import Workspace
+
+# Values per trigger of the fault types that need no image.
+COUNTS = {
+    ("radar", "chaff"): 24,
+    ("radar", "invisible_vehicle"): 6,
+    ("radar", "ghost_vehicle"): 31,
+    ("radar", "jamming"): 1,
+    ("car_sensors", "speed"): 12,
+    ("car_sensors", "steer"): 10,
+    ("vision_output", "camera_unavailable"): 1,
+    ("vision_output", "path_model"): 30,
+    ("vision_output", "relative_distance"): 49,
+    ("radar_vision", "relative_distance"): 49,
+}
+
+
+@pytest.fixture(scope="module")
+def faults() -> dict[str, tuple[Fault, ...]]:
+    """All faults of the library in both readings, seed 1."""
+    clone = Workspace.find(root=Path(__file__).parents[3])
+    manifest, models = clone.manifest(), clone.fault_models()
+    return {
+        reading: tuple(
+            fault
+            for spec in clone.specs()
+            for fault in expand(spec, 1, reading, models=models, manifest=manifest)
+        )
+        for reading in READINGS
+    }
+
+
+def test_the_library_that_ships_has_no_problem(clone: Workspace) -> None:
+    """Every spec expands, every anchor is found once, every shape compiles and un-splices."""
+    assert check_library(clone) == []
+
+
+def test_counts(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Each fault type has as many values as the experiments it reproduces, in both readings."""
+    for reading in READINGS:
+        assert Counter((f.module, f.fault_type) for f in faults[reading]) == COUNTS
+        assert len({f.id for f in faults[reading]}) == 213
+
+
+def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """An invisible vehicle seems faster, ghosts come closer; values lie in their ranges, in their units."""
+    by_spec: dict[str, list[Fault]] = {}
+    for fault in faults["as_described"]:
+        by_spec.setdefault(fault.spec, []).append(fault)
+
+    def params(spec: str, injection: int = 0) -> list[dict[str, object]]:
+        return [dict(f.injections[injection].params) for f in by_spec[spec]]
+
+    chaff = by_spec["radar/chaff/distance"]
+    assert all(15 + 10 * i <= f.value <= 24 + 10 * i for i, f in enumerate(chaff))
+    assert all(p["by"] > 0 for p in params("radar/invisible_vehicle/speed"))
+    assert params("radar/invisible_vehicle/speed")[-1]["by"] == pytest.approx(26.8224)
+    for spec in ("radar/ghost_vehicle/distance", "vision_output/relative_distance/shorter"):
+        assert len(by_spec[spec]) == 25
+        assert all(p["by"] < 0 and p["low"] == 0.0 for p in params(spec))
+    assert all(p["by"] < 0 for p in params("radar/ghost_vehicle/speed"))
+    assert all(p["low"] == 0.0 and p["by"] < 0 for p in params("car_sensors/speed/slower"))
+    assert all(p["high"] == pytest.approx(193.12128) for p in params("car_sensors/speed/faster"))
+    for i, fault in enumerate(by_spec["car_sensors/steer/angle"]):
+        assert -45 + 9 * i <= fault.value <= -36 + 9 * i
+    for side in ("left", "right", "both"):
+        for i, fault in enumerate(by_spec[f"vision_output/path_model/{side}"]):
+            assert -2.5 + 0.5 * i <= fault.value <= -1.5 + 0.5 * i
+    assert params("radar_vision/relative_distance/longer") == [
+        p | {"target": "d_rel"} for p in params("radar_vision/relative_distance/longer", 1)
+    ]
+
+
+def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Faults without lead aim at H2, steering and lanes at H3, the rest at H1; lost data stay lost."""
+    for fault in faults["as_described"]:
+        lateral = fault.fault_type in ("steer", "path_model", "camera_unavailable")
+        assert fault.aim == ("H3" if lateral else "H2" if fault.changes == ("no_lead",) else "H1")
+        assert (fault.hold is Hold.TO_END) == (fault.fault_type in ("jamming", "camera_unavailable"))
+    alone = Counter(f.fault_type for f in faults["as_described"] if f.changes)
+    assert alone == {"ghost_vehicle": 31, "speed": 6, "relative_distance": 50}
+
+
+def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Both readings have the same values; as coded, units slip, lanes drift and jamming stops all CAN."""
+    described, coded = faults["as_described"], faults["as_coded"]
+    assert [(f.spec, f.value) for f in described] == [(f.spec, f.value) for f in coded]
+    differing = {f.fault_type for f, g in zip(described, coded, strict=True) if f.injections != g.injections}
+    assert differing == {"speed", "steer", "path_model", "jamming"}
+    for fault, slipped in zip(described, coded, strict=True):
+        value = dict(fault.injections[0].params).get("by")
+        other = dict(slipped.injections[0].params)
+        if fault.fault_type == "speed":
+            assert other["by"] == pytest.approx(value / 3.6)
+            assert other.get("high", 85.0) == 85.0
+        if fault.fault_type == "steer":
+            assert abs(other["by"]) < 0.8 and other["by"] == pytest.approx(value / 57.29577951)
+        if fault.fault_type == "path_model":
+            assert {i.model for i in slipped.injections} == {"drift"}
+            assert (other["per_step"], other["stays"]) == (value, True)
+        if fault.fault_type == "jamming":
+            assert slipped.injections[0].location.path == "selfdrive/sim/simulator.py"
+
+
+def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Distance errors of radar, camera and both are the same numbers."""
+    values: dict[str, list[object]] = {}
+    for fault in faults["as_described"]:
+        values.setdefault(fault.spec, []).append(fault.value)
+    longer = values["radar/chaff/distance"]
+    shorter = values["radar/ghost_vehicle/distance"]
+    for module in ("vision_output", "radar_vision"):
+        assert values[f"{module}/relative_distance/longer"] == longer
+        assert values[f"{module}/relative_distance/shorter"] == shorter
+
+
+@pytest.mark.slow
+def test_every_mutant_of_the_library(clone: Workspace, faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Every fault, in both readings and all four contexts, compiles and un-splices to the original bytes."""
+    manifest, models = clone.manifest(), clone.fault_models()
+    triggers = clone.context_table("accelerate_decelerate").triggers(armed_after_s=1.5)
+    ids = set()
+    for fault in (*faults["as_described"], *faults["as_coded"]):
+        for trigger in triggers:
+            made = mutant.build(manifest, models, fault, trigger)
+            ids.add(made.id)
+            for path, data in made.files.items():
+                if path != manifest.probe_path:
+                    assert mutant.unsplice(data) == manifest.tree.files[path]
+    assert len(ids) == 2 * 213 * 4
+
+
+def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
+    """All problems of the toy library after one edit, without the folder's name."""
+    path = toy.library.parent / file
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    return [str(p).replace(f"{toy.library.parent}/", "") for p in check_library(toy, "toy")]
+
+
+def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
+    """Each variant that misses its statement is a problem of its own, at the line of the spec."""
+    problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "distance = truth.gap")
+    assert len(problems) == 4, "two variants in two readings"
+    assert problems[0].startswith(
+        "fault_library/faults/sensor/distance.yaml:12: sensor/distance/longer (as_described): "
+        "target/toycar/sensor.py:12: no assignment to 'gap' in Sensor.measure; expected one of 'distance' "
+        "(line 14)"
+    )
+
+
+def test_a_target_with_a_second_hit(toy: Workspace) -> None:
+    """An anchor that has become ambiguous is a problem with both candidates."""
+    problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "gap = 0\n        gap = truth.gap")
+    assert "assignment to 'gap' matches 2 statements in Sensor.measure: lines 14, 15" in problems[0]
+
+
+def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
+    """A broken table does not keep a broken spec from being told."""
+    (toy.library / "stpa" / "contexts" / "pedals.yaml").write_text("schema: context_table/9\n")
+    problems = edited(toy, "fault_library/faults/sensor/distance.yaml", "model: scale", "model: skale")
+    assert len(problems) == 2
+    assert "context_table/9" in problems[0] and "unknown fault model 'skale'" in problems[1]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        (
+            "fault_library/targets/toy.yaml",
+            "hazards: [H1]",
+            "hazards: [H1, H7]",
+            "hazard 'H7'; expected one of H1",
+        ),
+        (
+            "fault_library/stpa/contexts/pedals.yaml",
+            "provided: H1",
+            "provided: H7",
+            "hazard 'H7' of accelerate in near; expected one of H1, or null",
+        ),
+        (
+            "fault_library/targets/toy.yaml",
+            "after_assign: now",
+            "after_assign: then",
+            "world.py:17: no assignment to 'then' in World.step; expected one of 'now' (line 18)",
+        ),
+        ("target/toycar/world.py", "def step", "def step(", "target/toycar/world.py:17: not valid Python"),
+    ],
+)
+def test_other_problems(toy: Workspace, file: str, old: str, new: str, said: str) -> None:
+    """Unknown hazards, a lost place of observation and a target that does not parse are told."""
+    problems = edited(toy, file, old, new)
+    assert any(said in problem for problem in problems)

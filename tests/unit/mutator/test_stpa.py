@@ -1,0 +1,88 @@
+"""Context tables and hazards."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Hold, Trigger
+from mutator.stpa import load_context_table
+from mutator.trigger import evaluate
+from mutator.workspace import Workspace
+
+
+def test_rows_become_triggers(toy: Workspace) -> None:
+    """Each row gives a trigger of its name with the constants put in."""
+    near, far = toy.context_table("pedals").triggers(hold=Hold.TO_END, armed_after_s=1.5)
+    assert near == Trigger(name="near", condition="hwt <= 2.0", hold=Hold.TO_END, armed_after_s=1.5)
+    assert far.condition == "not hwt <= 2.0"
+    (only,) = toy.context_table("pedals").triggers(rows=("far",))
+    assert only.name == "far" and only.hold is Hold.WHILE
+
+
+def test_an_unknown_row(toy: Workspace) -> None:
+    """Asking for a row that is not there lists those that are."""
+    with pytest.raises(MutatorError, match="context 'C1'; expected one of near, far"):
+        toy.context_table("pedals").triggers(rows=("C1",))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("when: hwt <= safe_hwt_s", "when: hwt <= safe", "6: unknown name 'safe' in condition 'hwt <= safe'"),
+        ("when: hwt <= safe_hwt_s", "when: hwt", "6: 'hwt' is no truth value"),
+        ("safe_hwt_s: 2.0", "rs: 2.0", "3: constant 'rs'; expected a name of its own"),
+        ("safe_hwt_s: 2.0", "safe_hwt_s: two", "3: 'two' for 'safe_hwt_s'; expected a number"),
+        ("provided: H1,", "provided: 1,", "9: 1 for 'provided'; expected text"),
+    ],
+)
+def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
+    """A table is as strict as any other file, its conditions included."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        load_context_table(path)
+    assert said in str(caught.value).replace(f"{path}:", "")
+
+
+def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
+    """A hazard that leads nowhere known is refused at its line."""
+    assert toy.hazards().leads_to == {"H1": ("A1",)}
+    path = toy.library / "stpa" / "hazards.yaml"
+    path.write_text(path.read_text().replace("leads_to: [A1]", "leads_to: [A2]"))
+    with pytest.raises(MutatorError, match=r"hazards.yaml:4: accident 'A2'; expected one of A1"):
+        toy.hazards()
+
+
+def test_the_table_that_ships(clone: Workspace) -> None:
+    """Four contexts cover every observation exactly once; the paper's hazardous cells are there."""
+    table = clone.context_table("accelerate_decelerate")
+    triggers = table.triggers()
+    assert [t.name for t in triggers] == ["C1", "C2", "C3", "C4"]
+    for d_rel in (10.0, 40.0, 60.0, 200.0):
+        for v_ego in (0.0, 10.0, 20.0, 30.0):
+            for v_lead in (0.0, 10.0, 20.0, 30.0):
+                values = {"t": 1.0, "d_rel": d_rel, "v_ego": v_ego, "v_lead": v_lead}
+                assert sum(evaluate(t.condition, values) for t in triggers) == 1
+    cells = {
+        (row.id, action): (v.provided, v.not_provided)
+        for row in table.rows
+        for action, v in row.actions.items()
+        if v.provided or v.not_provided
+    }
+    assert cells == {
+        ("C2", "accelerate"): ("H1", None),
+        ("C2", "decelerate"): (None, "H1"),
+        ("C3", "accelerate"): (None, "H2"),
+        ("C3", "decelerate"): ("H2", None),
+        ("C4", "accelerate"): ("H1", None),
+        ("C4", "decelerate"): (None, "H1"),
+    }
+
+
+def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
+    """Another safe headway is one number in the file."""
+    text = (clone.library / "stpa" / "contexts" / "accelerate_decelerate.yaml").read_text()
+    path = tmp_path / "wide.yaml"
+    path.write_text(text.replace("safe_hwt_s: 2.0", "safe_hwt_s: 3"))
+    assert load_context_table(path).rows[1].condition == "hwt <= 3.0 and rs > 0.0"

@@ -1,0 +1,90 @@
+"""Where library, templates and targets are found."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A current folder outside any clone, no environment set."""
+    for name in ("ROOT", "LIBRARY", "TEMPLATES", "TARGET"):
+        monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    return place
+
+
+def test_found_upward(toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From any folder inside a clone the nearest library is found."""
+    root = toy.library.parent
+    (root / "templates").mkdir()
+    (root / "deep" / "down").mkdir(parents=True)
+    monkeypatch.chdir(root / "deep" / "down")
+    found = Workspace.find()
+    assert (found.library, found.templates) == (root / "fault_library", root / "templates")
+
+
+def test_options_go_before_the_environment(
+    toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An option beats a variable, and a single folder beats the root."""
+    root = toy.library.parent
+    (root / "templates").mkdir()
+    other = elsewhere / "library"
+    other.mkdir()
+    monkeypatch.setenv("MUTATOR_ROOT", str(root))
+    assert Workspace.find().library == root / "fault_library"
+    monkeypatch.setenv("MUTATOR_LIBRARY", str(other))
+    assert Workspace.find().library == other
+    assert Workspace.find(library=root / "fault_library").library == root / "fault_library"
+    monkeypatch.setenv("MUTATOR_TARGET", str(other))
+    assert Workspace.find().target == other
+    assert Workspace.find(target=root / "target").target == root / "target"
+
+
+def test_nothing_found(elsewhere: Path) -> None:
+    """Outside a clone the message says which options and variables help."""
+    with pytest.raises(
+        MutatorError, match=r"no folder fault_library/ here or in any folder above.*MUTATOR_ROOT"
+    ):
+        Workspace.find()
+    with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*--library"):
+        Workspace.find(library=elsewhere / "none", templates=elsewhere)
+
+
+def test_names_and_paths(toy: Workspace) -> None:
+    """Everything of the library is found by name or by the path of its file."""
+    assert toy.target_names() == ("toy",)
+    assert toy.scenario_names() == ("follow",)
+    assert toy.context_table_names() == ("pedals",)
+    assert toy.campaign_names() == ()
+    path = toy.library / "scenarios" / "follow.yaml"
+    assert toy.scenario("follow") == toy.scenario(path) == path
+    assert toy.spec_files() == (toy.library / "faults" / "sensor" / "distance.yaml",)
+    with pytest.raises(
+        MutatorError, match=r"no scenario 'folow'; expected one of follow.*did you mean 'follow'"
+    ):
+        toy.scenario("folow")
+    with pytest.raises(
+        MutatorError, match="no campaign 'x'; expected one of none, or the path of a YAML file"
+    ):
+        toy.campaign("x")
+
+
+def test_names_do_not_lead_out(toy: Workspace) -> None:
+    """A name with dots is not followed out of the library."""
+    with pytest.raises(MutatorError, match="no fault spec"):
+        toy.spec("../targets/toy")
+
+
+def test_specs_lie_where_their_names_say(toy: Workspace) -> None:
+    """A spec's file is named after its module and fault type, so that names are unique."""
+    path = toy.library / "faults" / "sensor" / "distance.yaml"
+    path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
+    with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):
+        toy.specs()
