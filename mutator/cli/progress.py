@@ -33,26 +33,27 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
 
 @contextmanager
 def _live(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=24),
-        MofNCompleteColumn(),
+        TextColumn("{task.fields[count]}"),
         TextColumn("{task.fields[outcomes]}"),
         TimeElapsedColumn(),
         TextColumn("{task.fields[remaining]}"),
     )
     with Bars(*columns, console=terminal.err, transient=True) as bars:
-        task = bars.add_task("starting", total=None, outcomes="", remaining="")
+        task = bars.add_task("starting", total=None, count="", outcomes="", remaining="")
 
         def notify(progress: "Progress") -> None:
             bars.update(
                 task,
                 description=STAGES.get(progress.stage, progress.stage),
                 completed=progress.done,
-                total=progress.total or None,
+                total=progress.total or 1,  # a stage without a count has an empty bar
+                count=count(progress),
                 outcomes=endings(progress.outcomes) or progress.detail,
                 remaining=remaining(progress),
             )
@@ -73,10 +74,14 @@ class _Lines:
         if progress.stage == self.stage and now < self.next_s:
             return
         self.stage, self.next_s = progress.stage, now + LINE_EVERY_S
-        name = STAGES.get(progress.stage, progress.stage)
-        parts = [f"{name} {progress.done}/{progress.total}" if progress.total else name]
+        parts = [f"{STAGES.get(progress.stage, progress.stage)} {count(progress)}".rstrip()]
         parts += [part for part in (endings(progress.outcomes), remaining(progress)) if part]
         self.terminal.note(", ".join(parts))
+
+
+def count(progress: "Progress") -> str:
+    """`12/60`, where there is something to count."""
+    return f"{progress.done}/{progress.total}" if progress.total else ""
 
 
 def endings(outcomes: Counter[str]) -> str:
