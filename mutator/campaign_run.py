@@ -26,6 +26,7 @@ from mutator.chunks import Pending, pending
 from mutator.engine import prepare_base
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.ids import digest
+from mutator.jsonio import DiskFull
 from mutator.locks import owned
 from mutator.model import Status
 from mutator.plan import Choices, freeze_owned, make_folder, make_plan
@@ -136,12 +137,16 @@ class Session:
         records = read_records(self.folder.path)
         wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
         done = len(records) - len(wrong)
-        built = results.up_to_date(self.folder.path) or results.build(self.folder.path)
+        built = None
+        try:
+            built = results.up_to_date(self.folder.path) or results.build(self.folder.path)
+        except DiskFull as err:  # the records are there, the table can be made any time
+            self.problem = self.problem or str(err)
         return Summary(
             planned=self.folder.planned,
             done=done,
             ran=done - self._done_before,
-            outcomes=Counter(label(r.status.value, r.outcome) for r in records.values()),
+            outcomes=Counter(label(r.status, r.outcome) for r in records.values()),
             harness_errors=tuple(sorted(wrong.items())),
             problem=self.problem,
             interrupted=self.interrupted,
@@ -232,8 +237,14 @@ def _run_pytest(begun: Session) -> None:
     folder = begun.folder.path
     arguments = [
         *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
-        *("-p", "mutator" if installed else "mutator.pytest_plugin"),
-        *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest"),
+        *(
+            "--disable-plugin-autoload",
+            "-p",
+            "xdist",
+            "-p",
+            "mutator" if installed else "mutator.pytest_plugin",
+        ),
+        *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest", "--assert=plain"),
         *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(begun.workers)),
     ]
     output = _Silent()
@@ -248,7 +259,7 @@ class _Silent:
     def __init__(self) -> None:
         self.text = io.StringIO()
 
-    @pytest.hookimpl
+    @pytest.hookimpl(trylast=True)  # after the reporter was made, before xdist (registered later) takes it
     def pytest_configure(self, config: pytest.Config) -> None:
         manager = config.pluginmanager
         manager.unregister(name="terminalreporter")

@@ -15,6 +15,7 @@ from mutator.ids import digest
 from mutator.jsonio import read_json, write_json
 from mutator.manifest import TargetManifest
 from mutator.model import Experiment, Status
+from mutator.mutant import InvalidMutant
 from mutator.provenance import sources, versions
 from mutator.records import Progress
 from mutator.runfolder import RunFolder
@@ -248,12 +249,14 @@ class _Checks:
         yield _result("canary", problem, f"reached {self.hazard}")
 
     def _anchors(self) -> CheckResult:
-        """One mutant of each variant in the plan can be built."""
+        """Each variant of the plan finds its statements (not compiling is a result, told later)."""
         variants = {fault.spec: fault for fault in planfile.read_faults(self.folder.path).values()}
         problems = []
         for fault in variants.values():
             try:
                 mutant.build(self.manifest, self.models, fault, always())
+            except InvalidMutant:
+                continue
             except MutatorError as err:
                 problems.append(f"{fault.spec}: {err}")
         return _result("anchors", "; ".join(problems), f"{len(variants)} variants found their statements")

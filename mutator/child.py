@@ -76,7 +76,9 @@ def describe(err: BaseException, tree: str, probe: Any) -> dict[str, Any]:
     if probe is not None and isinstance(err, probe.StepLimit):
         return {"ended": "steps"}
     where = place(err, tree)
-    text = f"exit status {err.code}" if isinstance(err, SystemExit) else f"{type(err).__name__}: {err}"
+    text = f"exit status {err.code}" if isinstance(err, SystemExit) else type(err).__name__
+    if str(err) and not isinstance(err, SystemExit):
+        text += f": {err}"
     full = isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
     return {"ended": "error", "error": text + where, "disk_full": full}
 

@@ -148,7 +148,7 @@ def read_records(run: Path) -> dict[str, Record]:
 
 def label(status: str, outcome: str | None) -> str:
     """What Progress counts: the outcome of what ran, else the status."""
-    return outcome or status
+    return str(outcome or status)
 
 
 class Tail:

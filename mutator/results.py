@@ -38,21 +38,21 @@ class Results:
     planned: int
 
 
-def row(experiment: Experiment, record: Record) -> dict[str, object]:
-    """One row: `COLUMNS`, further hazards and channels of the target, `variant, aim, condition, detail`.
+def row(experiment: Experiment, record: Record, hazards: Sequence[str] = _HAZARDS) -> dict[str, object]:
+    """One row: `COLUMNS`, the target's own hazards and channels, `variant, aim, condition, detail`.
 
-    None for nothing; flags are 0 or 1; times are seconds of simulation since its start.
+    `hazards` are those that the target checks. None for nothing; flags are 0 or 1; times are seconds of
+    simulation since its start.
     """
     activation = record.activation
     ok = record.status is Status.OK
-    known = ok or record.status is Status.CRASHED
     cells: dict[str, object] = plan_row(experiment)
     cells |= {
         "status": record.status.value,
         "outcome": record.outcome.value if record.outcome else None,
-        "activated": int(activation is not None) if known else None,
+        "activated": 1 if activation else (0 if ok else None),
         "t_activation": _time(activation.first) if activation else None,
-        "activations": activation.count if activation else (0 if known else None),
+        "activations": activation.count if activation else (0 if ok else None),
         "manifested": int(record.t_manifest is not None) if ok else None,
         "t_manifest": _time(record.t_manifest),
         "alerts": ";".join(name for name, _ in record.alerts) or None,
@@ -61,7 +61,7 @@ def row(experiment: Experiment, record: Record) -> dict[str, object]:
         "detail": record.detail or None,
     }
     times = dict(record.hazards)
-    for name in (*_HAZARDS, *times):
+    for name in hazards:
         cells[name.lower()] = int(name in times) if ok else None
         cells[f"t_{name.lower()}"] = _time(times.get(name))
     columns = deviation_columns([name for name, _ in record.max_dev])
@@ -89,7 +89,8 @@ def build(run: Path) -> Results:
     folder = RunFolder.open(run)
     records = read_records(folder.path)
     experiments = sorted(planfile.read_all(folder.path), key=lambda e: e.id)
-    rows = [row(e, records[e.id]) for e in experiments if e.id in records]
+    hazards = folder.head["hazards"]
+    rows = [row(e, records[e.id], hazards) for e in experiments if e.id in records]
     columns = _columns(folder)
     write_atomic(folder.path / "results.csv", _csv(rows, columns))
     schema = pa.schema([(name, _type(name, pa)) for name in columns])

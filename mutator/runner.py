@@ -1,5 +1,6 @@
 """From experiments to records: build each mutant, have an engine run it, compare with golden, judge."""
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -74,7 +75,7 @@ class Runner:
                 try:
                     built = mutant.build(self.manifest, self.models, experiment.fault, experiment.trigger)
                 except MutatorError as err:
-                    refused.append(_refused(experiment, err))
+                    refused.append(self._refused(experiment, err))
                     continue
                 started[experiment.id] = (experiment, built)
                 yield self._job(experiment, built)
@@ -94,6 +95,11 @@ class Runner:
             files=built.files,
             mutant=built.id,
         )
+
+    def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
+        status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
+        place = f"{err.where.removeprefix(str(self.manifest.root) + os.sep)}: " if err.where else ""
+        return Finished(experiment=experiment, record=_bare(experiment, status, place + err.got, None))
 
     def _finish(self, experiment: Experiment, built: Mutant, execution: Execution) -> Finished:
         try:
@@ -162,11 +168,6 @@ def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> s
         return ""
     when = "although the fault was never active" if activation is None else f"before {activation.first} s"
     return f"differs from golden at {t_first} s, {when}"
-
-
-def _refused(experiment: Experiment, err: MutatorError) -> Finished:
-    status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
-    return Finished(experiment=experiment, record=_bare(experiment, status, str(err), None))
 
 
 def _bare(

@@ -53,7 +53,7 @@ def run_single(
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
         goldens = Goldens(manifest, lambda scenario, changes: reference)
         runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
-        finished = next(_kept(runner.run([experiment]), out))
+        (finished,) = _kept(runner.run([experiment]), out)
     return Single(
         experiment=experiment,
         mutant=finished.mutant,

@@ -1,0 +1,1 @@
+"""A car that follows another, for tests."""
