@@ -218,33 +218,35 @@ def _choose(
     nth = anchor.nth
     if hits and (len(hits) == 1 if nth is None else nth <= len(hits)):
         return hits[(nth or 1) - 1]
-    what = _what(verb, anchor.name)
-    place = f"in {location.function}"
+    raise _no_single_hit(file, location, functions, pairs, hits)
+
+
+def _no_single_hit(
+    file: ParsedFile,
+    location: FaultLocation,
+    functions: tuple[Function, ...],
+    pairs: list[tuple[Function, Statement]],
+    hits: list[tuple[Function, Statement]],
+) -> MutatorError:
+    """Why none of `pairs` (what bears the name) or `hits` (those that are statements) can be taken."""
+    anchor = location.anchor
+    verb = anchor.kind.partition("_")[2]
+    what, place = _what(verb, anchor.name), f"in {location.function}"
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
+        take = f"`nth: 1` to `nth: {len(hits)}`"
         got = f"{what} matches {len(hits)} statements {place}: lines {lines}"
-        remedy = (
-            f"add `nth: 1` to `nth: {len(hits)}`" if nth is None else f"nth is {nth}: take 1 to {len(hits)}"
-        )
-        raise MutatorError(
-            got, where=file.where, line=hits[0][1].first + 1, expected="exactly one", remedy=remedy
-        )
-    if pairs:
+        remedy = f"add {take}" if anchor.nth is None else f"nth is {anchor.nth}: take {take}"
+        line, expected = hits[0][1].first, "exactly one"
+    elif pairs:
         statement = pairs[0][1]
-        raise MutatorError(
-            f"{what} {place} is no statement of its own: {statement.reason}",
-            where=file.where,
-            line=statement.first + 1,
-            expected="a statement that does nothing else",
-            remedy="anchor at another statement",
-        )
-    raise MutatorError(
-        f"no {what} {place}",
-        where=file.where,
-        line=functions[0].line + 1,
-        expected=_candidates(functions, verb),
-        remedy="correct the name as it is written in the source",
-    )
+        got = f"{what} {place} is no statement of its own: {statement.reason}"
+        line, expected = statement.first, "a statement that does nothing else"
+        remedy = "anchor at another statement"
+    else:
+        got, line, expected = f"no {what} {place}", functions[0].line, _candidates(functions, verb)
+        remedy = "correct the name as it is written in the source"
+    return MutatorError(got, where=file.where, line=line + 1, expected=expected, remedy=remedy)
 
 
 def _what(verb: str, name: str) -> str:

@@ -104,7 +104,8 @@ class Trigger:
 class Fault:
     """One fault with its value drawn: what is injected, where, and what it aims at.
 
-    `value` and `unit` are as the spec states them (for tables); `injections` carry SI values.
+    `value` and `unit` are as the spec states them (for tables); `injections` carry numbers in the unit of
+    the variable they change.
     `hold` overrides the trigger's when the fault by its nature latches. `changes` are the changes
     of the scenario that belong to the fault (`no_lead`).
     """

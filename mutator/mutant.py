@@ -58,7 +58,8 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     _add(edits, manifest.observation.location.path, _observation(manifest))
     for name, injection in zip(names, injections, strict=True):
         check_location(manifest, injection.location)
-        _add(edits, injection.location.path, edit_for(manifest, models, injection, name))
+        file = manifest.tree.parsed(injection.location.path)
+        _add(edits, file.path, injection_edit(file, models, injection, name))
     probe = _probe(manifest, models, mutant_id, trigger, hold, names)
     files = {manifest.probe_path: probe}
     patches = {manifest.probe_path: patch.new_file(manifest.probe_path, probe.splitlines(keepends=True))}
@@ -81,14 +82,8 @@ def injection_id(index: int, injection: Injection) -> str:
     return content_id([index, injection])[:8]
 
 
-def edit_for(manifest: TargetManifest, models: FaultModels, injection: Injection, name: str) -> splice.Edit:
-    """The edit of one injection, its anchor resolved and its snippet rendered."""
-    file = manifest.tree.parsed(injection.location.path)
-    return injection_edit(file, models, injection, name)
-
-
 def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> splice.Edit:
-    """As `edit_for`, in a file at hand."""
+    """The edit of one injection in its file: anchor resolved, names checked, snippet rendered."""
     model = models.get(injection.model)
     site = file.resolve(injection.location)
     params = dict(injection.params)

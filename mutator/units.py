@@ -44,8 +44,3 @@ def convert(number: float, source: Unit, target: Unit) -> float:
     if source.factor == target.factor:
         return float(number)
     return number * source.factor / target.factor
-
-
-def si(unit: Unit) -> Unit:
-    """The unit in which quantities of `unit`'s dimension are kept inside."""
-    return next(u for u in UNITS.values() if u.dimension == unit.dimension and u.factor == 1.0)

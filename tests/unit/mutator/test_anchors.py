@@ -102,7 +102,7 @@ def test_functions_are_found_by_qualified_name() -> None:
             AnchorKind.AFTER_ASSIGN, "a", "A.run", None,
             ["m.py:15: assignment to 'a' matches 2 statements", "lines 15, 21", "add `nth: 1` to `nth: 2`"],
         ),
-        (AnchorKind.AFTER_ASSIGN, "a", "A.run", 3, ["matches 2 statements", "nth is 3: take 1 to 2"]),
+        (AnchorKind.AFTER_ASSIGN, "a", "A.run", 3, ["nth is 3: take `nth: 1` to `nth: 2`"]),
         (AnchorKind.AFTER_ASSIGN, "g", "A.run", None, ["no assignment to 'g'"]),
         (AnchorKind.AFTER_ASSIGN, "i", "A.run", None, ["m.py:20:", "it is the target of a `for`"]),
         (AnchorKind.AFTER_ASSIGN, "h", "A.run", None, ["m.py:22:", "it is bound by `as`"]),

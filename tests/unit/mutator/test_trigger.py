@@ -98,6 +98,8 @@ def test_random_times_are_starts_of_steps() -> None:
 
 
 def test_random_times_need_an_interval() -> None:
-    """An interval that ends before it starts is refused."""
+    """An interval that ends before it starts, and a negative seed, are refused."""
+    with pytest.raises(MutatorError, match="seed -1; expected 0 or more"):
+        draw_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
     with pytest.raises(MutatorError, match="expected an interval"):
         draw_time(1, "k", first_s=2.0, last_s=1.0, step_s=0.01)
