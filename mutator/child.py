@@ -21,7 +21,7 @@ from typing import Any
 
 _PR_SET_PDEATHSIG = 1
 _FILE_LIMIT = 1 << 28  # bytes that a run may write into one file
-_HARD_CPU_EXTRA_S = 5  # who ignores SIGXCPU is killed this much later
+_HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 
 
 def main(job_file: str) -> int:

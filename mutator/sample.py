@@ -50,6 +50,7 @@ def _marks(cell: _Cell) -> Iterable[Hashable]:
     yield variant, method
     yield variant, "scenario", scenario
     yield variant, "trigger", trigger
+    yield method, scenario
     yield "method", method
     yield "scenario", scenario
     yield "trigger", trigger

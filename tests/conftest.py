@@ -1,18 +1,45 @@
 """Fixtures that several kinds of tests share."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mutator.model import (
+    Activation,
+    Anchor,
+    AnchorKind,
+    Experiment,
+    Fault,
+    FaultLocation,
+    Hold,
+    Injection,
+    Method,
+    Outcome,
+    Record,
+    Status,
+    Trigger,
+)
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
 
 
 @pytest.fixture
-def toy(tmp_path: Path) -> Workspace:
-    """A copy of the toy target's library and tree, with the project's templates and the hostile ones."""
+def toy(toycar: Workspace) -> Workspace:
+    """The toy of every kind of test but the unit tests of specs and mutants, which have one of their own."""
+    return toycar
+
+
+@pytest.fixture
+def toycar(tmp_path: Path) -> Workspace:
+    """A copy of the toy car's library and tree, with the project's templates and the hostile ones."""
+    return copy_toycar(tmp_path)
+
+
+def copy_toycar(tmp_path: Path) -> Workspace:
     shutil.copytree(
         _TESTS / "toy", tmp_path / "toy", ignore=shutil.ignore_patterns("__pycache__", "templates")
     )
@@ -20,3 +47,67 @@ def toy(tmp_path: Path) -> Workspace:
     shutil.copytree(_TESTS.parent / "templates", templates)
     shutil.copytree(_TESTS / "toy" / "templates", templates, dirs_exist_ok=True)
     return Workspace(library=tmp_path / "toy" / "fault_library", templates=templates)
+
+
+@pytest.fixture
+def experiment() -> Callable[..., Experiment]:
+    """Makes an experiment that differs from the others made in what is given."""
+
+    def make(
+        value: float = 1.0,
+        scenario: str = "S1",
+        method: Method = Method.GUIDED,
+        trigger: str = "C1",
+        spec: str = "radar/chaff/distance",
+        changes: tuple[str, ...] = (),
+    ) -> Experiment:
+        module, fault_type, _ = spec.split("/")
+        place = FaultLocation(
+            path="pkg/radar.py", function="measure", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="d_rel")
+        )
+        params = (("by", value), ("target", "d_rel"))
+        fault = Fault(
+            spec=spec,
+            module=module,
+            fault_type=fault_type,
+            reading="as_described",
+            value=value,
+            unit="m",
+            aim="H1",
+            injections=(Injection(location=place, model="offset", params=params),),
+            changes=changes,
+        )
+        condition = "t >= 2.0" if method is Method.RANDOM else "hwt <= 2.0"
+        return Experiment(
+            fault=fault,
+            scenario=scenario,
+            scenario_digest="d" * 64,
+            method=method,
+            trigger=Trigger(name=trigger, condition=condition, hold=Hold.WHILE, armed_after_s=1.5),
+            seed=7,
+        )
+
+    return make
+
+
+@pytest.fixture
+def record() -> Callable[..., Record]:
+    """Makes a record of an experiment that went well and whose fault was masked, but for what is given."""
+
+    def make(experiment_id: str = "e" * 16, **given: Any) -> Record:
+        fields: dict[str, Any] = {
+            "experiment_id": experiment_id,
+            "status": Status.OK,
+            "outcome": Outcome.MASKED,
+            "detail": "",
+            "tree": "t" * 64,
+            "activation": Activation(first=2.0, last=3.0, count=5),
+            "t_manifest": None,
+            "max_dev": (("gas", 0.0), ("brake", 0.0), ("steer_torque", 0.0)),
+            "hazards": (),
+            "alerts": (),
+            "trace_digest": "f" * 64,
+        }
+        return Record(**fields | given)
+
+    return make
