@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mutator.cli.console import Terminal
+from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Exclude, Json, Limit, Only, OutRun, Place, Reading, Seed, with_place
 from mutator.cli.progress import duration
 from mutator.errors import MutatorError
@@ -77,7 +77,7 @@ def plan(
         total=True,
     )
     terminal.say(f"expected: {_cost_line(cost)}")
-    terminal.say(f"plan: {folder.path / 'plan.csv'} (digest {made.digest[:16]})")
+    terminal.say(f"plan: {short_path(folder.path / 'plan.csv')} (digest {made.digest[:16]})")
     terminal.say(f"run it: mutator run {campaign} --out {out} -n {workers}")
 
 
@@ -212,7 +212,7 @@ def report(
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
     show_counts(terminal, run)
-    terminal.say(f"report: {written.markdown} and {written.page}")
+    terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
 
 
 CLEAN_EXAMPLES = """\b
@@ -237,7 +237,7 @@ def clean(
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
-        typer.confirm(f"delete {', '.join(map(str, folders))}?", abort=True)
+        typer.confirm(f"delete {', '.join(map(short_path, folders))}?", abort=True)
     for folder in folders:
         runfolder.clean(folder)
-        terminal.say(f"deleted {folder}")
+        terminal.say(f"deleted {short_path(folder)}")

@@ -175,7 +175,7 @@ def short_path(where: str | Path | None) -> str:
         return ""
     path = Path(where)
     try:
-        return str(path.relative_to(Path.cwd()) if path.is_absolute() else path)
+        return str(path.relative_to(Path.cwd()) if path.is_absolute() and path != Path.cwd() else path)
     except ValueError:
         return str(where)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mutator.cli import choose
-from mutator.cli.console import STYLES, Terminal
+from mutator.cli.console import STYLES, Terminal, short_path
 from mutator.cli.diffs import readable
 from mutator.errors import MutatorError
 
@@ -182,5 +182,5 @@ def not_run(found: Found) -> MutatorError:
     return MutatorError(
         f"experiment {found.experiment.id} has not run yet",
         where=found.folder.path,
-        remedy=f"run it: `mutator run {found.plan.campaign.name} --out {found.folder.path}`",
+        remedy=f"run it: `mutator run {found.plan.campaign.name} --out {short_path(found.folder.path)}`",
     )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mutator.cli.console import Terminal
+from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
 from mutator.errors import EXIT_CHECK_FAILED
 
@@ -57,7 +57,7 @@ def show(
         return
     view.print_verdict(terminal, found.record)
     if drawn:
-        terminal.say(f"plot: {drawn}")
+        terminal.say(f"plot: {short_path(drawn)}")
 
 
 def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | None:
@@ -127,8 +127,8 @@ def rerun(
     view.print_verdict(terminal, single.record)
     terminal.say(_comparison(recorded, same), style=None if same else "bold red")
     if trace:
-        terminal.say(f"trace: {single.faulty}")
-        terminal.say(f"plot: {plot}")
+        terminal.say(f"trace: {short_path(single.faulty)}")
+        terminal.say(f"plot: {short_path(plot)}" if plot else "no plot: the run left no trace")
     if not same:
         raise typer.Exit(EXIT_CHECK_FAILED)
 
