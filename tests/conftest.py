@@ -34,19 +34,23 @@ def toy(toycar: Workspace) -> Workspace:
 
 
 @pytest.fixture
-def toycar(tmp_path: Path) -> Workspace:
+def toycar(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Workspace:
     """A copy of the toy car's library and tree, with the project's templates and the hostile ones."""
     return copy_toycar(tmp_path)
 
 
-def copy_toycar(tmp_path: Path) -> Workspace:
-    shutil.copytree(
-        _TESTS / "toy", tmp_path / "toy", ignore=shutil.ignore_patterns("__pycache__", "templates")
-    )
-    templates = tmp_path / "toy" / "templates"
-    shutil.copytree(_TESTS.parent / "templates", templates)
-    shutil.copytree(_TESTS / "toy" / "templates", templates, dirs_exist_ok=True)
-    return Workspace(library=tmp_path / "toy" / "fault_library", templates=templates)
+@pytest.fixture(scope="session")
+def copy_toycar() -> Callable[[Path], Workspace]:
+    """Puts such a copy into a folder."""
+
+    def copy(folder: Path) -> Workspace:
+        root = folder / "toy"
+        shutil.copytree(_TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates"))
+        shutil.copytree(_TESTS.parent / "templates", root / "templates")
+        shutil.copytree(_TESTS / "toy" / "templates", root / "templates", dirs_exist_ok=True)
+        return Workspace(library=root / "fault_library", templates=root / "templates")
+
+    return copy
 
 
 @pytest.fixture

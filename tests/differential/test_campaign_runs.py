@@ -1,0 +1,228 @@
+"""The same campaign gives the same bytes, however it is run, stopped and resumed."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from mutator import campaign_run
+from mutator.campaign_run import Session
+from mutator.workspace import Workspace
+
+DERIVED = ("results.csv", "results.parquet")
+Bytes = dict[str, bytes]
+CopyToycar = Callable[[Path], Workspace]
+
+
+def results(out: Path) -> Bytes:
+    return {name: (out / name).read_bytes() for name in DERIVED}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Bytes:
+    """What the small campaign gives when it is run in one process, in one go."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    summary = campaign_run.run(copy_toycar(folder), "small", folder / "run")
+    assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
+    assert {"hazard", "sdc", "not_activated"} <= set(summary.outcomes)
+    return results(folder / "run")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Bytes, workers: int) -> None:
+    """One or two xdist workers give the bytes of a run without workers."""
+    summary = campaign_run.run(toy, "small", tmp_path / "run", workers=workers)
+    assert summary.exit_code == 0
+    assert len(list((tmp_path / "run" / "records").iterdir())) == workers
+    assert results(tmp_path / "run") == undisturbed
+
+
+def test_any_order(
+    toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chunks run in a shuffled order give the same bytes."""
+    prepare = Session.prepare
+
+    def shuffled(self: Session) -> None:
+        prepare(self)
+        self.pending = tuple(random.Random(3).sample(self.pending, len(self.pending)))
+
+    monkeypatch.setattr(Session, "prepare", shuffled)
+    assert campaign_run.run(toy, "small", tmp_path / "run").exit_code == 0
+    assert results(tmp_path / "run") == undisturbed
+
+
+def test_one_by_one(
+    toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that is given up after every chunk and resumed, again and again, gives the same bytes."""
+    prepare = Session.prepare
+
+    def one_chunk(self: Session) -> None:
+        prepare(self)
+        self.pending = self.pending[:1]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "prepare", one_chunk)
+        summary = campaign_run.run(toy, "small", tmp_path / "run")
+        assert summary.exit_code == 3
+        while summary.ran:
+            summary = campaign_run.run(toy, "small", tmp_path / "run")
+    assert (summary.done, summary.exit_code) == (12, 0)
+    assert results(tmp_path / "run") == undisturbed
+
+
+def test_lost_records_run_again(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """Lines lost at the end of a records file are run again, what is in the others is not."""
+    out = tmp_path / "run"
+    campaign_run.run(toy, "small", out, workers=2)
+    path = max((out / "records").iterdir(), key=lambda p: p.stat().st_size)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-3]) + lines[-3][:25])
+    summary = campaign_run.run(toy, "small", out)
+    assert (summary.exit_code, summary.ran) == (0, 3)
+    assert results(out) == undisturbed
+
+
+def test_derived_files_can_be_made_again(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """Tables deleted from a complete run come back from its records, byte for byte."""
+    out = tmp_path / "run"
+    campaign_run.run(toy, "small", out)
+    for name in DERIVED:
+        (out / name).unlink()
+    summary = campaign_run.run(toy, "small", out)
+    assert (summary.exit_code, summary.ran) == (0, 0)
+    assert results(out) == undisturbed
+
+
+class Command:
+    """A campaign command in a process of its own, and all processes that come of it."""
+
+    def __init__(self, toy: Workspace, out: Path, *words: str) -> None:
+        self.out = out
+        self.mark = f"MUTATOR_TEST={os.urandom(8).hex()}"
+        name, _, value = self.mark.partition("=")
+        places = {"MUTATOR_LIBRARY": str(toy.library), "MUTATOR_TEMPLATES": str(toy.templates), name: value}
+        self.process = subprocess.Popen(
+            [sys.executable, *words],
+            env=os.environ | places,
+            cwd=toy.library.parent,
+            start_new_session=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def wait_for_records(self, count: int) -> None:
+        """Until that many experiments have a record."""
+        deadline = time.monotonic() + 120.0
+        while sum(p.read_bytes().count(b"\n") - 1 for p in (self.out / "records").glob("*.jsonl")) < count:
+            assert self.process.poll() is None, self.process.communicate()[0]
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+    def others(self) -> Iterator[str]:
+        """Command lines of living processes that carry the mark or work in the run folder."""
+        for folder in Path("/proc").glob("[0-9]*"):
+            try:
+                if int(folder.name) in (os.getpid(), self.process.pid):
+                    continue
+                line = (folder / "cmdline").read_bytes()
+                if self.mark.encode() in (folder / "environ").read_bytes() or str(self.out).encode() in line:
+                    yield line.replace(b"\0", b" ").decode()
+            except OSError:
+                continue
+
+    def end(self) -> str:
+        """Wait for its end and for the end of everything it started; returns what it printed."""
+        printed = self.process.communicate(timeout=120)[0]
+        deadline = time.monotonic() + 10.0
+        while left := list(self.others()):
+            assert time.monotonic() < deadline, left
+            time.sleep(0.05)
+        return printed
+
+
+def pytest_words(out: Path) -> list[str]:
+    plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
+    return [*plain, "--campaign", "small", "--campaign-out", str(out), "-n", "2"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda s: s.name)
+def test_killed_and_resumed(
+    toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
+) -> None:
+    """A command killed half-way leaves no process behind; given again, it completes to the same bytes."""
+    out = tmp_path / "run"
+    command = Command(toy, out, *pytest_words(out))
+    command.wait_for_records(4)
+    if number is signal.SIGINT:  # as a terminal does it: everyone in the foreground gets it
+        os.killpg(command.process.pid, number)
+    else:
+        command.process.send_signal(number)
+    command.end()
+    again = Command(toy, out, *pytest_words(out))
+    printed = again.end()
+    assert again.process.returncode == 0, printed
+    assert "12 of 12 experiments done" in printed
+    assert "12 now" not in printed
+    assert results(out) == undisturbed
+
+
+def test_killed_during_the_checks(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """Killed before its first experiment, the command begins anew and gives the same bytes."""
+    out = tmp_path / "run"
+    command = Command(toy, out, *pytest_words(out))
+    while not (out / "work" / "checks").is_dir():
+        time.sleep(0.01)
+    command.process.kill()
+    command.end()
+    assert campaign_run.run(toy, "small", out).exit_code == 0
+    assert results(out) == undisturbed
+
+
+def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """A worker that is killed costs its chunk; the rest is run, the exit code says 3, a resume completes."""
+    out = tmp_path / "run"
+    command = Command(toy, out, *pytest_words(out))
+    command.wait_for_records(2)
+    worker = next((out / "workers").iterdir())
+    os.kill(int(worker.name), signal.SIGKILL)
+    printed = command.end()
+    assert command.process.returncode == 3, printed
+    assert "died" in printed
+    assert campaign_run.run(toy, "small", out).exit_code == 0
+    assert results(out) == undisturbed
+
+
+def test_the_command_line_is_the_same_thing(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """`mutator run` gives the bytes of pytest's campaign, and each resumes what the other began."""
+    out = tmp_path / "run"
+    command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
+    command.wait_for_records(3)
+    command.process.kill()
+    command.end()
+    again = Command(toy, out, *pytest_words(out))
+    assert "12 of 12" in again.end()
+    assert results(out) == undisturbed
+
+
+def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """A second command in a folder at work is told who works there, and disturbs nothing."""
+    out = tmp_path / "run"
+    first = Command(toy, out, *pytest_words(out))
+    first.wait_for_records(1)
+    second = Command(toy, out, *pytest_words(out))
+    printed = second.process.communicate(timeout=60)[0]
+    assert second.process.returncode == 2, printed
+    assert f"in use by process {first.process.pid}" in printed
+    assert "Traceback" not in printed
+    first.end()
+    assert first.process.returncode == 0
+    assert results(out) == undisturbed
