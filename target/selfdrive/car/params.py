@@ -8,7 +8,8 @@ class CarParams:
     """Physical data and tuning of one car model. Tables are (breakpoints, values).
 
     Speeds in m/s, masses in kg, lengths in m, stiffness in N/rad, inertia in kg m^2. Gains of the
-    lateral PI loop are per radian of steering-wheel angle.
+    lateral PI loop are per radian of steering-wheel angle, `steer_kf` also per (m/s)^2: what turns the
+    wheels straight again grows with lateral acceleration.
     """
 
     name: str
@@ -21,6 +22,7 @@ class CarParams:
     tire_stiffness_rear: float
     steer_kp: tuple[tuple[float, ...], tuple[float, ...]]
     steer_ki: tuple[tuple[float, ...], tuple[float, ...]]
+    steer_kf: float
     steer_max: float
     steer_actuator_delay: float  # s
     steer_rate_cost: float
@@ -29,7 +31,6 @@ class CarParams:
     gas_max: tuple[tuple[float, ...], tuple[float, ...]]
     brake_max: tuple[tuple[float, ...], tuple[float, ...]]
     acceleration_per_output: float  # m/s^2 for an output of 1, divides the feedforward
-    min_enable_speed: float  # m/s; negative: engages at standstill too
     radar_offset: float  # m from the radar to the bumper reference
     steer_limit_alert: bool
     start_acceleration: float = 0.5  # m/s^2, targeted while the brake is released to move off

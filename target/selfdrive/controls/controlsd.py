@@ -78,7 +78,7 @@ class Controlsd:
     ) -> Plan:
         """Plans are made in every state; so a lead is known before the driver engages."""
         if self._planner.take_model(car.v_ego, model):
-            self._lateral.plan(t, car, self._planner.path.lanes, self._angle_offset.value)
+            self._lateral.plan(car, self._planner.path.lanes, self._angle_offset.value)
         state, absent = self._longitudinal.state, self._awareness.absent
         return self._planner.update(t, car, radar_state, state, self._v_cruise, absent)
 
@@ -106,7 +106,7 @@ class Controlsd:
             self._longitudinal.reset(car.v_ego)
         self._learn(car, active)
         gas, brake = self._longitudinal.update(active, car, self.plan)
-        steer = self._lateral.update(t, car, active)
+        steer = self._lateral.update(car, active)
         if not active or car.buttons or car.steering_pressed:
             self._awareness.reset()
         if self._lateral.saturated and self._params.steer_limit_alert:

@@ -19,6 +19,7 @@ def params() -> CarParams:
         tire_stiffness_rear=90000.0,
         steer_kp=((0.0,), (0.8 * RAD_TO_DEG,)),
         steer_ki=((0.0,), (0.24 * RAD_TO_DEG,)),
+        steer_kf=0.00006 * RAD_TO_DEG,
         steer_max=1.0,
         steer_actuator_delay=0.1,
         steer_rate_cost=0.5,
@@ -27,7 +28,6 @@ def params() -> CarParams:
         gas_max=((0.0,), (0.6,)),
         brake_max=((5.0, 20.0), (1.0, 0.8)),
         acceleration_per_output=4.8,
-        min_enable_speed=-1.0,
         radar_offset=2.7,
         steer_limit_alert=True,
     )

@@ -1,4 +1,6 @@
-"""Steering between two solutions of the lateral MPC."""
+"""Steering towards the angle of the lateral MPC."""
+
+from math import nan
 
 import pytest
 from selfdrive.car.params import CarParams
@@ -22,49 +24,69 @@ class FixedMpc:
 
 
 def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[LatControl, CarState]:
+    """Lateral control that has planned the first of `degrees`, and a straight car."""
     lateral = LatControl(params)
     lateral.mpc = FixedMpc(*degrees)
     car = CarState(v_ego=v_ego)
-    for k in range(len(degrees)):
-        lateral.plan(k * 0.05, car, LANES, 0.0)
+    lateral.plan(car, LANES, 0.0)
     return lateral, car
 
 
-def test_wanted_angle_is_interpolated_and_not_held_back(params: CarParams) -> None:
-    """From one solution to the next the angle moves in 50 ms, and at most 70 ms when a message is late."""
-    lateral, car = control(params, 0.0, 1.0)
-    degrees = []
+def test_wanted_angle_is_held_until_the_next(params: CarParams) -> None:
+    """The MPC's angle counts from the cycle it is planned in, unchanged, however long none follows."""
+    lateral, car = control(params, 0.5, 1.0)
+    held = []
     for k in range(10):
-        lateral.update(0.05 + k * 0.01, car, True)
-        degrees.append(lateral.angle_desired / DEG_TO_RAD)
-    assert degrees == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.4, 1.4, 1.4])
+        if k == 5:
+            lateral.plan(car, LANES, 0.0)
+        lateral.update(car, True)
+        held.append(lateral.angle_desired / DEG_TO_RAD)
+    assert held == pytest.approx([0.5] * 5 + [1.0] * 5)
 
 
 def test_torque_is_that_of_the_degree_gains(params: CarParams) -> None:
-    """An error of one degree gives 0.8 of torque, and 0.24 more each second."""
-    lateral, car = control(params, 1.0, 1.0)
-    assert lateral.update(0.09, car, True) == pytest.approx(0.8 + 0.0024)
+    """An error of one degree gives 0.8 of torque, and 0.24 more each second, at walking pace."""
+    lateral, car = control(params, 1.0, v_ego=0.3)
+    assert lateral.update(car, True) == pytest.approx(0.8 + 0.0024, abs=1e-5)
+    assert lateral.update(car, True) == pytest.approx(0.8 + 0.0048, abs=1e-5)
+
+
+def test_feedforward_grows_with_lateral_acceleration(params: CarParams) -> None:
+    """Where the wheel is at the wanted angle, a degree is held with 0.00006 of torque per (m/s)^2."""
+    for v_ego in (10.0, 30.0):
+        lateral, _ = control(params, -2.0)
+        car = CarState(v_ego=v_ego, steering_angle=lateral.angle_desired)
+        assert lateral.update(car, True) == pytest.approx(-2.0 * 0.00006 * v_ego**2)
+
+
+def test_an_angle_that_is_no_number_is_full_torque_to_the_left(params: CarParams) -> None:
+    """Without a solution the torque is the upper limit; the next angle is steered to as if nothing was."""
+    lateral, car = control(params, nan, 1.0)
+    assert [lateral.update(car, True) for _ in range(100)] == [1.0] * 100
+    assert not lateral.saturated
+    lateral.plan(car, LANES, 0.0)
+    fresh, _ = control(params, 1.0)
+    assert lateral.update(car, True) == fresh.update(car, True)
 
 
 def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
     """While the driver steers, the integral does not grow and no saturation is told."""
-    lateral, _ = control(params, 5.0, 5.0)
+    lateral, _ = control(params, 5.0, 0.0)
     car = CarState(v_ego=20.0, steering_pressed=True)
-    for k in range(100):
-        lateral.update(0.05 + k * 0.01, car, True)
+    for _ in range(100):
+        lateral.update(car, True)
     assert not lateral.saturated
-    lateral.mpc.angles = [0.0, 0.0]
-    lateral.plan(1.1, car, LANES, 0.0)
-    lateral.plan(1.15, car, LANES, 0.0)
-    assert lateral.update(1.15, car, True) == 0.0
+    lateral.plan(car, LANES, 0.0)
+    assert lateral.update(car, True) == 0.0
 
 
 @pytest.mark.parametrize(("v_ego", "active"), [(0.29, True), (20.0, False)])
 def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, active: bool) -> None:
-    """Nearly at rest and out of control there is no torque and no history."""
-    lateral, car = control(params, 1.0, 1.0, v_ego=v_ego)
-    assert lateral.update(0.05, car, active) == 0.0
-    assert not lateral.saturated
+    """Nearly at rest and out of control there is no torque, and what was integrated is forgotten."""
+    lateral, car = control(params, 1.0)
+    first = [lateral.update(car, True) for _ in range(100)][0]
+    assert lateral.update(CarState(v_ego=v_ego), active) == 0.0
+    assert lateral.update(car, True) == first
 
 
 @pytest.mark.parametrize(
@@ -72,7 +94,7 @@ def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, ac
 )
 def test_saturation_is_told_above_10_mps(params: CarParams, v_ego: float, degrees: float, told: bool) -> None:
     """More than 0.8 s beyond full torque is told, faster than 10 m/s only."""
-    lateral, car = control(params, degrees, degrees, v_ego=v_ego)
-    for k in range(85):
-        lateral.update(0.05 + k * 0.01, car, True)
+    lateral, car = control(params, degrees, v_ego=v_ego)
+    for _ in range(85):
+        lateral.update(car, True)
     assert lateral.saturated is told

@@ -157,6 +157,16 @@ def test_lanes_that_run_away(s1):
     assert np.abs(np.diff(result.trace["steer_angle"])).max() < 1.1 / 100
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_lanes_beyond_any_solution(s1, side):
+    """Lanes so far off that no angle is found: full torque to the left, whichever side the lanes are on."""
+    trace = drive(replace(s1, steps=1300), lanes_from(5.0, lambda t: 50.0 * side * (t - 5.0))).trace
+    unsolved = np.flatnonzero(np.isnan(trace["angle_desired"]))
+    assert len(unsolved) > 50
+    # a command is felt in the next step; 4096 counts of the 3840 that are the EPS' full torque
+    assert set(trace["steer_torque"][unsolved[:-1] + 1]) == {4096 / 3840}
+
+
 def test_a_bend_of_500_m(s1):
     """A curve of 500 m at 60 mph is held within half a metre, steadily, with half the torque."""
     bend = replace(s1, lead=None, curvature=((0.0, 150.0, 250.0), (0.0, 0.0, 0.002)))
