@@ -84,7 +84,7 @@ def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
 def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, active: bool) -> None:
     """Nearly at rest and out of control there is no torque, and what was integrated is forgotten."""
     lateral, car = control(params, 1.0)
-    first = [lateral.update(car, True) for _ in range(100)][0]
+    first, *_ = [lateral.update(car, True) for _ in range(100)]
     assert lateral.update(CarState(v_ego=v_ego), active) == 0.0
     assert lateral.update(car, True) == first
 
