@@ -190,12 +190,8 @@ Examples:
 """
 
 
-@with_place
 def report(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")],
-    as_json: Json = False,
-    *,
-    place: Place,
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")], as_json: Json = False
 ) -> None:
     """Write the report of a run and print its path.
 

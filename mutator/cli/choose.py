@@ -32,11 +32,14 @@ class FaultChoice:
     def faults(
         self, workspace: "Workspace", manifest: "TargetManifest", models: "FaultModels"
     ) -> tuple["Fault", ...]:
-        """The chosen faults in the spec's order; never none."""
+        """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line."""
         from mutator.expand import expand
+        from mutator.library_check import check_spec
         from mutator.spec import AS_DESCRIBED
 
         spec = self._narrowed(workspace.spec(self.spec))
+        for problem in check_spec(spec, models, manifest):
+            raise problem
         reading = self.reading or AS_DESCRIBED
         return expand(spec, self.seed or 0, reading, models=models, manifest=manifest)
 

@@ -10,6 +10,7 @@ from mutator.cli import choose
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.diffs import readable
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
+from mutator.errors import EXIT_HARNESS_ERRORS
 
 if TYPE_CHECKING:
     from mutator.model import Experiment
@@ -68,6 +69,7 @@ def try_fault(
     The spec need not be in the library: a file will do.
     """
     from mutator.cli.experiment_view import show_single
+    from mutator.model import Status
     from mutator.single import run_single
 
     terminal = Terminal(as_json)
@@ -84,6 +86,8 @@ def try_fault(
     with terminal.wait(f"driving {scenario}, fault-free and faulty"):
         single = run_single(workspace, target, experiment, folder)
     show_single(terminal, target, single, plot=folder / "plot.svg")
+    if single.record.status is Status.HARNESS_ERROR:
+        raise typer.Exit(EXIT_HARNESS_ERRORS)
 
 
 def _experiment(workspace: "Workspace", fault: Any, scenario: str, trigger: Any, seed: int) -> "Experiment":

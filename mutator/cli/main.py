@@ -36,6 +36,11 @@ Examples:
   mutator try radar/chaff --scenario S1           one fault: diff, verdict, plot
   mutator run quickstart --out runs/first -n 2    a campaign, resumed by the same command
   mutator show 3f9a                               one of its experiments, by the start of its id
+
+\b
+Exit codes: 0 fine, 1 a check failed, 2 wrong input, 3 harness errors or experiments left,
+130 interrupted. Where things are is said by options, before or after the command, or by the
+environment; inside a clone neither is needed.
 """
 
 

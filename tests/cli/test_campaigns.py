@@ -137,7 +137,10 @@ def test_other_choices_need_another_folder(cli: Cli, run: Path) -> None:
 
 
 def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
-    """Ctrl-C ends with 130, what is done, and the command that goes on; that command completes the run."""
+    """Ctrl-C ends with 130, what is done, and the command that goes on; that command completes the run.
+
+    While it runs, a second command in the same folder is refused.
+    """
     words = ["run", "toy", "--out", "runs/cut", "--limit", "20"]
     command = [sys.executable, "-m", "mutator", *words]
     environment = os.environ | {"MUTATOR_ROOT": str(root)}
@@ -147,8 +150,11 @@ def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
         deadline = time.monotonic() + 60
         while not any((root / "runs/cut").glob("records/*.jsonl")) and time.monotonic() < deadline:
             time.sleep(0.05)
+        second = mutator(root, *words)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
+    assert second.returncode == 2
+    assert "in use" in second.stderr
     assert process.returncode == 130
     assert "go on: mutator run toy --out runs/cut --limit 20" in out + err
     assert "Traceback" not in err

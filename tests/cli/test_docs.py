@@ -16,7 +16,7 @@ TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#:]+)(?:#([^)]+))?\)")
 # What differs from machine to machine: how long it took.
-TIME = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|\d+ s\b")
+TIME = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b")
 
 
 def name(page: Path) -> str:

@@ -1,0 +1,136 @@
+"""Mistakes in specs, templates and run folders, as the command line answers them."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+SPEC = """\
+schema: fault_spec/1
+module: sensor
+fault_type: own
+about: A fault of one's own.
+variants:
+  it:
+    aim: H1
+    about: Something.
+    draw:
+      error_m: {values: [30]}
+    as_described:
+      injections:
+        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: gap}
+          model: offset
+          unit: m
+          params: {by_m: error}
+"""
+
+
+@pytest.fixture
+def own(root: Path) -> Path:
+    """A spec of one's own that is well."""
+    own = Path("own.yaml")
+    own.write_text(SPEC)
+    return own
+
+
+def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
+    """What the other tests break works before it is broken."""
+    assert cli("diff", own).code == 0
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "line", "said"),
+    [
+        ("after_assign: gap", "after_assign: gab", 11, "gap"),  # unknown anchor
+        ("toycar/sensing.py, function: Sensor.sense, after_assign: gap",
+         "toycar/driver.py, function: Driver.drive, after_assign: wanted", 11, "nth"),  # ambiguous anchor
+        ("toycar/sensing.py", "../../outside.py", 13, "outside"),  # beyond the target's root
+        ("toycar/sensing.py", "toycar/world.py", 13, "toycar/world.py"),  # a forbidden place
+        ("by_m: error", "by_kph: error", 16, "by_m"),  # a unit of another dimension
+        ("error_m: {values", "error_s: {values", 16, "by_m"),  # a draw of another dimension
+        ("by_m: error", "by_m: far", 16, "error"),  # no number
+        ("model: offset", "model: ofset", 14, "offset"),  # unknown model
+        ("aim: H1", "aim: H2", 7, "H9"),  # a hazard that the target does not have
+        ("aim: H1", "aims: H1", 7, "aim"),  # unknown key
+        ("    about: Something.", "    about: Something.\n    about: Else.", 9, "about"),  # a key twice
+        ("values: [30]", "values: [far]", 10, "number"),  # wrong type
+        ("fault_spec/1", "fault_spec/2", 1, "fault_spec/1"),  # newer schema
+        ("module: sensor", "module: [sensor", 3, "own.yaml"),  # not YAML
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_spec_is_told_with_its_place(
+    cli: Cli, own: Path, right: str, wrong: str, line: int, said: str
+) -> None:
+    """File and line, what was got, what to do; exit code 2 and no traceback."""
+    assert right in SPEC
+    own.write_text(SPEC.replace(right, wrong))
+    answer = cli("diff", own)
+    assert answer.code == 2
+    assert answer.err.startswith(f"error: own.yaml:{line}: ")
+    assert said in answer.err
+    assert "Traceback" not in answer.err
+
+
+def test_a_value_out_of_its_range_is_refused(cli: Cli, own: Path) -> None:
+    """A parameter beyond what its model allows is told with the range."""
+    flip = SPEC.replace("model: offset", "model: bit_flip").replace("          unit: m\n", "")
+    own.write_text(flip.replace("by_m: error", "bit: 64"))
+    answer = cli("diff", own)
+    assert answer.code == 2
+    assert "64" in answer.err
+    assert "63" in answer.err
+
+
+def test_a_template_that_does_not_parse_is_told_with_its_place(cli: Cli, own: Path, root: Path) -> None:
+    """A mistake in a template is told with the template's file and line, wherever it is used."""
+    template = root / "templates" / "offset.py.j2"
+    template.write_text(template.read_text() + "{% if %}\n")
+    for words in (["diff", own], ["check"]):
+        answer = cli(*words)
+        assert answer.code == (2 if words[0] == "diff" else 1)
+        assert "offset.py.j2:" in answer.out + answer.err
+        assert "Traceback" not in answer.err
+
+
+def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path, root: Path) -> None:
+    """`try` says what does not compile, drives nothing, and exits with 2."""
+    template = root / "templates" / "offset.py.j2"
+    template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = = {{ by }}\n")
+    answer = cli("try", own, "-s", "A")
+    assert answer.code == 2
+    assert "own.yaml:11: " in answer.err
+    assert "invalid syntax" in answer.err
+    assert not Path("runs").exists()
+
+
+def test_a_crash_is_a_verdict(cli: Cli, own: Path, root: Path) -> None:
+    """An exception in injected code is what the fault did: it is shown, and the command is fine."""
+    template = root / "templates" / "offset.py.j2"
+    template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = [][int({{ by }})]\n")
+    answer = cli("try", own, "-s", "A")
+    assert answer.code == 0
+    assert "verdict: crashed" in answer.out
+    assert "IndexError" in answer.out
+
+
+def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> None:
+    """Every verb that reads a run folder refuses one that a newer version wrote."""
+    cli("plan", "toy", "--out", "runs/p", "--limit", "2")
+    head = Path("runs/p/run.json")
+    data = json.loads(head.read_text())
+    head.write_text(json.dumps(data | {"schema": "run/999"}))
+    for words in (
+        ["report", "runs/p"],
+        ["run", "toy", "--out", "runs/p"],
+        ["show", "abcd"],
+        ["clean", "runs/p", "-y"],
+    ):
+        answer = cli(*words)
+        assert answer.code == 2, words
+        assert "run/999" in answer.err
+        assert "newer" in answer.err
+    assert head.exists()
