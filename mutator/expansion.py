@@ -1,6 +1,7 @@
 """From a campaign to its experiments: faults selected and expanded, triggers made, random times drawn."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from fnmatch import fnmatchcase
 
 from mutator.campaign import Campaign
@@ -12,6 +13,7 @@ from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.sample import spread
 from mutator.trigger import at_time, draw_time
 from mutator.workspace import Workspace
+from mutator.yamlio import Keys
 
 _Numbered = tuple[int, Fault]  # a fault and its place among the values of its variant
 
@@ -88,7 +90,7 @@ class Expansion:
                 selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
         return list(selected.values())
 
-    def _unmatched(self, keys: tuple[str | int, ...], pattern: str) -> MutatorError:
+    def _unmatched(self, keys: Keys, pattern: str) -> MutatorError:
         return self.campaign.error(
             keys,
             f"no fault in the library is named like '{pattern}'",
@@ -98,14 +100,10 @@ class Expansion:
 
     def _triggers(self) -> tuple[Trigger, ...]:
         """One for each row of the context table; random times are drawn for the same rows, as their pairs."""
-        try:
+        with self._placed(("triggers", "table")):
             table = self.workspace.context_table(self.campaign.table)
+        with self._placed(("triggers", "rows")):
             return table.triggers(armed_after_s=self.armed_after_s, rows=self.campaign.rows)
-        except MutatorError as err:
-            key = "table" if err.where and "contexts" in err.where else "rows"
-            raise self.campaign.error(
-                ("triggers", key), err.got, expected=err.expected or "", remedy=err.remedy or ""
-            ) from None
 
     def _of_scenario(
         self, scenario: str, faults: list[_Numbered], triggers: tuple[Trigger, ...]
@@ -140,18 +138,21 @@ class Expansion:
 
     def _scenario_digest(self, scenario: str) -> str:
         if scenario not in self._digests:
-            try:
+            with self._placed(self._scenario_keys(scenario)):
                 self._digests[scenario] = digest(self.workspace.scenario(scenario).read_bytes())
-            except MutatorError as err:
-                raise self.campaign.error(
-                    self._scenario_keys(scenario),
-                    err.got,
-                    expected=err.expected or "a scenario",
-                    remedy=err.remedy or "correct the name",
-                ) from None
         return self._digests[scenario]
 
-    def _scenario_keys(self, scenario: str) -> tuple[str | int, ...]:
+    @contextmanager
+    def _placed(self, keys: Keys) -> Iterator[None]:
+        """Errors within it point at the campaign's value at `keys`."""
+        try:
+            yield
+        except MutatorError as err:
+            raise self.campaign.error(
+                keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
+            ) from None
+
+    def _scenario_keys(self, scenario: str) -> Keys:
         if scenario in self.campaign.scenarios:
             return ("scenarios", self.campaign.scenarios.index(scenario))
         return ("canary", "scenario")
