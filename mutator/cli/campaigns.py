@@ -1,5 +1,6 @@
 """`plan`, `run`, `report` and `clean`: campaigns and their run folders."""
 
+import shlex
 import sys
 from collections import Counter
 from pathlib import Path
@@ -54,13 +55,13 @@ def plan(
 
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
-    from mutator.plan import freeze, make_plan
+    from mutator.plan import freeze, load_plan, make_plan
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
     made = make_plan(workspace, campaign, seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
     folder = freeze(made, out, workspace)
-    cost = made.cost(workers)
+    cost = load_plan(folder.path).cost(workers)  # knows what a run took, once one was driven here
     groups = Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in made.experiments)
     if as_json:
         faults = [
@@ -78,7 +79,8 @@ def plan(
     )
     terminal.say(f"expected: {_cost_line(cost)}")
     terminal.say(f"plan: {short_path(folder.path / 'plan.csv')} (digest {made.digest[:16]})")
-    terminal.say(f"run it: mutator run {campaign} --out {out} -n {workers}")
+    command = ["mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
+    terminal.say(f"run it: {shlex.join(command)}")
 
 
 def _cost_line(cost: "Cost") -> str:
@@ -167,8 +169,6 @@ def _tell(terminal: Terminal, out: Path, summary: "Summary") -> None:
 
 def resume_command() -> str:
     """The command line that goes on: the same one."""
-    import shlex
-
     return shlex.join(["mutator", *sys.argv[1:]])
 
 
@@ -233,7 +233,8 @@ def clean(
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
-        typer.confirm(f"delete {', '.join(map(short_path, folders))}?", abort=True)
+        if not typer.confirm(f"delete {', '.join(map(short_path, folders))}?"):
+            return
     for folder in folders:
         runfolder.clean(folder)
         terminal.say(f"deleted {short_path(folder)}")

@@ -1,0 +1,103 @@
+"""What a terminal gets beyond plain text: colours, tables, a progress bar."""
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.cli.console import Terminal
+from mutator.cli.diffs import readable
+from mutator.cli.progress import campaign_progress, duration
+from mutator.records import Progress
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+PATCH = """\
+diff --git a/p/_fi.py b/p/_fi.py
+new file mode 100644
+--- /dev/null
++++ b/p/_fi.py
+@@ -0,0 +1 @@
++probe
+diff --git a/p/a.py b/p/a.py
+--- a/p/a.py
++++ b/p/a.py
+@@ -1 +1,2 @@
+ a = 1
++a = 2
+"""
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rich takes what it writes to for a terminal of 120 columns."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+def test_a_diff_is_coloured_line_by_line(cli: Cli, root: Path, terminal: None) -> None:
+    """Inserted lines are green, and without the colours the diff is what a pipe gets."""
+    answer = cli("diff", "sensor/silence")
+    assert re.search(r"\x1b\[32m\+ +if not _fi.active", answer.out)
+    assert "+        if not _fi.active" in ANSI.sub("", answer.out)
+
+
+def test_a_table_fits_the_terminal(cli: Cli, root: Path, terminal: None) -> None:
+    """A table in a terminal is no wider than it, and has a rule under its heads."""
+    lines = ANSI.sub("", cli("list", "models").out).splitlines()
+    assert all(len(line.rstrip()) <= 120 for line in lines)
+    assert any(set(line.strip()) == {"─"} for line in lines)
+
+
+def test_json_stays_plain_in_a_terminal(cli: Cli, root: Path, terminal: None) -> None:
+    """A program that asks for JSON gets JSON, whatever it reads it from."""
+    assert cli("list", "specs", "--json").json["specs"]
+
+
+def notify_all(notify: Callable[[Progress], None]) -> None:
+    """A campaign's progress from begin to end."""
+    notify(Progress(stage="checks", done=1, total=7))
+    counts = Counter(hazard=2, sdc=1)
+    notify(Progress(stage="experiments", done=3, total=60, outcomes=counts, remaining_s=200.0))
+    notify(Progress(stage="experiments", done=4, total=60, outcomes=counts, remaining_s=195.0))
+
+
+def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
+    """The bar shows how many are done, the outcomes so far, and the remaining time."""
+    with campaign_progress(Terminal()) as notify:
+        notify_all(notify)
+    err = ANSI.sub("", capsys.readouterr().err)
+    for wanted in ("experiments", "4/60", "hazard 2, sdc 1", "3 min 15 s left"):
+        assert wanted in err
+
+
+def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
+    """A log gets a line for each stage, and no more than one every now and then."""
+    with campaign_progress(Terminal()) as notify:
+        notify_all(notify)
+    assert capsys.readouterr().err.splitlines() == [
+        "checks before the campaign 1/7",
+        "experiments 3/60, hazard 2, sdc 1, 3 min 20 s left",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
+)
+def test_durations(seconds: float, words: str) -> None:
+    """Times are told in the unit that fits them."""
+    assert duration(seconds) == words
+
+
+def test_a_diff_for_reading_leaves_the_probe_out() -> None:
+    """New files are left out and named; everything else stays as it is."""
+    text, note = readable(PATCH)
+    assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
+    assert "p/_fi.py" in note
+    assert readable(text) == (text, "")
