@@ -111,15 +111,13 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
     """The scenario in `text`; `where` names its source in errors."""
     root = read_yaml(text, where, _KEYS)
     root.text("schema", (SCHEMA,))
-    duration = root.number("duration_s", DT_CTRL, _LONGEST)
-    root.check("duration_s", _is_whole(duration), "a multiple of 0.01", "a step is 10 ms")
     host = root.section("host", _HOST_KEYS)
     grade, curvature = _road(root)
     return Scenario(
         name=root.text("name"),
         title=root.text("title"),
         digest=digest,
-        steps=_frame(duration),
+        steps=_step(root, "duration_s", DT_CTRL),
         speed=_host_speed(host),
         lateral_offset=host.number("lateral_offset_m", -10.0, 10.0, default=0.0),
         lead=_lead(root.section("lead", _LEAD_KEYS)) if "lead" in root else None,
@@ -152,8 +150,7 @@ def _lead(section: Section) -> Lead:
 def _buttons(root: Section) -> tuple[ButtonPress, ...]:
     presses: list[ButtonPress] = []
     for section in root.sections("buttons", _BUTTON_KEYS):
-        press = _frame(section.number("press_s", 0.0, _LONGEST))
-        release = _frame(section.number("release_s", 0.0, _LONGEST))
+        press, release = _step(section, "press_s"), _step(section, "release_s")
         section.check("release_s", release > press, "a time after press_s", "let go after pressing")
         if presses:
             ready = press >= presses[-1].release
@@ -186,9 +183,8 @@ def _table(section: Section, key: str, at: tuple[float, ...], values: tuple[floa
     return at, values
 
 
-def _frame(t: float) -> int:
-    return round(t / DT_CTRL)
-
-
-def _is_whole(t: float) -> bool:
-    return abs(t / DT_CTRL - _frame(t)) < 1e-6
+def _step(section: Section, key: str, earliest: float = 0.0) -> int:
+    """A time in s, a whole number of steps."""
+    steps = section.number(key, earliest, _LONGEST) / DT_CTRL
+    section.check(key, abs(steps - round(steps)) < 1e-6, "a multiple of 0.01", "a step is 10 ms")
+    return round(steps)

@@ -1,24 +1,26 @@
 """Strict reading of YAML: every key known and given once, every number in range, errors with their line."""
 
+import re
 from difflib import get_close_matches
-from math import isfinite
 from typing import NoReturn
 
 import yaml
 
 from selfdrive.common.errors import ConfigError
 
-_NUMBERS = {"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"}
+# YAML 1.1 takes 060 for 48 and 1:30 for 90; here a number is what it looks like, or no number.
+_DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 
 
 def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
     """The mapping a document consists of. Raises ConfigError if it is not YAML, or not one mapping."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None)
         raise ConfigError(
-            f"{getattr(error, 'problem', None) or 'unreadable text'}",
+            problem or ("bottomless nesting" if isinstance(error, RecursionError) else "unreadable text"),
             where=where,
             line=None if mark is None else mark.line + 1,
             expected="valid YAML",
@@ -126,11 +128,12 @@ class Section:
         return node.value
 
     def _number(self, node: yaml.Node, key: str, low: float, high: float) -> float:
-        value = yaml.SafeLoader("").construct_object(node) if node.tag in _NUMBERS else None
-        if value is None or not isfinite(value) or not low <= value <= high:
+        plain = isinstance(node, yaml.ScalarNode) and node.style is None
+        value = float(node.value) if plain and _DECIMAL.fullmatch(node.value) else None
+        if value is None or not low <= value <= high:
             expected = f"a number from {low:g} to {high:g}"
             self._fail(node, f"{key}: {_shown(node)}", expected, f"{key} is {self._keys[key]}")
-        return float(value)
+        return value
 
     def _fail(self, node: yaml.Node, got: str, expected: str, remedy: str) -> NoReturn:
         line = node.start_mark.line + 1

@@ -85,6 +85,11 @@ def test_what_may_be_left_out():
         (edit("speed_mph: 60", "speed_mph: '60'"), 6, "speed_mph: '60'", "a speed in mph"),
         (edit("speed_mph: 60", "speed_mph: [60]"), 6, "speed_mph: a list", "a speed in mph"),
         (edit("speed_mph: 60", "speed_mph: yes"), 6, "speed_mph: 'yes'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: 1:00"), 6, "speed_mph: '1:00'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: 0x3c"), 6, "speed_mph: '0x3c'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: !!float x"), 6, "speed_mph: 'x'", "a speed in mph"),
+        (edit("speed_mph: 60", "speed_mph: 6" + 5000 * "0"), 6, "speed_mph: '6000", "a speed in mph"),
+        (edit("release_s: 1.3", "release_s: 1.234"), 13, "release_s: '1.234'", "10 ms"),
         (edit("duration_s: 12.5", "duration_s: 12.503"), 4, "duration_s: '12.503'", "10 ms"),
         (edit("duration_s: 12.5", "duration_s: 1e9"), 4, "duration_s: '1e9'", "length of the run"),
         (edit("duration_s: 12.5\n", ""), 1, "no 'duration_s'", "length of the run"),
@@ -117,8 +122,17 @@ def test_mistakes(text, line, got, remedy):
     assert remedy in message.rsplit("; ", 1)[1]
 
 
+def test_a_number_is_what_it_looks_like():
+    """Sixty is sixty however it is written; YAML 1.1 would read a leading zero as octal."""
+    for text in ("60", "060", "60.", "+6.0e1"):
+        assert parse(edit("speed_mph: 60", f"speed_mph: {text}")).speed == pytest.approx(26.8224)
+
+
 def test_files_that_cannot_be_read(tmp_path):
-    """A file that is not there, and one that is no text, are told by name."""
+    """A file that is not there, one that is no text, and one without a bottom are told by name."""
+    (tmp_path / "deep.yaml").write_text("a: " + 5000 * "[")
+    with pytest.raises(ConfigError, match=r"deep\.yaml: bottomless nesting, expected valid YAML"):
+        load_scenario(tmp_path / "deep.yaml")
     with pytest.raises(ConfigError, match=r"no\.yaml: No such file"):
         load_scenario(tmp_path / "no.yaml")
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
