@@ -1,10 +1,12 @@
 """Runs one scenario: `python -m selfdrive.sim.run --scenario FILE --out DIR`.
 
 Writes DIR/trace.npz (100 Hz channels) and DIR/record.json (hazards, alerts, engagement, digests).
-The same scenario and seed give the same bytes. Exit code 2 for wrong input.
+The same scenario and seed give the same bytes. Exit code 2 for wrong input. The record comes last and
+whole: where there is one, the run was finished and the trace beside it is its own.
 """
 
 import argparse
+import io
 import json
 import sys
 from collections.abc import Sequence
@@ -48,12 +50,17 @@ def simulate(scenario: Scenario, seed: int) -> SimulationResult:
 
 def write(result: SimulationResult, folder: Path) -> None:
     """Write trace.npz and record.json into `folder`, which is made if need be."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **result.trace)
+    trace = buffer.getvalue()
+    record = {**result.record, "trace_digest": sha256(trace).hexdigest()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        trace = folder / "trace.npz"
-        np.savez(trace, **result.trace)
-        record = {**result.record, "trace_digest": sha256(trace.read_bytes()).hexdigest()}
-        (folder / "record.json").write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+        part, final = folder / "record.json.part", folder / "record.json"
+        final.unlink(missing_ok=True)
+        (folder / "trace.npz").write_bytes(trace)
+        part.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
+        part.replace(final)
     except OSError as error:
         raise ConfigError(
             str(error.strerror),
@@ -76,10 +83,9 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise ValueError
-    return value
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
+    return int(text)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 """One run from the command line: files, bytes, mistakes."""
 
+import errno
 import hashlib
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,6 +51,24 @@ def test_same_bytes_whatever_ran_before(run):
     assert contents(run("b")) == first
 
 
+def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
+    """The record stands for a whole run: with the disk full half way, neither an old nor a new one is left."""
+    folder = run("a")
+    write = Path.write_bytes
+
+    def full_disk(path, data):
+        write(path, data[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", full_disk)
+        arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(folder), "--max-steps", "1"]
+        assert main(arguments) == 2
+    assert f"error: {folder}: No space left on device" in capsys.readouterr().err
+    assert set(contents(folder)) == {"trace.npz"}
+    assert contents(run("a")) == contents(run("b"))
+
+
 def test_no_lead(run):
     """Without the lead the road is free from the first step on, and the record says so."""
     folder = run("a", "--no-lead")
@@ -78,9 +98,11 @@ def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments", [[], ["--max-steps", "0"], ["--seed", "x"], ["--max-steps", "many"]])
 def test_wrong_arguments(scenarios, tmp_path, arguments, capsys):
-    """Missing or impossible arguments end with code 2."""
+    """Missing or impossible arguments end with code 2, and speak of what was given."""
     full = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), *arguments]
     with pytest.raises(SystemExit) as caught:
         main(full if arguments else [])
     assert caught.value.code == 2
-    assert "error:" in capsys.readouterr().err
+    error = capsys.readouterr().err.rsplit("error: ", 1)[1]
+    assert repr(arguments[-1]) in error if arguments else "required" in error
+    assert "_positive" not in error
