@@ -71,6 +71,8 @@ class LateralDynamics:
         self.steer_rate = momentum / (COLUMN_INERTIA + DT_CTRL * COLUMN_DAMPING)
         angle = self.steer_angle + DT_CTRL * self.steer_rate
         self.steer_angle = clip(angle, -LARGEST_ANGLE, LARGEST_ANGLE)
+        if self.steer_angle != angle:
+            self.steer_rate = 0.0
 
     def _front_force(self, speed: float) -> float:
         """Lateral force of the front axle (N), left positive."""

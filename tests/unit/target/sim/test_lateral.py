@@ -82,6 +82,14 @@ def test_the_wheel_returns_by_itself(car):
     assert abs(car.steer_angle) < 0.01 * turned
 
 
+def test_the_wheel_has_a_stop(car):
+    """Turned on a standing car, the wheel comes to rest at its stop, and leaves it at once."""
+    run(car, 30.0, 1.0, 0.0)
+    assert (car.steer_angle, car.steer_rate) == (8.7, 0.0)
+    run(car, 0.01, -1.0, 0.0)
+    assert car.steer_angle < 8.7 and car.steer_rate < 0.0
+
+
 @pytest.mark.parametrize("speed", [0.0, 0.05, 0.3, 2.0])
 def test_slow_driving_is_stable(car, speed):
     """At walking pace and at rest nothing grows without bounds, and a standing car does not move."""
