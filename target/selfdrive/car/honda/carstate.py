@@ -20,7 +20,7 @@ from selfdrive.common.kalman import SteadyKalman
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import ButtonEvent, CanFrame, CarState
 
-SPEED_GAINS = (0.12288, 0.29666)
+SPEED_GAINS = (0.12287673, 0.29666309)  # of the speed estimate's Kalman filter at 100 Hz
 
 # The wheels' own sensors are too coarse at walking pace; the gearbox is trusted there.
 _BLEND_BP = (1.0, 6.0)  # m/s
