@@ -96,12 +96,12 @@ class PathData:
 
     points: tuple[float, ...]
     prob: float
-    std: float
+    std: float  # m
 
 
 @dataclass(slots=True)
 class LeadVision:
-    """The lead vehicle as the camera sees it; `d_rel` in m from the camera, `std` in m."""
+    """The lead vehicle as the camera sees it; `d_rel` in m from the front bumper, `std` in m."""
 
     d_rel: float
     prob: float

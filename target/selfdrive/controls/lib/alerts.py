@@ -30,6 +30,25 @@ class Alert(NamedTuple):
         return max(self.ends)
 
 
+_SPECIAL = {
+    "startup": Alert("Hands on the wheel", "Be ready to take over", LOWEST, "none", "none", 0.0, 0.0, 15.0),
+    "enable": Alert("", "", MID, "none", "beep_single", 0.2, 0.0, 0.0),
+    "disable": Alert("", "", MID, "none", "beep_single", 0.2, 0.0, 0.0),
+    "fcw": Alert("Brake now", "Collision ahead", HIGH, "fcw", "chime_repeated", 1.0, 2.0, 2.0),
+    "steer_saturated": Alert(
+        "Take over steering", "Turn is too sharp", LOW, "steer_required", "chime_single", 1.0, 2.0, 3.0
+    ),
+    "steer_temp_unavailable": Alert(
+        "Take over steering", "Power steering is busy", LOW, "steer_required", "chime_double", 0.4, 2.0, 3.0
+    ),
+    "pre_driver_distracted": Alert(
+        "Touch the wheel", "Driver seems absent", LOW, "steer_required", "chime_double", 0.1, 0.1, 0.1
+    ),
+    "driver_distracted": Alert(
+        "Touch the wheel", "Slowing down", MID, "steer_required", "chime_repeated", 0.1, 0.1, 0.1
+    ),
+}
+
 # Event name: what is wrong, in a few words.
 _IMMEDIATE = {
     "can_error": "CAN messages are missing",
@@ -37,9 +56,7 @@ _IMMEDIATE = {
     "model_error": "No data from the camera",
     "steer_unavailable": "Power steering fault",
     "brake_unavailable": "Brake fault",
-    "gas_unavailable": "Throttle fault",
     "reverse_gear": "Reverse gear",
-    "cruise_disabled": "Cruise control is off",
 }
 _SOFT = {
     "wrong_gear": "Gear is not D",
@@ -47,7 +64,7 @@ _SOFT = {
     "seatbelt_not_latched": "Seat belt is open",
     "esp_disabled": "Stability control is off",
 }
-_QUIET = {"no_target": "No lead vehicle nearby", "speed_too_low": "Speed is too low"}
+_QUIET = {"no_target": "No lead vehicle nearby"}
 _NO_ENTRY_ONLY = {
     "wrong_car_mode": "Main switch is off",
     "pedal_pressed": "A pedal is pressed",
@@ -60,33 +77,7 @@ _PERMANENT = ("steer_unavailable", "brake_unavailable")
 
 def _table() -> dict[str, Alert]:
     """All alerts by name; refusals end in `_no_entry`, lasting ones in `_permanent`."""
-    table = {
-        "startup": Alert(
-            "Hands on the wheel", "Be ready to take over", LOWEST, "none", "none", 0.0, 0.0, 15.0
-        ),
-        "enable": Alert("", "", MID, "none", "beep_single", 0.2, 0.0, 0.0),
-        "disable": Alert("", "", MID, "none", "beep_single", 0.2, 0.0, 0.0),
-        "fcw": Alert("Brake now", "Collision ahead", HIGH, "fcw", "chime_repeated", 1.0, 2.0, 2.0),
-        "steer_saturated": Alert(
-            "Take over steering", "Turn is too sharp", LOW, "steer_required", "chime_single", 1.0, 2.0, 3.0
-        ),
-        "steer_temp_unavailable": Alert(
-            "Take over steering",
-            "Power steering is busy",
-            LOW,
-            "steer_required",
-            "chime_double",
-            0.4,
-            2.0,
-            3.0,
-        ),
-        "pre_driver_distracted": Alert(
-            "Touch the wheel", "Driver seems absent", LOW, "steer_required", "chime_double", 0.1, 0.1, 0.1
-        ),
-        "driver_distracted": Alert(
-            "Touch the wheel", "Slowing down", MID, "steer_required", "chime_repeated", 0.1, 0.1, 0.1
-        ),
-    }
+    table = dict(_SPECIAL)
     for name, text in _IMMEDIATE.items():
         table[name] = Alert("Take over now", text, HIGH, "steer_required", "chime_repeated", 1.0, 3.0, 4.0)
     for name, text in _SOFT.items():

@@ -4,9 +4,8 @@ from selfdrive.common.conversions import DEG_TO_RAD, RAD_TO_DEG
 from selfdrive.common.interp import clip
 
 MAX_OFFSET = 5.0 * DEG_TO_RAD  # rad
-LEARN_RATE = (
-    DEG_TO_RAD / 36000.0
-)  # rad per m of error and m/s: one degree in two minutes at 30 m/s, 0.5 m, 20 Hz
+# rad per m of error and m/s, each update: one degree in two minutes at 30 m/s and half a metre off
+LEARN_RATE = DEG_TO_RAD / 36000.0
 MIN_LEARN_SPEED = 1.0  # m/s
 TURN_FACTOR = 0.02 * RAD_TO_DEG  # 1/(rad m/s), learn less in turns
 

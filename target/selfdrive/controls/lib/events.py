@@ -10,7 +10,7 @@ WARNING = "warning"  # shown while engaged
 USER_DISABLE = "user_disable"  # the driver takes over
 SOFT_DISABLE = "soft_disable"  # disengage after a warning time
 IMMEDIATE_DISABLE = "immediate_disable"  # disengage now
-PERMANENT = "permanent"  # shown whenever disabled
+PERMANENT = "permanent"  # shown as long as it lasts, engaged or not
 
 
 class Event(NamedTuple):
@@ -25,6 +25,6 @@ def has_kind(events: Iterable[Event], kind: str) -> bool:
     return any(kind in event.kinds for event in events)
 
 
-def names_of_kind(events: Sequence[Event], *kinds: str) -> list[str]:
-    """Names of the events that ask for one of the kinds, in order of occurrence."""
-    return [event.name for event in events if any(kind in event.kinds for kind in kinds)]
+def names_of_kind(events: Sequence[Event], kind: str) -> list[str]:
+    """Names of the events that ask for this kind of reaction, in order of occurrence."""
+    return [event.name for event in events if kind in event.kinds]

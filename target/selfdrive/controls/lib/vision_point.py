@@ -11,8 +11,8 @@ from selfdrive.messages import LeadVision
 
 MIN_PROB = 0.7
 RATE_VARIANCE = 1e2  # (m/s)^2, about that of a lead of 70 % probability
-Q_DISTANCE = 0.5  # m^2/s
-Q_RATE = 1.0  # (m/s)^2/s
+Q_DISTANCE = 0.5  # m^2, each cycle
+Q_RATE = 1.0  # (m/s)^2, each cycle
 
 MAX_DISTANCE = 4.0
 MAX_SPEED_DIFF = 10.0  # m/s, a camera estimates speed badly
