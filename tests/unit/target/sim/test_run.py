@@ -52,7 +52,7 @@ def test_same_bytes_whatever_ran_before(run):
 
 
 def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
-    """The record stands for a whole run: with the disk full half way, neither an old nor a new one is left."""
+    """The record stands for a whole run: with the disk full half way, none is left, old or new."""
     folder = run("a")
     write = Path.write_bytes
 
