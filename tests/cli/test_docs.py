@@ -1,7 +1,7 @@
 """What README and docs print is what the commands print; what they link exists.
 
-After a change that alters the output: `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py` writes it into the
-pages; read the difference before it is kept.
+After a change that alters the output, `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py` writes it into
+the pages; read the difference before it is kept.
 """
 
 import os
@@ -67,7 +67,7 @@ def lines_of(output: str) -> list[str]:
 
 
 def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
-    """Put what the commands printed into the page, and the campaign's table of the tutorial into the README."""
+    """Put what the commands printed into the page, and the tutorial's table into the README."""
     rest = iter(printed)
 
     def session(block: re.Match[str]) -> str:
@@ -78,9 +78,10 @@ def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
     page.write_text(BLOCK.sub(session, page.read_text(encoding="utf-8")), encoding="utf-8")
     for command, output in printed:
         if page == TUTORIAL and command.startswith(CAMPAIGN):
-            table = "\n".join(lines_of(output.replace("runs/first", "runs/quickstart")))
-            readme = TABLE.sub(lambda _: f"```text\n{table}\n```", README.read_text(encoding="utf-8"))
-            README.write_text(readme, encoding="utf-8")
+            lines = lines_of(output.replace("runs/first", "runs/quickstart"))
+            before, rest_of_page = README.read_text(encoding="utf-8").split("```text\n", 1)
+            after = rest_of_page.split("```", 1)[1]
+            README.write_text("\n".join([before + "```text", *lines, "```" + after]), encoding="utf-8")
 
 
 @pytest.mark.slow
