@@ -251,15 +251,16 @@ class _Checks:
     def _anchors(self) -> CheckResult:
         """Each variant of the plan finds its statements (not compiling is a result, told later)."""
         variants = {fault.spec: fault for fault in planfile.read_faults(self.folder.path).values()}
-        problems = []
+        problems: dict[str, list[str]] = {}
         for fault in variants.values():
             try:
                 mutant.build(self.manifest, self.models, fault, always())
             except InvalidMutant:
                 continue
             except MutatorError as err:
-                problems.append(f"{fault.spec}: {err}")
-        return _result("anchors", "; ".join(problems), f"{len(variants)} variants found their statements")
+                problems.setdefault(str(err), []).append(fault.spec)
+        text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
+        return _result("anchors", text, f"{len(variants)} variants found their statements")
 
 
 def judge_golden(first: _Run, again: _Run) -> str:

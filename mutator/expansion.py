@@ -144,10 +144,12 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """Errors within it point at the campaign's value at `keys`."""
+        """A name that is not known is told at the campaign's `keys`; mistakes in other files stay theirs."""
         try:
             yield
         except MutatorError as err:
+            if err.line is not None:
+                raise
             raise self.campaign.error(
                 keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
             ) from None
