@@ -1,0 +1,339 @@
+"""Campaigns on a foreign target from the first command to the table: what a user meets."""
+
+import csv
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mutator import campaign_run, planfile
+from mutator.chunks import Pending
+from mutator.engine import Execution, Job, ReferenceEngine
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Status
+from mutator.plan import Choices
+from mutator.pytest_campaign import Controller
+from mutator.records import Progress
+from mutator.single import rerun, run_single
+from mutator.workspace import Workspace
+
+CopyToycar = Callable[[Path], Workspace]
+
+
+def rows_of(out: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((out / "results.csv").open()))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProcess[str]":
+    """Run pytest as a user would, in the toy's folder."""
+    plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
+    return subprocess.run(
+        [sys.executable, *plain, *map(str, words)],
+        env=os.environ | {"MUTATOR_ROOT": str(toy.library.parent)},
+        cwd=toy.library.parent,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+@pytest.fixture(scope="module")
+def finished_once(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
+    folder = tmp_path_factory.mktemp("finished")
+    assert campaign_run.run(copy_toycar(folder), "small", folder / "run").exit_code == 0
+    return folder / "run"
+
+
+@pytest.fixture
+def finished(finished_once: Path, tmp_path: Path) -> Path:
+    """The run folder of a small finished campaign."""
+    return Path(shutil.copytree(finished_once, tmp_path / "finished"))
+
+
+def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
+    """Loops, crashes, exits, greed and mutants that do not compile have a status; none is the harness's."""
+    summary = campaign_run.run(toy, "hostile", tmp_path / "run", workers=2)
+    assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
+    found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}
+    assert found == {
+        "hang": ("timeout", ""),
+        "crash": ("crashed", ""),
+        "leave": ("crashed", ""),
+        "segfault": ("crashed", ""),
+        "hoard": ("crashed", ""),
+        "unsound": ("invalid_mutant", ""),
+        "silence": ("ok", "sdc"),
+    }
+
+
+def test_a_run_leaves_what_it_should(toy: Workspace, tmp_path: Path) -> None:
+    """Plan, goldens, patches, records, tables; no scratch; and the target's tree is what it was."""
+    tree = toy.library.parent / "tree"
+    before = contents(tree)
+    out = tmp_path / "run"
+    told: list[Progress] = []
+    summary = campaign_run.run(toy, "small", out, workers=2, notify=told.append)
+    assert contents(tree) == before
+    assert {stage.stage for stage in told} == {"plan", "checks", "experiments", "results"}
+    assert told[-2].done == 12
+    assert {p.name for p in out.iterdir()} == {
+        "run.json",
+        "campaign.yaml",
+        "plan.csv",
+        "plan",
+        "checks.json",
+        "golden",
+        "patches",
+        "records",
+        "timings",
+        "results.csv",
+        "results.parquet",
+        "timings.parquet",
+        "owner.lock",
+        "workers",
+    }
+    assert summary.results is not None
+    assert summary.results.rows == 12
+    assert {p.name for p in (out / "golden").iterdir()} == {"A", "A+alone"}
+    for row in rows_of(out):
+        name = row["experiment_id"]
+        assert (out / "patches" / name[:2] / f"{name}.patch").read_text().startswith("diff --git a/")
+
+
+@pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
+def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
+    """A kept patch applies to the target and gives, byte for byte, the files of the mutant that ran."""
+    row = next(row for row in rows_of(finished) if row["outcome"] == "sdc")
+    name = row["experiment_id"]
+    tree = tmp_path / "patched"
+    shutil.copytree(toy.library.parent / "tree", tree, ignore=shutil.ignore_patterns("__pycache__"))
+    patch = finished / "patches" / name[:2] / f"{name}.patch"
+    subprocess.run(["patch", "-p1", "-s", "-d", str(tree), "-i", str(patch)], check=True)
+    single, same = rerun(toy, finished, name)
+    assert same
+    assert (tree / "toycar" / "_fi.py").is_file()
+    assert single.mutant is not None
+    for path, data in single.mutant.files.items():
+        assert (tree / path).read_bytes() == data
+
+
+def test_rerun_gives_the_same_record_and_a_trace(toy: Workspace, finished: Path) -> None:
+    """Any experiment can be run again exactly, its trace kept; a changed record would be noticed."""
+    for row in rows_of(finished)[:3]:
+        single, same = rerun(toy, finished, row["experiment_id"][:8])
+        assert same
+        assert single.faulty == finished / "traces" / row["experiment_id"] / "faulty"
+        assert (single.faulty / "log.npz").is_file()
+        assert single.golden == finished / "golden" / single.golden.name
+        assert not (single.faulty.parent / "work").exists()
+    path = next((finished / "records").iterdir())
+    path.write_text(path.read_text().replace('"outcome":"', '"outcome":"masked","x":"'))
+    assert not rerun(toy, finished, single.experiment.id)[1]
+
+
+def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
+    """An experiment can be run with nothing but a workspace; golden is run too."""
+    experiment = planfile.read_all(finished)[0]
+    single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
+    assert single.record.status is Status.OK
+    assert (single.golden / "log.npz").is_file()
+    assert (tmp_path / "alone" / "mutant.patch").is_file()
+    hostile = Choices(only='fault_type == "unsound"')
+    campaign_run.run(toy, "hostile", tmp_path / "hostile", choices=hostile)
+    unsound = planfile.read_all(tmp_path / "hostile")[0]
+    refused = run_single(toy, toy.manifest("toycar"), unsound, tmp_path / "alone")
+    assert (refused.mutant, refused.record.status) == (None, Status.INVALID_MUTANT)
+    (toy.library.parent / "tree" / "toycar" / "go.py").write_text("raise SystemExit(1)")
+    with pytest.raises(CheckFailed, match="without any fault ended as crashed"):
+        run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "broken")
+
+
+def test_harness_errors_are_tried_again(
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Harness errors make exit code 3 and no outcome; the same command runs just them again."""
+    execute, hit = ReferenceEngine.execute, []
+
+    def flaky(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
+        done = execute(self, job, folder)
+        if job.mutant and len(job.name) == 16 and len(hit) < 2:
+            hit.append(job.name)
+            fields = {name: getattr(done, name) for name in ("out", "probe", "cpu_s", "wall_s")}
+            return Execution(status=Status.HARNESS_ERROR, detail="killed from outside by SIGKILL", **fields)
+        return done
+
+    monkeypatch.setattr(ReferenceEngine, "execute", flaky)
+    out = tmp_path / "run"
+    summary = campaign_run.run(toy, "small", out)
+    assert (summary.exit_code, summary.done, summary.ran) == (3, 10, 10)
+    assert dict(summary.harness_errors).keys() == set(hit)
+    assert summary.outcomes["harness_error"] == 2
+    assert sum(row["status"] == "harness_error" and row["outcome"] == "" for row in rows_of(out)) == 2
+    again = campaign_run.run(toy, "small", out)
+    assert (again.exit_code, again.done, again.ran) == (0, 12, 2)
+    assert campaign_run.run(toy, "small", out).ran == 0
+
+
+def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
+    """A run goes on without saying its choices again; other ones, or another text, are refused."""
+    assert campaign_run.run(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
+    for choices in (
+        Choices(seed=4),
+        Choices(limit=3),
+        Choices(only="value > 1"),
+        Choices(reading="as_coded"),
+    ):
+        with pytest.raises(MutatorError, match="planned with"):
+            campaign_run.run(toy, "small", finished, choices=choices)
+    with pytest.raises(MutatorError, match="another text"):
+        campaign_run.run(toy, "toy", finished)
+    assert campaign_run.run(toy, finished / "campaign.yaml", finished).exit_code == 0
+
+
+def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
+    """A finished run does not pass for one of a target that was edited since."""
+    with (toy.library.parent / "tree" / "toycar" / "driver.py").open("a") as file:
+        file.write("# edited\n")
+    with pytest.raises(MutatorError, match="changed since this run was planned: target"):
+        campaign_run.run(toy, "small", finished)
+    with pytest.raises(MutatorError, match="changed since this run was planned: target"):
+        rerun(toy, finished, rows_of(finished)[0]["experiment_id"])
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["--campaign", "small"], 4, "--campaign needs --campaign-out DIR"),
+        (["--campaign-out", "out"], 4, "--campaign-out without --campaign"),
+        (["--campaign", "nosuch", "--campaign-out", "out"], 2, "no campaign 'nosuch'"),
+        (["--campaign", "small", "--campaign-out", "tree"], 2, "no run folder, and not empty (toycar)"),
+        (["--campaign", "small", "--campaign-out", "newer", "-n", "2"], 2, "written by a newer mutator"),
+        (["--campaign", "unarmed", "--campaign-out", "out", "-n", "2"], 1, "canary: did not reach H3"),
+    ],
+)
+def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int, told: str) -> None:
+    """Called as pytest, a mistake is answered in words, with the exit code of its kind and no traceback."""
+    root = toy.library.parent
+    (root / "newer").mkdir()
+    (root / "newer" / "run.json").write_text(json.dumps({"schema": "run/99"}))
+    text = toy.campaign("small").read_text().replace("at_s: 1.0", "at_s: 5.9")
+    (toy.library / "campaigns" / "unarmed.yaml").write_text(text)
+    answer = pytest_campaign(toy, *words)
+    assert answer.returncode == code, answer.stdout + answer.stderr
+    assert told in answer.stdout + answer.stderr
+    assert "Traceback" not in answer.stdout + answer.stderr
+
+
+def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
+    """The plugin does nothing, and imports nothing of the harness, when no campaign is asked for."""
+    test = "import sys\n\ndef test_it():\n    assert 'mutator.campaign_run' not in sys.modules\n"
+    (toy.library.parent / "test_it.py").write_text(test)
+    answer = pytest_campaign(toy, "test_it.py")
+    assert "1 passed" in answer.stdout
+    assert "experiments" not in answer.stdout
+
+
+def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
+    """Without xdist the same items run in the command's own process; a finished run has nothing to do."""
+    words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
+    answer = pytest_campaign(toy, *words)
+    assert answer.returncode == 0, answer.stdout
+    assert "7 passed" in answer.stdout
+    assert "12 of 12 experiments done, 12 now" in answer.stdout
+    again = pytest_campaign(toy, *words, "-n", "2")
+    assert again.returncode == 0, again.stdout
+    assert "12 of 12 experiments done, 0 now" in again.stdout
+
+
+class Counting:
+    """Pytest plugin: what was collected, and when."""
+
+    def __init__(self) -> None:
+        self.items = 0
+        self.seconds = 0.0
+        self._began = time.monotonic()
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        self.items = len(session.items)
+        self.seconds = time.monotonic() - self._began
+
+
+def test_collecting_50000_experiments_is_cheap(toy: Workspace, tmp_path: Path) -> None:
+    """2,500 chunks are collected in a moment, and without opening plan, target or library."""
+    begun: Any = SimpleNamespace(
+        folder=SimpleNamespace(path=tmp_path / "nowhere"),
+        workspace=Workspace(library=tmp_path / "nowhere", templates=tmp_path / "nowhere"),
+        pending=tuple(Pending(chunk, tuple(range(20))) for chunk in range(2500)),
+        worker_name=lambda name: name,
+        problem="",
+        interrupted=False,
+    )
+    words = ["--campaign", "x", "--campaign-out", str(tmp_path), "--collect-only", "-qq", "--noconftest"]
+    alone = ["-c", os.devnull, "-p", "no:cacheprovider", "--disable-plugin-autoload", "-p", "mutator"]
+    counting = Counting()
+    pytest.main([*words, *alone], plugins=[Controller(begun), counting])
+    assert counting.items == 2500
+    assert counting.seconds < 5.0
+
+
+FULL_DISK = """
+import os, sys, threading, time
+from pathlib import Path
+from mutator import campaign_run
+from mutator.workspace import Workspace
+out, workers = Path(sys.argv[2]) / "run", int(sys.argv[3])
+toy = Workspace.find(root=Path(sys.argv[1]))
+filler = out.parent / "filler"
+
+def fill():
+    while not any(p.read_bytes().count(b"\\n") > 2 for p in (out / "records").glob("*")):
+        time.sleep(0.01)
+    with filler.open("wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(4096))
+        except OSError:
+            pass
+
+threading.Thread(target=fill).start()
+first = campaign_run.run(toy, "small", out, workers=workers)
+filler.unlink()
+again = campaign_run.run(toy, "small", out, workers=workers)
+print(first.exit_code, 2 <= first.done < 12, "no space left" in first.problem)
+print(again.exit_code, again.done, again.ran == 12 - first.done)
+sys.stdout.flush()
+os.write(1, (out / "results.csv").read_bytes())
+"""
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_a_full_disk(toy: Workspace, finished: Path, tmp_path: Path, workers: int) -> None:
+    """A disk that fills up stops the campaign with clear words; with room again the same command completes it
+    to the same table, repeating nothing that was finished."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    script = f'mount -t tmpfs -o size=6m none "{disk}" && exec "$0" -c "$1" "$2" "{disk}" {workers}'
+    command = ["unshare", "-rm", "sh", "-c", script, sys.executable, FULL_DISK, str(toy.library.parent)]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    except FileNotFoundError:
+        pytest.skip("needs unshare")
+    if "unshare" in answer.stderr or "mount" in answer.stderr:
+        pytest.skip("needs the right to mount a small file system")
+    assert answer.returncode == 0, answer.stderr
+    first, again, table = answer.stdout.split("\n", 2)
+    assert first == "3 True True"
+    assert again == "0 12 True"
+    assert table == (finished / "results.csv").read_text()

@@ -1,0 +1,107 @@
+"""The quickstart on the controller that ships: whole, and what it must show."""
+
+import csv
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mutator import campaign_run
+from mutator.golden import load_trace
+from mutator.plan import Choices
+from mutator.trigger import VARIABLES, evaluate
+from mutator.workspace import Workspace
+
+pytestmark = pytest.mark.slow
+
+CONTEXTS = {"S1": 3, "S2": 4, "S3": 4, "S4": 4, "S5": 3}
+Row = dict[str, str]
+
+
+@pytest.fixture(scope="module")
+def workspace() -> Workspace:
+    return Workspace.find(root=Path(__file__).parents[2])
+
+
+@pytest.fixture(scope="module")
+def quickstart(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run folder of the quickstart, run by two workers."""
+    out = tmp_path_factory.mktemp("quickstart") / "run"
+    began = time.monotonic()
+    summary = campaign_run.run(workspace, "quickstart", out, workers=2)
+    assert (summary.exit_code, summary.done) == (0, 60)
+    assert time.monotonic() - began < 300.0
+    return out
+
+
+@pytest.fixture(scope="module")
+def rows(quickstart: Path) -> list[Row]:
+    return list(csv.DictReader((quickstart / "results.csv").open()))
+
+
+def test_every_run_ends_well_and_every_outcome_is_seen(rows: list[Row]) -> None:
+    """60 runs, all ok; hazards of all three kinds, silent corruption, masked and never activated faults."""
+    assert Counter(row["status"] for row in rows) == {"ok": 60}
+    assert {row["outcome"] for row in rows} == {"hazard", "sdc", "masked", "not_activated"}
+    assert all(any(row[name] == "1" for row in rows) for name in ("h1", "h2", "h3"))
+
+
+@pytest.mark.parametrize(
+    ("fault_type", "alerts"),
+    [("jamming", {"can_error", "radar_error"}), ("camera_unavailable", {"model_error"})],
+)
+def test_lost_data_are_noticed_at_once(rows: list[Row], fault_type: str, alerts: set[str]) -> None:
+    """Without radar or camera data the controller says so within 0.6 s of the activation."""
+    active = [row for row in rows if row["fault_type"] == fault_type and row["activated"] == "1"]
+    assert active
+    for row in active:
+        assert row["alerts"].split(";")[0] in alerts
+        assert float(row["t_alert"]) - float(row["t_activation"]) <= 0.6
+
+
+def test_distance_in_the_camera_alone_changes_little(rows: list[Row]) -> None:
+    """The radar's distance matters, the camera's alone hardly."""
+
+    def hazards(module: str, fault_type: str) -> int:
+        chosen = [row for row in rows if (row["module"], row["fault_type"]) == (module, fault_type)]
+        assert chosen
+        return sum(row["outcome"] == "hazard" for row in chosen)
+
+    assert hazards("vision_output", "relative_distance") == 0
+    assert hazards("radar", "chaff") > 0
+
+
+def test_times_are_in_order(rows: list[Row]) -> None:
+    """Nothing comes before the activation, and reaction times are positive or nothing."""
+    for row in rows:
+        for name in ("t_manifest", "t_h1", "t_h2", "t_h3", "t_alert"):
+            assert not row[name] or float(row[name]) >= float(row["t_activation"])
+        assert not row["reaction_time"] or float(row["reaction_time"]) > 0.0
+
+
+@pytest.mark.parametrize("scenario", sorted(CONTEXTS))
+def test_contexts_that_fault_free_runs_reach(quickstart: Path, workspace: Workspace, scenario: str) -> None:
+    """The golden runs reach as many contexts of the table as the original does."""
+    manifest = workspace.manifest()
+    trace = load_trace(manifest, quickstart / "golden" / scenario)
+    table = workspace.context_table("accelerate_decelerate")
+    reached = set()
+    for t, d_rel, v_ego, v_lead in zip(*(trace[name] for name in VARIABLES[:4]), strict=True):
+        values = {"t": t, "d_rel": d_rel, "v_ego": v_ego, "v_lead": v_lead}
+        if t >= 1.5:
+            reached |= {row.id for row in table.rows if evaluate(row.condition, values)}
+    assert len(reached) == CONTEXTS[scenario]
+
+
+@pytest.mark.parametrize("reading", ["as_described", "as_coded"])
+def test_one_worker_or_two(workspace: Workspace, tmp_path: Path, reading: str) -> None:
+    """A part of the quickstart in either reading gives the same bytes with one worker and with two."""
+    choices = Choices(reading=reading, limit=16)
+    tables = []
+    for workers in (1, 2):
+        out = tmp_path / f"run{workers}"
+        summary = campaign_run.run(workspace, "quickstart", out, workers=workers, choices=choices)
+        assert (summary.exit_code, summary.done) == (0, 16)
+        tables.append([(out / name).read_bytes() for name in ("results.csv", "results.parquet")])
+    assert tables[0] == tables[1]
