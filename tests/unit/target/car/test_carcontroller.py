@@ -1,10 +1,13 @@
 """What the Civic's actuators are sent for a demand."""
 
+import cantools
 import pytest
 from selfdrive.car.honda.carcontroller import BrakeHysteresis, CarController
-from selfdrive.car.honda.values import COMMAND_MESSAGES
+from selfdrive.car.honda.values import CAR_DBC, COMMAND_MESSAGES
 from selfdrive.messages import Actuators, CarControl, CarState
 from selfdrive.sim.actuators import ActuatorReceiver
+
+DBC = cantools.database.load_file(CAR_DBC)
 
 
 class Rig:
@@ -105,6 +108,30 @@ def test_what_is_sent_when(rig):
     assert all(0xE4 in sent for sent in addresses)
     assert [k for k, sent in enumerate(addresses) if {0x200, 0x1FA} <= sent] == list(range(0, 20, 2))
     assert [k for k, sent in enumerate(addresses) if {0x30C, 0x33D} <= sent] == [0, 10]
+
+
+@pytest.mark.parametrize(
+    ("control", "shown"),
+    [
+        (
+            {"enabled": True, "speed_visible": True, "set_speed": 97 / 3.6, "lanes_visible": True},
+            {"CRUISE_SPEED": 97, "HUD_LEAD": 1, "SOLID_LANES": 1, "CRUISE_OVERRIDE": 1, "FCW": 0, "CHIME": 0},
+        ),
+        ({"enabled": True, "lead_visible": True}, {"CRUISE_SPEED": 255, "HUD_LEAD": 2, "SOLID_LANES": 0}),
+        ({"cancel_cruise": True, "lead_visible": True}, {"CRUISE_CANCEL_CMD": 1, "HUD_LEAD": 0}),
+        (
+            {"visual_alert": "fcw", "audible_alert": "chime_repeated"},
+            {"FCW": 2, "CHIME": 1, "BEEP": 1, "STEERING_REQUIRED": 0, "CRUISE_CANCEL_CMD": 0},
+        ),
+        ({"visual_alert": "steer_required"}, {"FCW": 0, "BEEP": 0, "STEERING_REQUIRED": 1}),
+    ],
+)
+def test_what_the_driver_is_shown(rig, control, shown):
+    """Set speed, lead, lanes and warnings reach the dashboard, as cantools reads it."""
+    values = {}
+    for frame in rig.controller.update(CarControl(**control), rig.car, 0):
+        values |= DBC.decode_message(frame.address, frame.data, decode_choices=False)
+    assert {name: values[name] for name in shown} == shown
 
 
 def test_every_command_frame_is_accepted(rig):

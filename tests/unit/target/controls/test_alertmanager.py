@@ -1,8 +1,18 @@
 """Priorities and durations of alerts."""
 
 import pytest
+from selfdrive.car.honda import interface
+from selfdrive.controls import controlsd, plannerd
 from selfdrive.controls.lib.alertmanager import AlertManager
 from selfdrive.controls.lib.alerts import ALERTS, HIGH, LOW, LOWEST, MID
+from selfdrive.controls.lib.events import (
+    IMMEDIATE_DISABLE,
+    NO_ENTRY,
+    PERMANENT,
+    SOFT_DISABLE,
+    WARNING,
+    Event,
+)
 
 
 def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
@@ -60,6 +70,38 @@ def test_unknown_alert_is_an_error() -> None:
     """A name without an alert is refused when it is raised."""
     with pytest.raises(KeyError, match="no alert is named 'nonsense'"):
         AlertManager().add("nonsense", 0.0)
+
+
+EVENTS = [
+    *(event for _, event in interface._CONDITIONS),
+    *(
+        e
+        for module in (interface, controlsd, plannerd)
+        for e in vars(module).values()
+        if isinstance(e, Event)
+    ),
+]
+SUFFIX = {
+    NO_ENTRY: "_no_entry",
+    PERMANENT: "_permanent",
+    WARNING: "",
+    SOFT_DISABLE: "",
+    IMMEDIATE_DISABLE: "",
+}
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.name)
+def test_every_event_has_its_alerts(event: Event) -> None:
+    """What an event of the car, the planner or the controls asks to be shown can be shown."""
+    asked = {event.name + SUFFIX[kind] for kind in event.kinds if kind in SUFFIX}
+    assert asked <= set(ALERTS)
+
+
+def test_every_alert_can_be_raised() -> None:
+    """No alert is without an event, or a place in the loop, that raises it."""
+    asked = {event.name + SUFFIX[kind] for event in EVENTS for kind in event.kinds if kind in SUFFIX}
+    in_the_loop = {"startup", "enable", "disable", "fcw", "steer_saturated"}
+    assert set(ALERTS) - asked - in_the_loop == {"pre_driver_distracted", "driver_distracted"}
 
 
 @pytest.mark.parametrize(

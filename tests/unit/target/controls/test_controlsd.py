@@ -227,5 +227,9 @@ def test_frames_are_counted_and_passed_on(drive: Drive) -> None:
 
 
 def test_startup_is_told(drive: Drive) -> None:
-    """The first cycles show the start-up text."""
+    """The first 15 s show the start-up text."""
     assert drive.state.alerts == ("startup",) and drive.state.alert_text1 != ""
+    drive.run(1490)
+    assert drive.state.alerts == ("startup",)
+    drive.run(10)
+    assert drive.state.alerts == () and drive.state.alert_text1 == ""

@@ -38,23 +38,42 @@ def test_warns_when_all_counters_are_full() -> None:
     assert warnings() == [pytest.approx(3.0)]
 
 
-@pytest.mark.parametrize(
-    ("car", "lead"),
-    [
-        ({"v_ego": 5.0}, {}),
-        ({"left_blinker": True}, {}),
-        ({"right_blinker": True}, {}),
-        ({"v_ego": 18.0}, {}),  # 2.5 s to collision
-        ({"v_ego": 10.0}, {"d_rel": 1.0}),
-        ({}, {"v_lead": 2.4, "d_rel": 30.0}),
-        ({}, {"y_rel": -1.0}),
-        ({}, {"v_lat": 0.4}),
-        ({}, {"fcw": False}),
-    ],
-)
-def test_each_condition_prevents_the_warning(car: dict, lead: dict) -> None:
-    """Every single condition is needed."""
+# A situation in which one condition alone is missing, and the smallest change that brings it back.
+BARELY = [
+    ({"v_ego": 5.0}, {"v_lead": 3.0, "d_rel": 4.0}, {"v_ego": 5.01}, {}),
+    ({"v_ego": 18.0}, {}, {"v_ego": 18.01}, {}),  # 2.5 s to collision
+    ({"v_ego": 10.0}, {"d_rel": 1.0, "a_lead_k": -4.0}, {"v_ego": 10.01}, {}),  # not closing in
+    ({}, {"v_lead": 2.5}, {}, {"v_lead": 2.51}),
+    ({}, {"y_rel": -1.0}, {}, {"y_rel": -0.99}),
+    ({}, {"v_lat": 0.4}, {}, {"v_lat": 0.39}),
+    ({"left_blinker": True}, {}, {"left_blinker": False}, {}),
+    ({"right_blinker": True}, {}, {"right_blinker": False}, {}),
+    ({}, {"fcw": False}, {}, {"fcw": True}),
+]
+
+
+@pytest.mark.parametrize(("car", "lead", "car_change", "lead_change"), BARELY)
+def test_each_condition_prevents_the_warning(
+    car: dict, lead: dict, car_change: dict, lead_change: dict
+) -> None:
+    """Every single condition is needed, and no more than its limit."""
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == []
+    car, lead = car | car_change, lead | lead_change
+    assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == [pytest.approx(3.0, abs=0.06)]
+
+
+@pytest.mark.parametrize(("car", "lead", "car_change", "lead_change"), BARELY[:6])
+def test_a_condition_must_have_held_for_ten_cycles(
+    car: dict, lead: dict, car_change: dict, lead_change: dict
+) -> None:
+    """With all else in place, ten cycles of the condition that was missing bring the warning."""
+    checker = FcwChecker()
+    car, lead = replace(CAR, **car), replace(LEAD, **lead)
+    for k in range(80):
+        assert not checker.update(k * 0.05, car, lead, BRAKING)
+    car, lead = replace(car, **car_change), replace(lead, **lead_change)
+    warned = [checker.update(4.0 + k * 0.05, car, lead, BRAKING) for k in range(10)]
+    assert warned == [False] * 9 + [True]
 
 
 @pytest.mark.parametrize(

@@ -93,13 +93,14 @@ def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
 def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
     """The brake is released by 0.8 a second to 0.2, then the loop takes over."""
     control = stopped(params)
-    follow(control, at(0.0, standstill=True), plan(0.3, future=1.0))
-    assert control.state == STARTING
-    cycles = 0
-    while control.state == STARTING:
-        follow(control, at(0.0, standstill=True), plan(0.3, future=1.0))
-        cycles += 1
-    assert control.state == PID
+    follow(control, at(0.0, standstill=True), plan(0.3, future=0.5))
+    assert control.state == STOPPING
+    states = []
+    for _ in range(60):
+        follow(control, at(0.0, standstill=True), plan(0.3, future=0.51))
+        states.append(control.state)
+    cycles = states.count(STARTING)
+    assert states == [STARTING] * cycles + [PID] * (60 - cycles)
     assert cycles == pytest.approx(0.3 / 0.8 * 100, abs=2)
 
 

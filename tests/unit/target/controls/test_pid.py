@@ -30,12 +30,13 @@ def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
     assert pid.i == pytest.approx(-0.005)
 
 
-def test_integrator_may_return_from_beyond() -> None:
+@pytest.mark.parametrize("side", [1, -1])
+def test_integrator_may_return_from_beyond(side: int) -> None:
     """An integral of the other sign is worked off even while control is beyond the limit."""
     pid = make()
-    pid.i = -0.5
-    pid.update(3.0, 0.0, speed=0.0)
-    assert pid.i == pytest.approx(-0.47)
+    pid.i = -0.5 * side
+    pid.update(3.0 * side, 0.0, speed=0.0)
+    assert pid.i == pytest.approx(-0.47 * side)
 
 
 def test_limits_apply_after_conversion() -> None:

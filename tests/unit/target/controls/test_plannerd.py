@@ -89,6 +89,14 @@ def test_cruise_within_limits(params: CarParams) -> None:
     assert max(p.a_target for p in plans) == pytest.approx(0.5, abs=0.01)
 
 
+def test_turns_leave_less_to_speed_up(params: CarParams) -> None:
+    """At 20 m/s a bend of 1.88 m/s^2 leaves 0.27 m/s^2 of the 1.9 m/s^2 that are allowed together."""
+    drive = started(params)
+    angle = 1.88 / 20.0**2 * params.steer_ratio * params.wheelbase
+    drive.car = CarState(v_ego=20.0, a_ego=0.3, steering_angle=angle)
+    assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.275, abs=0.01)
+
+
 def test_the_slowest_wins(params: CarParams) -> None:
     """The plan that is slowest in 0.2 s is taken, if it is for a lead."""
     slow, slower = FixedMpc(-0.1, -0.5, True), FixedMpc(-0.2, -1.0, True)

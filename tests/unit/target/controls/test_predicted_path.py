@@ -37,6 +37,7 @@ def test_model_curve_agrees_with_a_search() -> None:
     assert distance_to(curve, 40.0, 3.0) == pytest.approx(best, abs=1e-3)
 
 
-def test_sharp_steering_stays_finite() -> None:
+@pytest.mark.parametrize("side", [1, -1])
+def test_sharp_steering_stays_finite(side: int) -> None:
     """Points beyond the circle have a finite distance."""
-    assert abs(distance_to(steering_curve(0.1), 100.0, 0.0)) < 2000.0 * pi
+    assert abs(distance_to(steering_curve(0.1 * side), 100.0, 0.0)) < 2000.0 * pi

@@ -100,7 +100,8 @@ def lead(d_rel: float = 50.0, d_path: float = 0.0, v_lat: float = 0.0, v_rel: fl
         (lead(v_rel=-20.0), False),
         (lead(v_rel=-30.0), False),
         (lead(d_rel=10.0, d_path=2.0, v_lat=-0.6), True),  # cuts in
-        (lead(d_rel=60.0, d_path=2.0, v_lat=-0.6), False),  # too far for lateral speed to count
+        (lead(d_rel=57.0, d_path=2.0, v_lat=-99.0), False),  # too far for lateral speed to count
+        (lead(d_rel=56.0, d_path=2.0, v_lat=-99.0), True),
         (lead(d_rel=10.0, d_path=2.6, v_lat=-5.0), False),  # no more than 1 m is corrected
         (lead(d_rel=10.0, d_path=1.4, v_lat=5.0), True),  # leaving does not count
     ],

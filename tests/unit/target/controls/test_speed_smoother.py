@@ -50,6 +50,22 @@ def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: floa
     assert path[-1][1] == pytest.approx(0.0, abs=1e-2)
 
 
+@given(
+    v=st.floats(0.0, 40.0),
+    a=st.floats(0.0, 1.0),
+    gain=st.floats(1.0, 20.0),
+    side=st.sampled_from((1, -1)),
+    once=st.floats(0.01, 30.0),
+)
+def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int, once: float) -> None:
+    """Asked for a time far ahead, the way is the one that many small steps lead to."""
+    limits = Limits(a_min=-0.8, a_max=0.8, j_min=-0.7, j_max=0.7)
+    v_far, a_far = smooth_speed(v, side * a, v + side * gain, limits, once)
+    (v_near, a_near), *_ = reversed(drive(v, side * a, v + side * gain, 200, limits, once / 200))
+    assert v_near == pytest.approx(v_far, abs=1e-3)
+    assert a_near == pytest.approx(a_far, abs=1e-2)
+
+
 def test_a_ceiling_below_zero_slows_down_towards_a_higher_target() -> None:
     """With an upper limit of -0.2 the car slows down though the target is higher."""
     v, a = drive(20.0, 0.0, 30.0, 100, Limits(-0.5, -0.2, -0.5, 0.5))[-1]
