@@ -1,14 +1,25 @@
 """Scenarios and truths to try parts of the simulator on."""
 
+from functools import cache
 from pathlib import Path
 
 import pytest
+from selfdrive.sim.run import simulate
+from selfdrive.sim.scenario import load_scenario
 from selfdrive.sim.truth import GroundTruth
+
+SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"
 
 
 @pytest.fixture
 def scenarios():
-    return Path(__file__).parents[4] / "fault_library" / "scenarios"
+    return SCENARIOS
+
+
+@pytest.fixture(scope="session")
+def fault_free():
+    """Runs a scenario of the library without a fault, once; returns its result."""
+    return cache(lambda name: simulate(load_scenario(SCENARIOS / f"{name}.yaml"), 0))
 
 
 @pytest.fixture
