@@ -12,7 +12,7 @@ from mutator.engine import Execution, Job, ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
 from mutator.golden import BadOutput, golden_key
 from mutator.ids import digest
-from mutator.jsonio import read_json, write_json
+from mutator.jsonio import full_disk_told, read_json, write_json
 from mutator.manifest import TargetManifest
 from mutator.model import Experiment, Status
 from mutator.mutant import InvalidMutant
@@ -67,7 +67,8 @@ def run_checks(
     known = checks.known()
     if known is not None:
         return known
-    results = tuple(checks.run(workers, notify or (lambda progress: None)))
+    with full_disk_told(folder.path):
+        results = tuple(checks.run(workers, notify or (lambda progress: None)))
     failed = [result for result in results if not result.passed]
     if failed:
         text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])

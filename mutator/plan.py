@@ -23,7 +23,7 @@ from mutator.sample import pick
 from mutator.workspace import Workspace
 
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
-_DEFAULT_CPU_S = 1.7  # one run on the reference engine, interpreter start included
+_DEFAULT_CPU_S = 1.4  # one run on the reference engine, interpreter start included
 _START_S = 3.0  # of a campaign, before and after its runs
 _BYTES_PER_EXPERIMENT = 14_000  # a patch in whole blocks, its record, its rows
 _BYTES_PER_GOLDEN = 1_200_000
@@ -184,8 +184,17 @@ def make_folder(out: Path) -> None:
                 expected="a run folder, or a new or empty folder",
                 remedy="choose another --out",
             )
-    with full_disk_told(out):
-        out.mkdir(parents=True, exist_ok=True)
+    try:
+        with full_disk_told(out):
+            out.mkdir(parents=True, exist_ok=True)
+            (out / _OURS[0]).touch()
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be written ({err.strerror})",
+            where=out,
+            expected="a folder of one's own",
+            remedy="choose another --out",
+        ) from None
 
 
 _OURS = ("owner.lock", "workers", "plan", "plan.csv", "campaign.yaml")  # what a killed freeze leaves

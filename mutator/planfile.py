@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from mutator.errors import MutatorError
 from mutator.ids import canonical, plain
 from mutator.jsonio import full_disk_told, write_atomic
 from mutator.model import (
@@ -42,9 +43,20 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
     return places
 
 
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be read ({err.strerror}); the run folder is damaged",
+            where=path,
+            remedy="plan into a new folder",
+        ) from None
+
+
 def read_faults(run: Path) -> dict[str, Fault]:
     """The plan's faults by id."""
-    faults = (fault_from(json.loads(line)) for line in (run / _FAULTS).read_bytes().splitlines())
+    faults = (fault_from(json.loads(line)) for line in _content(run / _FAULTS).splitlines())
     return {fault.id: fault for fault in faults}
 
 
@@ -60,15 +72,14 @@ def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
 def read_all(run: Path) -> tuple[Experiment, ...]:
     """Every experiment, in the plan's order."""
     faults = read_faults(run)
-    lines = (run / _EXPERIMENTS).read_bytes().splitlines()
+    lines = _content(run / _EXPERIMENTS).splitlines()
     return tuple(experiment_from(json.loads(line), faults) for line in lines)
 
 
 def ids(run: Path) -> Iterator[str]:
     """Every experiment's id, in the plan's order."""
-    with (run / _EXPERIMENTS).open("rb") as file:
-        for line in file:
-            yield json.loads(line)["id"]
+    for line in _content(run / _EXPERIMENTS).splitlines():
+        yield json.loads(line)["id"]
 
 
 def to_plain(experiment: Experiment) -> dict[str, Any]:

@@ -149,9 +149,9 @@ class Command:
         return printed
 
 
-def pytest_words(out: Path) -> list[str]:
+def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
     plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
-    return [*plain, "--campaign", "small", "--campaign-out", str(out), "-n", "2"]
+    return [*plain, "--campaign", str(campaign), "--campaign-out", str(out), "-n", str(workers)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda s: s.name)
@@ -226,3 +226,37 @@ def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes)
     first.end()
     assert first.process.returncode == 0
     assert results(out) == undisturbed
+
+
+@pytest.fixture(scope="module")
+def clone() -> Workspace:
+    """The library, templates and controller that ship."""
+    return Workspace.find(root=Path(__file__).parents[2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reading", ["as_described", "as_coded"])
+def test_the_controller_that_ships(clone: Workspace, tmp_path: Path, reading: str) -> None:
+    """On the real target too: one worker, two, killed with TERM and KILL and resumed, the same bytes."""
+    text = clone.campaign("quickstart").read_text()
+    for old, new in (
+        ("scenarios: [S1, S2, S3, S4, S5]", "scenarios: [S2]"),
+        ("sample: 60", "sample: 16"),
+        ("chunk: 4", "chunk: 2"),
+        ("reading: as_described", f"reading: {reading}"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    campaign = tmp_path / "part.yaml"
+    campaign.write_text(text)
+    one, disturbed = tmp_path / "one", tmp_path / "disturbed"
+    assert campaign_run.run(clone, campaign, one, workers=1).exit_code == 0
+    for count, number in ((3, signal.SIGTERM), (9, signal.SIGKILL)):
+        command = Command(clone, disturbed, *pytest_words(disturbed, campaign))
+        command.wait_for_records(count)
+        command.process.send_signal(number)
+        command.end()
+    summary = campaign_run.run(clone, campaign, disturbed, workers=2)
+    assert summary.exit_code == 0
+    assert 0 < summary.ran < 10
+    assert results(disturbed) == results(one)

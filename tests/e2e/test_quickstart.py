@@ -9,7 +9,6 @@ import pytest
 
 from mutator import campaign_run
 from mutator.golden import load_trace
-from mutator.plan import Choices
 from mutator.trigger import VARIABLES, evaluate
 from mutator.workspace import Workspace
 
@@ -92,16 +91,3 @@ def test_contexts_that_fault_free_runs_reach(quickstart: Path, workspace: Worksp
         if t >= 1.5:
             reached |= {row.id for row in table.rows if evaluate(row.condition, values)}
     assert len(reached) == CONTEXTS[scenario]
-
-
-@pytest.mark.parametrize("reading", ["as_described", "as_coded"])
-def test_one_worker_or_two(workspace: Workspace, tmp_path: Path, reading: str) -> None:
-    """A part of the quickstart in either reading gives the same bytes with one worker and with two."""
-    choices = Choices(reading=reading, limit=16)
-    tables = []
-    for workers in (1, 2):
-        out = tmp_path / f"run{workers}"
-        summary = campaign_run.run(workspace, "quickstart", out, workers=workers, choices=choices)
-        assert (summary.exit_code, summary.done) == (0, 16)
-        tables.append([(out / name).read_bytes() for name in ("results.csv", "results.parquet")])
-    assert tables[0] == tables[1]

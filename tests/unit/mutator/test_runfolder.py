@@ -107,3 +107,17 @@ def test_clean_deletes_everything(folder: RunFolder) -> None:
     """A run folder that nobody holds is deleted whole."""
     runfolder.clean(folder.path)
     assert not folder.path.exists()
+
+
+def test_a_damaged_folder_is_told(folder: RunFolder) -> None:
+    """A run folder whose plan is gone is answered in words."""
+    (folder.path / "plan" / "experiments.jsonl").unlink()
+    with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read .*damaged"):
+        folder.find("00")
+
+
+@pytest.mark.parametrize("place", ["/proc/nosuch/run", "/dev/null/run"])
+def test_a_place_that_cannot_be_written(toycar: Workspace, place: str) -> None:
+    """A folder that cannot be made is answered in words."""
+    with pytest.raises(MutatorError, match="cannot be written"):
+        freeze(make_plan(toycar, "toy"), Path(place), toycar)
