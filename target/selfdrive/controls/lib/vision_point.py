@@ -19,7 +19,11 @@ MAX_SPEED_DIFF = 10.0  # m/s, a camera estimates speed badly
 
 
 class VisionPoint:
-    """Distance and relative speed of the camera's lead; alone it never makes a lead."""
+    """Distance and relative speed of the camera's lead; alone it never makes a lead.
+
+    The simulated camera tells the distance from the bumper, as the original's did, while tracks have it
+    from the camera, 2.7 m further back; the match is wide enough for both.
+    """
 
     def __init__(self) -> None:
         self._filter = DistanceFilter(variance=RATE_VARIANCE, q_distance=Q_DISTANCE, q_rate=Q_RATE)
