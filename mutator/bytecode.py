@@ -21,10 +21,11 @@ def write_compiled(files: Mapping[str, bytes], dest: Path) -> None:
 
 
 def put(files: Mapping[str, bytes], tree: Path) -> None:
-    """Put changed and new files into a tree; their bytecode is dropped, to be made on import."""
+    """Put files into a tree in place of what is there (links, maybe); their bytecode is dropped."""
     for name, data in files.items():
         path = tree / name
         path.parent.mkdir(parents=True, exist_ok=True)
+        path.unlink(missing_ok=True)
         path.write_bytes(data)
         if path.suffix == ".py":
             Path(cache_from_source(str(path))).unlink(missing_ok=True)

@@ -2,8 +2,8 @@
 
 Written to be read by nobody but this process: it imports nothing of the harness, so that no harness code can
 change what the target does. It limits itself, puts the tree first on sys.path, runs the entry module as
-`__main__`, and writes report.json: how the run ended, which files of the package were loaded (with digests),
-and what the probe counted.
+`__main__`, and writes report.json: how the run ended, what the tree was (digests of its files), whether the
+package was also imported from elsewhere, and what the probe counted.
 """
 
 import ctypes
@@ -39,7 +39,8 @@ def main(job_file: str) -> int:
         run_module(job["module"], job["args"])
     except BaseException as err:
         report |= describe(err, job["tree"], probe)
-    report |= loaded_files(job["package"], job["tree"])
+    report["outside"] = imported_elsewhere(job["package"], job["tree"])
+    report["files"] = tree_files(job["tree"])
     report["probe"] = probe.report() if probe else None
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
     return 0
@@ -95,18 +96,25 @@ def place(err: BaseException, tree: str) -> str:
     return found
 
 
-def loaded_files(package: str, tree: str) -> dict[str, Any]:
-    """Files of the package that were imported: digests of those in the tree, paths of any others."""
-    inside, outside = {}, []
+def imported_elsewhere(package: str, tree: str) -> list[str]:
+    """Files of the package that were imported from outside the tree."""
+    found = []
     for name, module in sorted(sys.modules.items()):
         file = getattr(module, "__file__", None)
-        if name.partition(".")[0] != package or file is None:
-            continue
-        if file.startswith(tree + os.sep):
-            inside[os.path.relpath(file, tree)] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        else:
-            outside.append(file)
-    return {"files": inside, "outside": outside}
+        if name.partition(".")[0] == package and file and not file.startswith(tree + os.sep):
+            found.append(file)
+    return found
+
+
+def tree_files(tree: str) -> dict[str, str]:
+    """Digest of every file of the tree but bytecode, by its path in it."""
+    files = {}
+    for folder, _, names in os.walk(tree):
+        if Path(folder).name != "__pycache__":
+            for name in names:
+                path = Path(folder, name)
+                files[str(path.relative_to(tree))] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return files
 
 
 if __name__ == "__main__":

@@ -157,6 +157,15 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
     assert "toycar/world.py" in execution.detail
+    assert run().status is Status.OK, "the next run has its own tree again"
+
+
+def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
+    """A file that belongs to no tree of this job makes a harness error."""
+    body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
+    execution = run(entry(body))
+    assert execution.status is Status.HARNESS_ERROR
+    assert "toycar/left.py" in execution.detail
 
 
 def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
