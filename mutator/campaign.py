@@ -55,6 +55,7 @@ class Canary:
 class Campaign:
     """A campaign file, checked. Times are seconds of simulation; `source` is the file as it was read.
 
+    `setting` names changes of the manifest that every run of the campaign is made with.
     `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
     """
 
@@ -64,6 +65,7 @@ class Campaign:
     source: bytes
     target: str
     scenarios: tuple[str, ...]
+    setting: tuple[str, ...]
     faults: tuple[Selection, ...]
     reading: str
     methods: tuple[Method, ...]
@@ -125,6 +127,7 @@ class _CampaignModel(StrictModel):
     about: str
     target: str
     scenarios: list[str] = Field(min_length=1)
+    setting: list[str] = Field(default_factory=list)
     faults: list[_SelectionModel] = Field(min_length=1)
     reading: Literal["as_described", "as_coded"] = "as_described"
     methods: list[Literal["guided", "random"]] = Field(min_length=1)
@@ -139,7 +142,7 @@ class _CampaignModel(StrictModel):
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file strictly; MutatorError with file and line for anything wrong with it."""
     model, source = read(path, _CampaignModel, SCHEMA)
-    for key in ("scenarios", "methods"):
+    for key in ("scenarios", "setting", "methods"):
         values = getattr(model, key)
         for i, value in enumerate(values):
             if value in values[:i]:
@@ -154,6 +157,7 @@ def load_campaign(path: Path) -> Campaign:
         source=path.read_bytes(),
         target=model.target,
         scenarios=tuple(model.scenarios),
+        setting=tuple(model.setting),
         faults=tuple(Selection(spec=item.spec, values=item.values) for item in model.faults),
         reading=model.reading,
         methods=tuple(Method(name) for name in model.methods),

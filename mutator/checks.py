@@ -195,7 +195,7 @@ class _Checks:
                 name="canary",
                 scenario=self.workspace.scenario(canary.scenario),
                 seed=canary.seed,
-                changes=canary.fault.changes,
+                changes=canary.changes,
                 files=built.files,
                 mutant=built.id,
             ),

@@ -34,15 +34,16 @@ class Expansion:
 
     def experiments(self) -> tuple[Experiment, ...]:
         """All of them, runs of the same scenario and changes side by side (they share a golden run)."""
+        self._check_setting()
         faults = self._selected()
         triggers = self._triggers()
         made = [
-            (order, changes, experiment)
+            (order, experiment)
             for order, scenario in enumerate(self.campaign.scenarios)
-            for changes, experiment in self._of_scenario(scenario, faults, triggers)
+            for experiment in self._of_scenario(scenario, faults, triggers)
         ]
-        made.sort(key=lambda item: item[:2])
-        return tuple(experiment for _, _, experiment in made)
+        made.sort(key=lambda item: (item[0], item[1].changes))
+        return tuple(experiment for _, experiment in made)
 
     def canary(self) -> Experiment:
         """The campaign's canary: the variant's largest value from a given time on."""
@@ -62,6 +63,16 @@ class Expansion:
         )
         trigger = at_time(canary.at_s, name="canary")
         return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
+
+    def _check_setting(self) -> None:
+        for i, change in enumerate(self.campaign.setting):
+            if change not in self.manifest.changes:
+                raise self.campaign.error(
+                    ("setting", i),
+                    f"change '{change}'",
+                    expected=f"one of {', '.join(self.manifest.changes) or 'none'}",
+                    remedy="name a change of the target's manifest",
+                )
 
     def _library(self) -> list[_Numbered]:
         """Every fault of the library with its number within its variant."""
@@ -107,13 +118,13 @@ class Expansion:
 
     def _of_scenario(
         self, scenario: str, faults: list[_Numbered], triggers: tuple[Trigger, ...]
-    ) -> Iterator[tuple[tuple[str, ...], Experiment]]:
+    ) -> Iterator[Experiment]:
         for number, fault in faults:
             for method in self.campaign.methods:
                 for trigger in triggers:
                     if method is Method.RANDOM:
                         trigger = self._random(scenario, fault, number, trigger)
-                    yield fault.changes, self._experiment(fault, scenario, method, trigger)
+                    yield self._experiment(fault, scenario, method, trigger)
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
         """The random partner of a row's trigger, the same in both readings but for when times begin."""
@@ -134,6 +145,7 @@ class Expansion:
             method=method,
             trigger=trigger,
             seed=self.seed,
+            setting=self.campaign.setting,
         )
 
     def _scenario_digest(self, scenario: str) -> str:

@@ -128,7 +128,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One run: a fault (or none), in a scenario, under a trigger, with a seed."""
+    """One run: a fault, in a scenario, under a trigger, with a seed.
+
+    `setting` names the changes of the scenario that a campaign makes for all its experiments.
+    """
 
     fault: Fault
     scenario: str
@@ -136,12 +139,18 @@ class Experiment:
     method: Method
     trigger: Trigger
     seed: int
+    setting: tuple[str, ...] = ()
 
     @cached_property
     def id(self) -> str:
         # through the fault's id, not its whole content: a plan hashes each fault once, not once a run
-        parts = (self.scenario, self.scenario_digest, self.method, self.trigger, self.seed)
+        parts = (self.scenario, self.scenario_digest, self.method, self.trigger, self.seed, self.setting)
         return content_id([self.fault.id, *parts])
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """All changes of the scenario, each once: the fault's own, then those of the setting."""
+        return tuple(dict.fromkeys((*self.fault.changes, *self.setting)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -77,7 +77,7 @@ class Plan:
 
     def goldens(self) -> list[tuple[str, tuple[str, ...]]]:
         """(scenario, changes) of every fault-free run that is needed, the canary's included."""
-        needed = dict.fromkeys((e.scenario, e.fault.changes) for e in (*self.experiments, self.canary))
+        needed = dict.fromkeys((e.scenario, e.changes) for e in (*self.experiments, self.canary))
         return list(needed)
 
     def cost(self, workers: int = 2) -> Cost:
@@ -117,7 +117,7 @@ def make_plan(
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
     experiments = _choose(expansion.experiments(), loaded, choices, seed)
     canary = expansion.canary()
-    chunks = cut([(e.scenario, e.fault.changes) for e in experiments], loaded.chunk)
+    chunks = cut([(e.scenario, e.changes) for e in experiments], loaded.chunk)
     content = [[e.id for e in experiments], chunks, canary.id, plain(loaded.canary), plain(loaded.limits)]
     return Plan(
         campaign=loaded,

@@ -92,6 +92,7 @@ def to_plain(experiment: Experiment) -> dict[str, Any]:
         "method": experiment.method.value,
         "trigger": plain(experiment.trigger),
         "seed": experiment.seed,
+        "setting": list(experiment.setting),
     }
 
 
@@ -104,6 +105,7 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
         method=Method(data["method"]),
         trigger=Trigger(**trigger | {"hold": Hold(trigger["hold"])}),
         seed=data["seed"],
+        setting=tuple(data["setting"]),
     )
 
 

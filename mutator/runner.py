@@ -41,7 +41,7 @@ class Goldens:
         self._traces: dict[tuple[str, tuple[str, ...]], Trace] = {}
 
     def trace(self, experiment: Experiment) -> Trace:
-        key = (experiment.scenario, experiment.fault.changes)
+        key = (experiment.scenario, experiment.changes)
         if key not in self._traces:
             channels = [channel.name for channel in self._manifest.compared]
             self._traces[key] = golden.load_trace(self._manifest, self._folder_of(*key), channels)
@@ -91,7 +91,7 @@ class Runner:
             name=experiment.id,
             scenario=self.scenario_file(experiment.scenario),
             seed=experiment.seed,
-            changes=experiment.fault.changes,
+            changes=experiment.changes,
             files=built.files,
             mutant=built.id,
         )

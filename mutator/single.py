@@ -75,7 +75,7 @@ def rerun(workspace: Workspace, run: Path, experiment_id: str) -> tuple[Single, 
     check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, scenarios))
     wanted = folder.find(experiment_id)
     experiment = next(e for e in planfile.read_all(folder.path) if e.id == wanted)
-    golden = folder.golden(experiment.scenario, experiment.fault.changes)
+    golden = folder.golden(experiment.scenario, experiment.changes)
     single = run_single(
         workspace,
         manifest,
@@ -107,7 +107,7 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
         name="golden",
         scenario=workspace.scenario(experiment.scenario),
         seed=experiment.seed,
-        changes=experiment.fault.changes,
+        changes=experiment.changes,
     )
     execution = engine.execute(job, engine.work / job.name)
     if execution.status is not Status.OK:

@@ -63,7 +63,7 @@ def describe(experiment: "Experiment") -> dict[str, Any]:
         "fault": choose.fault_words(fault),
         "aim": fault.aim,
         "reading": fault.reading,
-        "scenario": " ".join((experiment.scenario, *fault.changes)),
+        "scenario": " ".join((experiment.scenario, *experiment.changes)),
         "method": experiment.method.value,
         "trigger": f"{trigger.name}: {trigger.condition}",
         "armed_after_s": trigger.armed_after_s,

@@ -97,6 +97,21 @@ def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
     assert first == len(keys)
 
 
+def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
+    """A campaign's setting joins every run's changes once, canary and goldens included, and their ids."""
+    before = make_plan(whole, "toy")
+    path = whole.campaign("toy")
+    path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
+    after = make_plan(whole, "toy")
+    assert {e.changes for e in (*after.experiments, after.canary)} == {("alone",)}
+    assert {changes for _, changes in after.goldens()} == {("alone",)}
+    assert Counter(e.fault.id for e in before.experiments) == Counter(e.fault.id for e in after.experiments)
+    assert not {e.id for e in before.experiments} & {e.id for e in after.experiments}
+    path.write_text(path.read_text().replace("[alone]", "[rainy]"))
+    with pytest.raises(MutatorError, match=r"toy\.yaml:\d+: change 'rainy'; expected one of alone"):
+        make_plan(whole, "toy")
+
+
 def test_filters_and_limit(whole: Workspace) -> None:
     """--only keeps, --exclude drops, --limit takes an even part of what is left."""
     plan = make_plan(
