@@ -1,0 +1,1 @@
+"""Holding the controller's traces against references: reading, measuring, reporting."""

@@ -1,0 +1,69 @@
+"""Runs to be compared or shown: made now from a scenario, or taken from finished folders."""
+
+import json
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.recorder import CHANNELS
+from selfdrive.sim.run import simulate
+from selfdrive.sim.scenario import Scenario, load_scenario
+
+SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the project around this tree
+PLANTS = ("standard", "reference")
+NO_LEAD = "_nolead"  # a run's name is its scenario's, with this at the end if the lead was left out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A finished run. `record` and `trace` as in record.json and trace.npz."""
+
+    name: str
+    title: str
+    record: dict
+    trace: dict[str, np.ndarray]
+
+    @property
+    def free_road(self) -> bool:
+        """Whether there was no lead."""
+        return self.record["no_lead"]
+
+
+def drive(name: str, scenarios: Path, plant: str) -> Run:
+    """Run a scenario from its start to its end. Raises ConfigError if there is no such scenario."""
+    path = scenarios / f"{name.removesuffix(NO_LEAD)}.yaml"
+    if not path.is_file():
+        raise ConfigError(
+            f"no scenario for {name!r}",
+            where=str(path),
+            expected="a scenario file of that name",
+            remedy="name it, or choose another --scenarios",
+        )
+    scenario = load_scenario(path)
+    if "plant" in Scenario.__dataclass_fields__:
+        scenario = replace(scenario, plant=plant)
+    title = scenario.title
+    if name.endswith(NO_LEAD):
+        scenario, title = replace(scenario, lead=None), f"{title}; without the lead"
+    result = simulate(scenario, seed=0)
+    return Run(name=name, title=title, record=result.record, trace=result.trace)
+
+
+def load(folder: Path) -> Run:
+    """A finished run's folder. Raises ConfigError if it is none."""
+    try:
+        record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+        with np.load(folder / "trace.npz", allow_pickle=False) as arrays:
+            trace = {name: arrays[name] for name in CHANNELS}
+        return Run(name=folder.name, title=str(record["scenario"]), record=record, trace=trace)
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        reason = error.strerror if isinstance(error, OSError) else f"unreadable: {error}"
+        raise ConfigError(
+            str(reason),
+            where=str(folder),
+            expected="record.json and trace.npz of a finished run",
+            remedy="run the scenario with --out there",
+        ) from None

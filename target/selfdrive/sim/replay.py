@@ -1,0 +1,97 @@
+"""Compares runs with reference traces: `python -m selfdrive.sim.replay --references DIR [NAME...]`.
+
+Every CSV in the folder of references, or those named, is compared with a run of the scenario of its name
+on the reference plant, channel by channel, under a tolerance table. Exit code 0 within tolerance, 1 beyond
+it, 2 for wrong input. References are written only with --update-references.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.compare import report, runs
+from selfdrive.sim.compare.differences import compare
+from selfdrive.sim.compare.tolerances import load_tolerances
+from selfdrive.sim.compare.trace_csv import read_reference, write_reference
+
+EXIT_BEYOND = 1
+EXIT_INPUT = 2
+
+_TOLERANCES = runs.SCENARIOS.parent / "references" / "tolerances.yaml"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = _parse(arguments)
+    try:
+        if options.update_references:
+            return _update(options)
+        return _compare(options)
+    except ConfigError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_INPUT
+
+
+def reference_names(folder: Path) -> list[str]:
+    """The names of the references in a folder. Raises ConfigError if there are none."""
+    names = sorted(path.stem for path in folder.glob("*.csv"))
+    if not names:
+        raise ConfigError(
+            "no reference" if folder.is_dir() else "no such folder",
+            where=str(folder),
+            expected="a folder of CSV traces",
+            remedy="choose another --references, or name runs and give --update-references",
+        )
+    return names
+
+
+def _compare(options: argparse.Namespace) -> int:
+    tolerances = load_tolerances(options.tolerances)
+    names = options.names or reference_names(options.references)
+    references = [read_reference(options.references / f"{name}.csv") for name in names]
+    beyond = []
+    for reference in references:
+        run = _run(reference.name, options)
+        result = compare(reference, run.trace, tolerances, free_road=run.free_road)
+        print("\n".join(report.lines(result, long=options.long)), flush=True)
+        if not result.good:
+            beyond.append(reference.name)
+    print(f"{len(references) - len(beyond)} of {len(references)} within tolerance", end="")
+    print(f"; beyond it: {', '.join(beyond)}" if beyond else "")
+    return EXIT_BEYOND if beyond else 0
+
+
+def _update(options: argparse.Namespace) -> int:
+    for name in options.names or reference_names(options.references):
+        path = options.references / f"{name}.csv"
+        write_reference(path, _run(name, options).trace)
+        print(f"written: {path}")
+    return 0
+
+
+def _run(name: str, options: argparse.Namespace) -> runs.Run:
+    if options.runs is not None:
+        return runs.load(options.runs / name)
+    return runs.drive(name, options.scenarios, options.plant)
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="selfdrive.sim.replay", description="Compare runs with reference traces."
+    )
+    add = parser.add_argument
+    add("names", nargs="*", metavar="NAME", help="a reference, such as S1 or S1_nolead; all, if none")
+    add("--references", type=Path, required=True, metavar="DIR", help="the folder of their CSV files")
+    add("--scenarios", type=Path, default=runs.SCENARIOS, metavar="DIR", help="the scenario files")
+    add("--tolerances", type=Path, default=_TOLERANCES, metavar="FILE", help="the tolerance table")
+    add("--plant", choices=runs.PLANTS, default="reference", help="the plant to run on (%(default)s)")
+    add("--runs", type=Path, metavar="DIR", help="take finished runs, DIR/NAME/, and run nothing")
+    add("--long", action="store_true", help="every channel, and every crossing of its tolerance")
+    add("--update-references", action="store_true", help="write the runs as the new references")
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
