@@ -12,6 +12,7 @@ poles run away as 1/speed; at walking pace it becomes the kinematic model.
 """
 
 from math import cos, sin
+from typing import Protocol
 
 from selfdrive.car.params import CarParams
 from selfdrive.common.interp import clip
@@ -24,6 +25,18 @@ TRAIL = 0.053  # m, caster and pneumatic trail
 LARGEST_ANGLE = 8.7  # rad, mechanical stop
 CREEP = 0.1  # m/s; below this the tyres take no side force
 NEAREST_TO_CENTRE = 0.1  # of a bend's radius; a car astray may reach its centre, where `along` has no meaning
+
+
+class Lateral(Protocol):
+    """Sideways motion: place in the lane (m, rad), and what the steering wheel does (rad, rad/s)."""
+
+    offset: float
+    heading: float
+    steer_angle: float
+    steer_rate: float
+
+    def step(self, torque: float, speed: float, curvature: float) -> float:
+        """Advance 10 ms; returns the speed along the road (m/s)."""
 
 
 class LateralDynamics:

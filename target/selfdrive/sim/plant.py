@@ -4,7 +4,8 @@ from selfdrive.car.params import CarParams
 from selfdrive.common.interp import interp
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import Actuators
-from selfdrive.sim.lateral import LateralDynamics
+from selfdrive.sim.lateral import Lateral, LateralDynamics
+from selfdrive.sim.truth import GroundTruth
 
 MASS = 1700.0  # kg, for the longitudinal motion
 GRAVITY = 9.81
@@ -30,13 +31,19 @@ def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
 
 
 class Plant:
-    """The host car. `speed` never falls below 0; `position` is counted along the road."""
+    """The host car, and what its sensors are shown of it.
+
+    `speed` never falls below 0; `position` is counted along the road; `lateral` has `offset`,
+    `heading`, `steer_angle` and `steer_rate`; the gearbox reports `gearbox_scale` times the speed.
+    """
+
+    gearbox_scale = 1.0
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         self.speed = speed
         self.acceleration = 0.0
         self.position = 0.0
-        self.lateral = LateralDynamics(car, offset)
+        self.lateral: Lateral = LateralDynamics(car, offset)
 
     def step(self, actuators: Actuators, grade: float, curvature: float) -> None:
         """Advance 10 ms by Euler's method: position with the old speed, then the new speed."""
@@ -46,3 +53,15 @@ class Plant:
         self.speed = old + DT_CTRL * self.acceleration
         if self.speed <= 0.0:
             self.speed = self.acceleration = 0.0
+
+    def distance_to(self, position: float) -> float:
+        """Distance (m) from the front bumper to `position` on the road; negative behind it."""
+        return position - self.position
+
+    def headway(self, d_rel: float) -> float:
+        """Headway time (s) to what is `d_rel` m ahead; infinite at standstill."""
+        return d_rel / self.speed if self.speed > 0.0 else float("inf")
+
+    def shown(self, truth: GroundTruth) -> GroundTruth:
+        """What camera and radar can see: all there is."""
+        return truth

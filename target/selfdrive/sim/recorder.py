@@ -51,8 +51,7 @@ class Recorder:
         self._rows.extend(
             (
                 *(t, v_ego, truth.a_ego, d_rel, v_lead - v_ego, v_lead),
-                d_rel / v_ego if v_ego > 0.0 else float("inf"),
-                *(actuators.gas, actuators.brake, actuators.steer),
+                *(truth.hwt, actuators.gas, actuators.brake, actuators.steer),
                 *(truth.steer_angle, truth.lateral_offset, truth.heading),
                 *(lead.status, lead.d_rel, lead.v_rel, lead.v_lead_k, lead.a_lead_k),
                 *(state.v_ego, state.a_ego, state.v_cruise, state.v_pid),

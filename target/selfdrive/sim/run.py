@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.scenario import Scenario, load_scenario
+from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
 
 EXIT_INPUT = 2
@@ -30,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scenario = load_scenario(options.scenario)
         if options.no_lead:
             scenario = replace(scenario, lead=None)
+        if options.plant:
+            scenario = on_plant(scenario, options.plant)
         if options.max_steps is not None:
             scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
         write(simulate(scenario, options.seed), options.out)
@@ -78,6 +80,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the results go")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers")
     parser.add_argument("--no-lead", action="store_true", help="run without the lead vehicle")
+    parser.add_argument("--plant", choices=PLANTS, help="plant to drive on, instead of the scenario's")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
 

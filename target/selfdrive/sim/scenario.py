@@ -1,6 +1,6 @@
 """Scenarios: what the host, the lead, the driver and the road do. Read from YAML, in SI units inside."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -12,12 +12,18 @@ from selfdrive.sim.road import Table
 from selfdrive.sim.yaml_section import Section, read_yaml
 
 SCHEMA = "scenario/1"
+PLANTS = STANDARD, REFERENCE = "standard", "reference"
 BUTTONS = {
     "cancel": CruiseButton.CANCEL,
     "decel_set": CruiseButton.DECEL_SET,
     "res_accel": CruiseButton.RES_ACCEL,
 }
 SPEED_UNITS = {"mps": 1.0, "kph": KPH_TO_MS, "mph": MPH_TO_MS}
+
+_ONLY_STRAIGHT = (
+    "a straight road and a start in mid-lane for the reference plant",
+    "take the standard plant",
+)
 
 _FASTEST = 400.0  # in any speed unit
 _LONGEST = 600.0  # s
@@ -32,6 +38,7 @@ _KEYS = {
     "host": "the controlled car at the start",
     "lead": "the vehicle ahead; left out: a free road",
     "buttons": "cruise buttons the driver presses",
+    "plant": "standard (also when left out), or reference: the original's simulator with its errors",
     "road": "grade and curvature; left out: flat and straight",
 }
 _HOST_KEYS = {**_SPEED_KEYS, "lateral_offset_m": "the distance from the lane's middle in m, left positive"}
@@ -85,6 +92,7 @@ class Scenario:
     buttons: tuple[ButtonPress, ...]
     grade: Table | None
     curvature: Table | None
+    plant: str = STANDARD
 
     def button(self, frame: int) -> int:
         """The cruise button held down in step `frame`."""
@@ -113,7 +121,7 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
     root.text("schema", (SCHEMA,))
     host = root.section("host", _HOST_KEYS)
     grade, curvature = _road(root)
-    return Scenario(
+    scenario = Scenario(
         name=root.text("name"),
         title=root.text("title"),
         digest=digest,
@@ -125,6 +133,23 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
         grade=grade,
         curvature=curvature,
     )
+    if "plant" not in root:
+        return scenario
+    plant = root.text("plant", PLANTS)
+    root.check("plant", _possible(scenario, plant), *_ONLY_STRAIGHT)
+    return replace(scenario, plant=plant)
+
+
+def on_plant(scenario: Scenario, plant: str) -> Scenario:
+    """The same scenario on the plant of that name. Raises ConfigError where that knows no such road."""
+    if not _possible(scenario, plant):
+        expected, remedy = _ONLY_STRAIGHT
+        raise ConfigError(f"{scenario.name} on the plant {plant!r}", expected=expected, remedy=remedy)
+    return replace(scenario, plant=plant)
+
+
+def _possible(scenario: Scenario, plant: str) -> bool:
+    return plant != REFERENCE or not (scenario.curvature or scenario.lateral_offset)
 
 
 def _host_speed(section: Section) -> float:

@@ -32,9 +32,13 @@ _BRAKES_EVERY = 2  # steps
 
 
 class CarSensors:
-    """Makes the car's frames of each 10 ms step, with running counters."""
+    """Makes the car's frames of each 10 ms step, with running counters.
 
-    def __init__(self) -> None:
+    The gearbox reports `gearbox_scale` times the speed.
+    """
+
+    def __init__(self, gearbox_scale: float = 1.0) -> None:
+        self._gearbox_scale = gearbox_scale
         messages = load(CAR_DBC)
         self._gearbox_speed = Packer(messages["ENGINE_DATA"], ("XMISSION_SPEED",), CAR_BUS)
         wheels = [f"WHEEL_SPEED_{corner}" for corner in ("FL", "FR", "RL", "RR")]
@@ -52,7 +56,7 @@ class CarSensors:
         steer_angle_deg = steer_angle * RAD_TO_DEG
         steer_rate_deg = truth.steer_rate * RAD_TO_DEG
         frames = [
-            self._gearbox_speed.pack((speed_kph,), frame),
+            self._gearbox_speed.pack((speed_kph * self._gearbox_scale,), frame),
             self._wheel_speeds.pack((speed_kph, speed_kph, speed_kph, speed_kph)),
             self._steering.pack((steer_angle_deg, steer_rate_deg), frame),
             self._buttons.pack((button,), frame),

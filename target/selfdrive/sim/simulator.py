@@ -15,8 +15,9 @@ from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.plant import Plant
 from selfdrive.sim.radar import RadarSensor
 from selfdrive.sim.recorder import Recorder
+from selfdrive.sim.reference_plant import ReferencePlant
 from selfdrive.sim.road import Road
-from selfdrive.sim.scenario import Scenario
+from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.visiond import Visiond
@@ -24,6 +25,7 @@ from selfdrive.visiond.visiond import Visiond
 RECORD_SCHEMA = "sim-record/1"
 STEPS_PER_SECOND = 100
 CYCLE = 5  # steps between radar cycles, and between pictures
+PLANTS: dict[str, type[Plant]] = {STANDARD: Plant, REFERENCE: ReferencePlant}
 FREE_ROAD_DISTANCE = 200.0  # m; radar and camera see an object there that keeps its distance
 
 
@@ -45,13 +47,14 @@ class Simulator:
         lead = scenario.lead
         self._road = Road(scenario.grade, scenario.curvature)
         self._lead = LeadVehicle(lead.gap, lead.times, lead.speeds) if lead else None
-        self._sensors = CarSensors()
         self._radar = RadarSensor(self._road)
         self._camera = Camera(self._road)
         self._receiver = ActuatorReceiver()
         self._actuators = Actuators()
         car = CarInterface()
-        self._plant = Plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
+        make_plant = PLANTS[scenario.plant]
+        self._plant = make_plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
+        self._sensors = CarSensors(self._plant.gearbox_scale)
         self.manager = Manager(car, RadarInterface(), Visiond())
         self.hazards = HazardMonitor()
         self.recorder = Recorder()
@@ -70,8 +73,9 @@ class Simulator:
         measured = self._sensors.measure(truth, self._scenario.button(self.frame), self.frame)
         view = None
         if self.frame % CYCLE == 0:
-            measured += self._radar.measure(truth)
-            view = self._camera.look(truth)
+            shown = self._plant.shown(truth)
+            measured += self._radar.measure(shown)
+            view = self._camera.look(shown)
         frames: list[CanFrame] = []
         frames.extend(measured)
         sent = self.manager.step(t, frames, view)
@@ -91,6 +95,7 @@ class Simulator:
             "scenario_digest": self._scenario.digest,
             "seed": self._seed,
             "no_lead": self._scenario.lead is None,
+            "plant": self._scenario.plant,
             "steps": self.frame,
             "engaged_from": recorder.engaged_from,
             "engaged_to": recorder.engaged_to,
@@ -109,9 +114,10 @@ class Simulator:
 
     def _observe(self, t: float) -> GroundTruth:
         plant, lateral, lead = self._plant, self._plant.lateral, self._lead
+        d_rel = plant.distance_to(lead.position) if lead else FREE_ROAD_DISTANCE
         return GroundTruth(
             t=t,
-            d_rel=lead.position - plant.position if lead else FREE_ROAD_DISTANCE,
+            d_rel=d_rel,
             v_ego=plant.speed,
             v_lead=lead.speed if lead else plant.speed,
             a_ego=plant.acceleration,
@@ -120,5 +126,6 @@ class Simulator:
             steer_angle=lateral.steer_angle,
             steer_rate=lateral.steer_rate,
             position=plant.position,
+            hwt=plant.headway(d_rel),
             free_road=lead is None,
         )

@@ -16,4 +16,5 @@ class GroundTruth(NamedTuple):
     steer_angle: float  # rad at the steering wheel
     steer_rate: float  # rad/s
     position: float  # m along the road
+    hwt: float  # s, headway time
     free_road: bool  # no lead vehicle

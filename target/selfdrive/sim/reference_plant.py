@@ -1,0 +1,72 @@
+"""The reference plant: openpilot v0.4.2's own PC simulation with its errors, to compare with its recordings.
+
+It moves along the road as the standard plant does. Sideways, and in what it tells the controller, it
+is the original's crude stand-in for a car. No result about driving should be taken from it.
+"""
+
+from selfdrive.car.params import CarParams
+from selfdrive.common.conversions import DEG_TO_RAD, MS_TO_KPH
+from selfdrive.common.realtime import DT_CTRL
+from selfdrive.sim.plant import Plant
+from selfdrive.sim.truth import GroundTruth
+
+FULL_TORQUE_RATE = 0.1  # deg/s of the steering wheel, for a torque of 1
+ANGLE_PER_OFFSET = 0.1067  # deg of the steering wheel for a metre to the side
+OFFSET_CYCLE = 5  # steps, of which only the first moves the car sideways
+FIRST_HEADWAY = 30.0  # s
+
+
+class CrudeLateral:
+    """Torque turns the steering wheel slowly; only while it turns does the car go sideways, at any speed.
+
+    There is no heading, no bend, and no force that turns the wheel back.
+    """
+
+    heading = 0.0  # rad
+
+    def __init__(self, offset: float = 0.0) -> None:
+        self.offset = offset  # m from the middle of the lane
+        self.steer_angle = 0.0  # rad at the steering wheel
+        self.steer_rate = 0.0  # rad/s
+        self._angle = 0.0  # deg
+        self._step = 0
+
+    def step(self, torque: float, speed: float, curvature: float) -> float:
+        """Advance 10 ms with `torque` (left positive, 1 is full); returns the speed along the road (m/s)."""
+        change = DT_CTRL * FULL_TORQUE_RATE * torque
+        self._angle += change
+        self.steer_angle = self._angle * DEG_TO_RAD
+        self.steer_rate = change * DEG_TO_RAD / DT_CTRL
+        if self._step % OFFSET_CYCLE == 0:
+            self.offset += change / ANGLE_PER_OFFSET
+        self._step += 1
+        return speed
+
+
+class ReferencePlant(Plant):
+    """The standard plant's longitudinal motion with the original's errors around it.
+
+    The gearbox sends km/h where m/s are meant. Camera and radar see a car in mid-lane wherever it is.
+    A distance ends at 0; headway time starts at 30 s and stays as it was while the car stands.
+    """
+
+    gearbox_scale = MS_TO_KPH
+
+    def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
+        super().__init__(car, speed=speed, offset=offset)
+        self.lateral = CrudeLateral(offset)
+        self._headway = FIRST_HEADWAY
+
+    def distance_to(self, position: float) -> float:
+        """As the standard plant's, but 0 where that is negative."""
+        return max(super().distance_to(position), 0.0)
+
+    def headway(self, d_rel: float) -> float:
+        """Headway time (s); at standstill that of the last step in which the car moved."""
+        if self.speed > 0.0:
+            self._headway = d_rel / self.speed
+        return self._headway
+
+    def shown(self, truth: GroundTruth) -> GroundTruth:
+        """The car's drift is kept from camera and radar."""
+        return truth._replace(lateral_offset=0.0)
