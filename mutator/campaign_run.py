@@ -26,7 +26,7 @@ from mutator.chunks import Pending, pending
 from mutator.engine import prepare_base
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.ids import digest
-from mutator.jsonio import DiskFull
+from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
 from mutator.model import Status
 from mutator.plan import Choices, freeze_owned, make_folder, make_plan
@@ -176,6 +176,9 @@ def session(
             plan = make_plan(workspace, campaign, **asdict(choices))
             folder = freeze_owned(plan, out, workspace)
         shutil.rmtree(folder.work, ignore_errors=True)
+        for path in folder.path.iterdir():
+            if is_half_written(path.name):
+                path.unlink()
         try:
             yield Session(workspace, folder, workers, notify)
         finally:

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -54,6 +55,11 @@ def write_atomic(path: Path, data: bytes) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+def is_half_written(name: str) -> bool:
+    """Whether a file of that name is what a kill left of `write_atomic`."""
+    return re.fullmatch(r"\..+\.\d+", name) is not None
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from mutator.errors import MutatorError
 from mutator.expansion import Expansion
 from mutator.filters import compile_filter
 from mutator.ids import digest, plain
-from mutator.jsonio import full_disk_told, write_atomic, write_json
+from mutator.jsonio import full_disk_told, is_half_written, write_atomic, write_json
 from mutator.locks import owned
 from mutator.model import Experiment
 from mutator.provenance import check_sources, sources, versions
@@ -176,7 +176,8 @@ def freeze(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
 def make_folder(out: Path) -> None:
     """Make `out` unless it is a run folder; MutatorError when it holds anything else."""
     if out.exists() and not RunFolder.exists(out):
-        strangers = [p.name for p in out.iterdir() if p.name not in _OURS] if out.is_dir() else [out.name]
+        names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
+        strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
         if strangers:
             raise MutatorError(
                 f"no run folder, and not empty ({', '.join(sorted(strangers)[:3])})",

@@ -224,7 +224,7 @@ def test_a_freeze_that_was_killed_is_done_again(toycar: Workspace, tmp_path: Pat
     """A folder in which a freeze was killed before its end takes the plan."""
     plan = make_plan(toycar, "toy")
     freeze(plan, tmp_path / "run", toycar)
-    (tmp_path / "run" / "run.json").unlink()
+    (tmp_path / "run" / "run.json").rename(tmp_path / "run" / ".run.json.4711")
     assert freeze(plan, tmp_path / "run", toycar).planned == 24
 
 
