@@ -7,7 +7,7 @@ it, 2 for wrong input. References are written only with --update-references.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from selfdrive.common.errors import ConfigError
@@ -15,11 +15,12 @@ from selfdrive.sim.compare import report, runs
 from selfdrive.sim.compare.differences import compare
 from selfdrive.sim.compare.tolerances import load_tolerances
 from selfdrive.sim.compare.trace_csv import read_reference, write_reference
+from selfdrive.sim.scenario import PLANTS, REFERENCE, on_plant
 
 EXIT_BEYOND = 1
 EXIT_INPUT = 2
 
-_TOLERANCES = runs.SCENARIOS.parent / "references" / "tolerances.yaml"
+TOLERANCES = runs.SCENARIOS.parent / "references" / "tolerances.yaml"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,8 +53,7 @@ def _compare(options: argparse.Namespace) -> int:
     names = options.names or reference_names(options.references)
     references = [read_reference(options.references / f"{name}.csv") for name in names]
     beyond = []
-    for reference in references:
-        run = _run(reference.name, options)
+    for reference, run in zip(references, _runs(names, options), strict=True):
         result = compare(reference, run.trace, tolerances, free_road=run.free_road)
         print("\n".join(report.lines(result, long=options.long)), flush=True)
         if not result.good:
@@ -64,17 +64,21 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _update(options: argparse.Namespace) -> int:
-    for name in options.names or reference_names(options.references):
-        path = options.references / f"{name}.csv"
-        write_reference(path, _run(name, options).trace)
+    names = options.names or reference_names(options.references)
+    for run in _runs(names, options):
+        path = options.references / f"{run.name}.csv"
+        write_reference(path, run.trace)
         print(f"written: {path}")
     return 0
 
 
-def _run(name: str, options: argparse.Namespace) -> runs.Run:
+def _runs(names: list[str], options: argparse.Namespace) -> Iterator[runs.Run]:
+    """The runs one by one; wrong scenario files are found before the first."""
     if options.runs is not None:
-        return runs.load(options.runs / name)
-    return runs.drive(name, options.scenarios, options.plant)
+        yield from (runs.load(options.runs / name, options.plant) for name in names)
+        return
+    scenarios = [on_plant(runs.find(name, options.scenarios), options.plant) for name in names]
+    yield from map(runs.drive, names, scenarios)
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -85,8 +89,8 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("names", nargs="*", metavar="NAME", help="a reference, such as S1 or S1_nolead; all, if none")
     add("--references", type=Path, required=True, metavar="DIR", help="the folder of their CSV files")
     add("--scenarios", type=Path, default=runs.SCENARIOS, metavar="DIR", help="the scenario files")
-    add("--tolerances", type=Path, default=_TOLERANCES, metavar="FILE", help="the tolerance table")
-    add("--plant", choices=runs.PLANTS, default="reference", help="the plant to run on (%(default)s)")
+    add("--tolerances", type=Path, default=TOLERANCES, metavar="FILE", help="the tolerance table")
+    add("--plant", choices=PLANTS, default=REFERENCE, help="the plant to run on (%(default)s)")
     add("--runs", type=Path, metavar="DIR", help="take finished runs, DIR/NAME/, and run nothing")
     add("--long", action="store_true", help="every channel, and every crossing of its tolerance")
     add("--update-references", action="store_true", help="write the runs as the new references")

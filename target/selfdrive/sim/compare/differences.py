@@ -217,17 +217,21 @@ def crossings(seconds: np.ndarray, differences: np.ndarray, band: float) -> tupl
 def time_lag(steps: np.ndarray, reference: np.ndarray, channel: np.ndarray) -> float | None:
     """By how much (s, at most 1) the channel follows the reference: the shift with the highest correlation.
 
-    None where nothing varies enough to tell. Of equal shifts the smallest counts.
+    None where nothing varies enough to tell. Of shifts that are about as good the smallest counts: a steady
+    slope fits with any.
     """
-    best, found = -inf, None
+    apart: dict[int, float] = {}  # what is missing from full correlation, by shift
     for shift in sorted(range(-_LONGEST_LAG, _LONGEST_LAG + 1), key=abs):
         inside = (steps + shift >= 0) & (steps + shift < len(channel))
         ours, theirs = channel[steps[inside] + shift], reference[inside]
         finite = np.isfinite(ours)
         correlation = _correlation(ours[finite], theirs[finite])
-        if correlation is not None and correlation > best + 1e-6:
-            best, found = correlation, shift / STEPS_PER_SECOND
-    return found
+        if correlation is not None:
+            apart[shift] = 1.0 - correlation
+    if not apart:
+        return None
+    good = 1.1 * min(apart.values()) + 1e-9
+    return next(shift for shift, missing in apart.items() if missing <= good) / STEPS_PER_SECOND
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float | None:

@@ -13,7 +13,6 @@ from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import Scenario, load_scenario
 
 SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the project around this tree
-PLANTS = ("standard", "reference")
 NO_LEAD = "_nolead"  # a run's name is its scenario's, with this at the end if the lead was left out
 
 
@@ -32,8 +31,8 @@ class Run:
         return self.record["no_lead"]
 
 
-def drive(name: str, scenarios: Path, plant: str) -> Run:
-    """Run a scenario from its start to its end. Raises ConfigError if there is no such scenario."""
+def find(name: str, scenarios: Path) -> Scenario:
+    """The scenario of a run. Raises ConfigError if there is none, or its file is wrong."""
     path = scenarios / f"{name.removesuffix(NO_LEAD)}.yaml"
     if not path.is_file():
         raise ConfigError(
@@ -43,22 +42,25 @@ def drive(name: str, scenarios: Path, plant: str) -> Run:
             remedy="name it, or choose another --scenarios",
         )
     scenario = load_scenario(path)
-    if "plant" in Scenario.__dataclass_fields__:
-        scenario = replace(scenario, plant=plant)
-    title = scenario.title
     if name.endswith(NO_LEAD):
-        scenario, title = replace(scenario, lead=None), f"{title}; without the lead"
+        return replace(scenario, lead=None, title=f"{scenario.title}; without the lead")
+    return scenario
+
+
+def drive(name: str, scenario: Scenario) -> Run:
+    """Run a scenario from its start to its end."""
     result = simulate(scenario, seed=0)
-    return Run(name=name, title=title, record=result.record, trace=result.trace)
+    return Run(name=name, title=scenario.title, record=result.record, trace=result.trace)
 
 
-def load(folder: Path) -> Run:
-    """A finished run's folder. Raises ConfigError if it is none."""
+def load(folder: Path, plant: str) -> Run:
+    """A finished run's folder of that name. Raises ConfigError if it is none, or of something else."""
     try:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         with np.load(folder / "trace.npz", allow_pickle=False) as arrays:
             trace = {name: arrays[name] for name in CHANNELS}
-        return Run(name=folder.name, title=str(record["scenario"]), record=record, trace=trace)
+        name = record["scenario"] + (NO_LEAD if record["no_lead"] else "")
+        got = f"a run of {name} on the {record['plant']} plant"
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         reason = error.strerror if isinstance(error, OSError) else f"unreadable: {error}"
         raise ConfigError(
@@ -67,3 +69,8 @@ def load(folder: Path) -> Run:
             expected="record.json and trace.npz of a finished run",
             remedy="run the scenario with --out there",
         ) from None
+    if got != (wanted := f"a run of {folder.name} on the {plant} plant"):
+        raise ConfigError(
+            got, where=str(folder), expected=wanted, remedy="run that with --out there, or give its --plant"
+        )
+    return Run(name=name, title=record["scenario"], record=record, trace=trace)

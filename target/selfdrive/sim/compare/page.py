@@ -1,0 +1,199 @@
+"""The page of maneuvers: for each run its key figures and plots, over the reference where there is one."""
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from selfdrive.sim.compare import figures
+from selfdrive.sim.compare.differences import Comparison
+from selfdrive.sim.compare.runs import Run
+from selfdrive.sim.compare.svg import Line, Mark, Panel, draw
+from selfdrive.sim.compare.trace_csv import ROW_STEPS, STEPS_PER_SECOND, Reference, channels_of
+
+_STYLE = """
+:root{color-scheme:light dark;--back:#fff;--ink:#1d2330;--dim:#5d6675;--grid:#e4e7ec;--zero:#a8b0bd;
+--c0:#1667c7;--c1:#c4500a;--c2:#2c8a3d;--alert:#a66a00;--hazard:#c8102e;--bad:#c8102e;--good:#24803a}
+@media(prefers-color-scheme:dark){:root{--back:#14171d;--ink:#e4e8ef;--dim:#9aa4b4;--grid:#2b313b;
+--zero:#5b6573;--c0:#69aef8;--c1:#f79a57;--c2:#71cf82;--alert:#f0b64a;--hazard:#ff6b7d;--bad:#ff6b7d;--good:#71cf82}}
+body{margin:0 auto;max-width:1700px;padding:1rem 1.2rem 3rem;background:var(--back);color:var(--ink);
+font:15px/1.45 system-ui,sans-serif}
+h1{font-size:1.5rem;margin:.4rem 0}h2{font-size:1.15rem;margin:2.2rem 0 .3rem}
+p{margin:.3rem 0;color:var(--dim)}
+h3{font-size:.9rem;margin:.5rem 0 0;font-weight:600}a{color:var(--c0)}
+.scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-variant-numeric:tabular-nums}
+th,td{text-align:right;padding:.12rem .7rem;border-bottom:1px solid var(--grid);white-space:nowrap}
+th{font-weight:600;color:var(--dim)}td.t,th.t{text-align:left}
+.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(330px,100%),1fr));gap:.2rem 1rem}
+.key{font-size:.8rem;color:var(--dim)}.key i{display:inline-block;width:1.3em;height:.22em;
+vertical-align:.25em;margin:0 .3em 0 .8em}
+.k0{background:var(--c0)}.k1{background:var(--c1)}.k2{background:var(--c2)}
+svg{width:100%;height:auto;display:block}path{fill:none;stroke-linejoin:round}
+.g{stroke:var(--grid);stroke-width:8}.z{stroke:var(--zero);stroke-width:10}
+.c0,.c1,.c2{stroke-width:16}.c0{stroke:var(--c0)}.c1{stroke:var(--c1)}.c2{stroke:var(--c2)}
+.r{stroke-width:60;opacity:.33;stroke-linecap:round}
+text{font-size:105px;fill:var(--dim)}.e{text-anchor:end}.m{text-anchor:middle}
+path.engaged{stroke:var(--zero);stroke-width:10;stroke-dasharray:40 30}
+path.alert{stroke:var(--alert);stroke-width:14}text.alert{fill:var(--alert)}
+path.hazard{stroke:var(--hazard);stroke-width:18}text.hazard{fill:var(--hazard)}
+.bad,span.hazard{color:var(--bad)}span.alert{color:var(--alert)}.good{color:var(--good)}
+"""
+
+# Of each panel: title, unit, and lines of (label, channel).
+_PANELS = (
+    ("Distance", "m", (("to the lead", "d_rel"),)),
+    ("Speed", "m/s", (("host", "v_ego"), ("lead", "v_lead"), ("set", "v_cruise"))),
+    ("Acceleration", "m/s²", (("host", "a_ego"), ("planned", "a_target"))),
+    ("Pedals", "share", (("gas", "gas"), ("brake", "brake"))),
+    ("Lead as estimated", "m/s, m/s²", (("speed", "lead_v_lead_k"), ("acceleration", "lead_a_lead_k"))),
+)
+_TITLES = {
+    "engaged_s": "engaged [s]",
+    "set_speeds_kph": "set speeds [km/h]",
+    "min_hwt_s": "least HWT [s]",
+    "min_d_rel_m": "least d_rel [m]",
+    "max_brake": "most brake",
+}
+_LEAD_ESTIMATES = ("lead_v_lead_k", "lead_a_lead_k")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maneuver:
+    """A run, and if there is one its reference with the comparison."""
+
+    run: Run
+    reference: Reference | None
+    comparison: Comparison | None
+
+
+def page(maneuvers: list[Maneuver], plant: str) -> str:
+    """The whole HTML page; it loads nothing."""
+    rows = "".join(_overview_row(one) for one in maneuvers)
+    head = "".join(f"<th>{_TITLES[name]}</th>" for name in figures.FIGURES)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>Maneuvers</title><style>{_STYLE}</style></head><body><h1>Maneuvers</h1>"
+        f"<p>{len(maneuvers)} fault-free runs on the {escape(plant)} plant. Thin lines are the runs, broad "
+        "pale lines beneath them the references; time in seconds. Dashed: engaging.</p>"
+        f'<div class="scroll"><table><tr><th class="t">run</th><th class="t">what happens</th>'
+        f'<th class="t">reference</th>{head}<th class="t">hazards and alerts</th></tr>'
+        f"{rows}</table></div>{''.join(_section(one) for one in maneuvers)}</body></html>\n"
+    )
+
+
+def _overview_row(one: Maneuver) -> str:
+    name = escape(one.run.name)
+    cells = "".join(f"<td>{figures.text(key, value)}</td>" for key, value in _own_figures(one.run).items())
+    verdict, kind = "-", ""
+    if one.comparison:
+        verdict, kind = ("within tolerance", "good") if one.comparison.good else ("beyond tolerance", "bad")
+    return (
+        f'<tr><td class="t"><a href="#{name}">{name}</a></td><td class="t">{escape(one.run.title)}</td>'
+        f'<td class="t {kind}">{verdict}</td>{cells}<td class="t">{_events_text(one.run)}</td></tr>'
+    )
+
+
+def _section(one: Maneuver) -> str:
+    run = one.run
+    end = len(run.trace["t"]) / STEPS_PER_SECOND
+    plots = "".join(
+        f"<div><h3>{panel.title} [{panel.unit}]</h3>{_legend(panel)}{draw(panel, _marks(run), end)}</div>"
+        for panel in _panels(one)
+    )
+    return (
+        f'<section id="{escape(run.name)}"><h2>{escape(run.name)}: {escape(run.title)}</h2>'
+        f"<p>{_events_text(run) or 'no hazard, no alert'}</p>{_comparison_table(one.comparison)}"
+        f'<div class="plots">{plots}</div></section>'
+    )
+
+
+def _comparison_table(comparison: Comparison | None) -> str:
+    if comparison is None:
+        return ""
+    rows = [
+        (
+            _TITLES[one.name],
+            figures.text(one.name, one.ours),
+            figures.text(one.name, one.reference),
+            one.limit,
+            one.failed,
+        )
+        for one in comparison.figures
+    ]
+    rows += [
+        (
+            f"{channel.column.channel} rms [{channel.column.unit}]",
+            f"{channel.rms:.4f}",
+            "-",
+            channel.limits.rms,
+            bad,
+        )
+        for channel in comparison.channels
+        if channel.limits.rms is not None
+        for bad in ("rms" in channel.failures,)
+    ]
+    head = "".join(f"<th>{name}</th>" for name, *_ in rows)
+    ours = "".join(f'<td class="{"bad" if failed else ""}">{value}</td>' for _, value, _, _, failed in rows)
+    theirs = "".join(f"<td>{value}</td>" for _, _, value, _, _ in rows)
+    limits = "".join(f"<td>{'-' if limit is None else f'{limit:g}'}</td>" for *_, limit, _ in rows)
+    return (
+        f'<div class="scroll"><table><tr><th></th>{head}</tr><tr><td class="t">run</td>{ours}</tr>'
+        f'<tr><td class="t">reference</td>{theirs}</tr><tr><td class="t">may differ by</td>{limits}</tr>'
+        "</table></div>"
+    )
+
+
+def _panels(one: Maneuver) -> list[Panel]:
+    ours = channels_of(one.run.trace)
+    shown = np.arange(0, len(ours["t"]), ROW_STEPS)
+    panels = []
+    for title, unit, given in _PANELS:
+        lines = []
+        for colour, (label, channel) in enumerate(given):
+            if one.run.free_road and channel == "v_lead":
+                continue
+            lines.append(Line(label, colour, ours["t"][shown], _visible(ours, channel)[shown]))
+            if one.reference and channel in one.reference.channels:
+                seconds = one.reference.steps / STEPS_PER_SECOND
+                theirs = _visible(one.reference.channels, channel)
+                lines.append(Line(label, colour, seconds, theirs, reference=True))
+        panels.append(Panel(title=title, unit=unit, lines=tuple(lines)))
+    return panels
+
+
+def _visible(channels: dict[str, np.ndarray], channel: str) -> np.ndarray:
+    """A channel, blank where it means nothing: no set speed while off, no estimate without a lead."""
+    values, condition = channels[channel], None
+    if channel == "v_cruise":
+        condition = channels.get("engaged")
+    elif channel in _LEAD_ESTIMATES:
+        condition = channels.get("lead_status")
+    return values if condition is None else np.where(condition == 1.0, values, np.nan)
+
+
+def _legend(panel: Panel) -> str:
+    names = {line.colour: line.label for line in panel.lines}
+    keys = "".join(f'<i class="k{colour}"></i>{escape(label)}' for colour, label in sorted(names.items()))
+    return f'<div class="key">{keys}</div>'
+
+
+def _own_figures(run: Run) -> dict[str, figures.Value]:
+    channels = channels_of(run.trace)
+    return figures.key_figures(np.arange(len(channels["t"])), channels)
+
+
+def _marks(run: Run) -> tuple[Mark, ...]:
+    hazards = (Mark("hazard", name, t) for name, t in run.record["hazards"].items() if t is not None)
+    alerts = (Mark("alert", event["name"], event["t"]) for event in run.record["alert_events"])
+    engaged = run.record["engaged_from"]
+    start = () if engaged is None else (Mark("engaged", "", engaged),)
+    return (*start, *sorted((*hazards, *alerts), key=lambda mark: mark.t))
+
+
+def _events_text(run: Run) -> str:
+    return ", ".join(
+        f'<span class="{mark.kind}">{escape(mark.label)} at {mark.t:.2f} s</span>'
+        for mark in _marks(run)
+        if mark.label
+    )

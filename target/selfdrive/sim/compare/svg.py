@@ -1,0 +1,124 @@
+"""Small line plots as inline SVG, in the colours of the page around them."""
+
+from dataclasses import dataclass
+from html import escape
+from math import floor, log10
+from typing import NamedTuple
+
+import numpy as np
+
+# All in tenths of a pixel, so that whole numbers are fine enough.
+_WIDTH, _HEIGHT = 3600, 2000
+_LEFT, _RIGHT, _TOP, _BOTTOM = 380, 3540, 150, 1750
+_SLACK = 2.5  # how far a line may run from its points
+_TICKS = 4
+
+
+class Line(NamedTuple):
+    """A line: its label in the legend, its number among the panel's colours, times (s) and values."""
+
+    label: str
+    colour: int
+    seconds: np.ndarray
+    values: np.ndarray
+    reference: bool = False  # drawn broad and pale, beneath the others
+
+
+class Mark(NamedTuple):
+    """An event at a time (s); `kind` is engaged, alert or hazard."""
+
+    kind: str
+    label: str
+    t: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One plot; its lines share a unit."""
+
+    title: str
+    unit: str
+    lines: tuple[Line, ...]
+
+
+def draw(panel: Panel, marks: tuple[Mark, ...], end: float) -> str:
+    """The panel as an <svg> from time 0 to `end` (s), reference lines beneath."""
+    low, high, step = _scale(panel.lines)
+    parts = [
+        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><title>{escape(panel.title)}</title>',
+        *_grid(low, high, step, end),
+        *(_mark(mark, end, number) for number, mark in enumerate(marks)),
+    ]
+    for line in sorted(panel.lines, key=lambda line: not line.reference):
+        x = _LEFT + line.seconds / end * (_RIGHT - _LEFT)
+        y = _BOTTOM - (line.values - low) / (high - low) * (_BOTTOM - _TOP)
+        kind = f"c{line.colour} r" if line.reference else f"c{line.colour}"
+        parts.append(f'<path class="{kind}" d="{_path(x, y)}"/>')
+    return "".join((*parts, "</svg>"))
+
+
+def simplify(points: np.ndarray, slack: float) -> np.ndarray:
+    """Those rows of `points` (n, 2; x ascending) through which a line misses none by over `slack` in y."""
+    keep = {0, len(points) - 1}
+    spans = [(0, len(points) - 1)]
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        (x0, y0), (x1, y1) = points[first], points[last]
+        inner = points[first + 1 : last]
+        off = np.abs(inner[:, 1] - y0 - (inner[:, 0] - x0) * (y1 - y0) / (x1 - x0))
+        farthest = int(np.argmax(off))
+        if off[farthest] > slack:
+            middle = first + 1 + farthest
+            keep.add(middle)
+            spans += [(first, middle), (middle, last)]
+    return points[sorted(keep)]
+
+
+def _path(x: np.ndarray, y: np.ndarray) -> str:
+    """Path data of the finite stretches, in whole numbers, each point relative to the one before."""
+    finite = np.isfinite(y)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], finite.astype(int), [0]))))
+    parts = []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        points = np.column_stack((x[begin:end], y[begin:end]))
+        whole = np.round(simplify(points, _SLACK)).astype(int)
+        parts.append(
+            f"M{whole[0][0]} {whole[0][1]}l" + " ".join(f"{a} {b}" for a, b in np.diff(whole, axis=0))
+        )
+    return "".join(part.rstrip("l") for part in parts).replace(" -", "-")
+
+
+def _scale(lines: tuple[Line, ...]) -> tuple[float, float, float]:
+    """Lowest and highest value of the axis and the distance of its ticks; never less than 0.1 high."""
+    finite = np.concatenate([line.values[np.isfinite(line.values)] for line in lines] or [np.zeros(1)])
+    if not finite.size:
+        finite = np.zeros(1)
+    low, high = min(0.0, float(finite.min())), max(0.1, float(finite.max()))
+    rough = (high - low) / _TICKS
+    size = 10.0 ** floor(log10(rough))
+    step = next(factor * size for factor in (1.0, 2.0, 5.0, 10.0) if factor * size >= rough * 0.999)
+    return floor(low / step + 1e-9) * step, -floor(-high / step + 1e-9) * step, step
+
+
+def _grid(low: float, high: float, step: float, end: float) -> list[str]:
+    parts = []
+    for number in range(round((high - low) / step) + 1):
+        y = round(_BOTTOM - number * step / (high - low) * (_BOTTOM - _TOP))
+        kind = "z" if abs(low + number * step) < step / 2 else "g"
+        parts.append(f'<path class="{kind}" d="M{_LEFT} {y}H{_RIGHT}"/>')
+        parts.append(f'<text x="{_LEFT - 40}" y="{y + 35}" class="e">{low + number * step:.6g}</text>')
+    seconds = next(size for size in (1, 2, 5, 10, 20, 50, 100, 1000) if end / size <= 8)
+    for t in range(0, int(end) + 1, seconds):
+        x = round(_LEFT + t / end * (_RIGHT - _LEFT))
+        parts.append(f'<text x="{x}" y="{_BOTTOM + 140}" class="m">{t}</text>')
+    return parts
+
+
+def _mark(mark: Mark, end: float, number: int) -> str:
+    x = round(_LEFT + mark.t / end * (_RIGHT - _LEFT))
+    anchor = "e" if x > (_LEFT + _RIGHT) / 2 else "b"
+    at = x - 25 if anchor == "e" else x + 25
+    label = f'<text x="{at}" y="{_TOP + 10 + 105 * (number % 4)}" class="{anchor} {mark.kind}">'
+    return f'<path class="{mark.kind}" d="M{x} {_TOP}V{_BOTTOM}"/>{label}{escape(mark.label)}</text>'
