@@ -38,6 +38,7 @@ def test_gas_is_quantised_like_the_original(rig):
     """Gas goes out as whole pedal counts: the values the original's plant decoded."""
     assert rig.send(gas=0.011).gas == pytest.approx(0.01094, abs=1e-5)  # 11 counts
     assert rig.send(gas=0.0359).gas == pytest.approx(0.035743, abs=1e-6)  # 36 counts
+    assert rig.send(gas=0.0119).gas == pytest.approx(0.01094, abs=1e-5)  # 11.95 counts, cut off
     assert rig.send(gas=1.5).gas == pytest.approx(0.99611, abs=1e-4)
     assert rig.send(gas=0.0).gas == 0.0
     assert rig.send(gas=-0.5).gas == 0.0
@@ -54,7 +55,9 @@ def test_brake_is_quantised_and_never_full(rig):
     """Brakes take 1/256 steps, cut off, and at most 255 of them."""
     assert rig.send(cycles=200, brake=5.0).brake == 255 / 256
     rig.send(brake=0.0)
-    assert rig.send(cycles=60, brake=0.3).brake == int((0.3 - 0.01) * 256) / 256
+    assert rig.send(cycles=60, brake=0.3).brake == 74 / 256  # 0.29 is 74.24 counts
+    assert rig.send(cycles=60, brake=0.312).brake == 77 / 256  # 0.302 is 77.3 counts
+    assert rig.send(cycles=60, brake=0.3255).brake == 80 / 256  # 0.3155 is 80.8 counts, cut off
 
 
 def test_brake_hysteresis():

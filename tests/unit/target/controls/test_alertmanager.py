@@ -42,6 +42,18 @@ def test_higher_priority_is_shown_and_all_are_listed() -> None:
     assert alerts.active == ("steer_saturated",)
 
 
+def test_the_newer_of_equals_is_shown() -> None:
+    """Among alerts of the same priority the one raised last is shown."""
+    alerts = AlertManager()
+    alerts.add("can_error_no_entry", 1.0)
+    alerts.add("steer_saturated", 1.5)
+    alerts.process(1.5)
+    assert alerts.active == ("steer_saturated", "can_error_no_entry")
+    alerts.add("can_error_no_entry", 2.0)
+    alerts.process(2.0)
+    assert alerts.text2 == ALERTS["can_error_no_entry"].text2
+
+
 def test_sound_picture_and_text_end_one_after_the_other() -> None:
     """Steer saturated: sound for 1 s, picture for 2 s, text for 3 s."""
     alerts = AlertManager()

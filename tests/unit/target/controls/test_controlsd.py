@@ -1,5 +1,6 @@
 """The control loop with a car made of messages."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -177,6 +178,26 @@ def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
     assert drive.state.alerts[0] == "steer_saturated" and drive.state.enabled and drive.state.steer_saturated
 
 
+def test_a_car_may_do_without_the_steering_alert(params: CarParams) -> None:
+    """Where the car's parameters say so, saturated steering is not told."""
+    drive = Drive(replace(params, steer_limit_alert=False)).engage().run(100)
+    assert drive.state.steer_saturated and "steer_saturated" not in drive.state.alerts
+
+
+def test_buttons_without_engaging_set_no_speed(drive: Drive) -> None:
+    """A button that does not engage leaves the set speed at that of a car never engaged."""
+    drive.run(1, buttons=(ButtonEvent("decel", False),))
+    assert drive.state.v_cruise == pytest.approx(255 * KPH_TO_MS)
+
+
+def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
+    """Once the driver has been away for too long, the plan slows the car by 0.2 m/s^2."""
+    drive.engage()
+    drive.controlsd._awareness.status = -0.01
+    drive.run(300)
+    assert drive.controlsd.plan.a_target == pytest.approx(-0.2, abs=0.01)
+
+
 def test_warnings_and_permanent_alerts(drive: Drive) -> None:
     """A warning shows only while engaged; a lasting fault shows also while disengaged."""
     drive.run(1, BUSY)
@@ -218,6 +239,15 @@ def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
     assert once > 0.0
     drive.run(10)
     assert offset.value == pytest.approx(3 * once, rel=1e-3)
+
+
+def test_the_learnt_offset_is_steered_with(drive: Drive) -> None:
+    """The lateral plan is told the offset learnt."""
+    told = []
+    drive.controlsd._lateral.mpc.update = lambda *arguments: told.append(arguments[3]) or 0.1
+    drive.controlsd._angle_offset.value = 0.02
+    drive.run(5)
+    assert told == [0.02]
 
 
 def test_frames_are_counted_and_passed_on(drive: Drive) -> None:

@@ -82,6 +82,7 @@ def test_a_condition_must_have_held_for_ten_cycles(
         ((-2.0,) * 21, 0.0, 0),  # the threshold at 10 m/s is -2.67
         ((-2.7,) * 21, 0.0, 1),
         ((-2.7,) * 21, -0.5, 0),  # what the car does already does not count
+        ((0.0,) * 8 + (-2.7,) * 13, 0.0, 1),  # at 2.8 s
         ((0.0,) * 9 + (-2.9,) * 12, 0.0, 0),  # late
         ((0.0,) * 9 + (-3.1,) * 12, 0.0, 1),  # late but hard
     ],
@@ -89,6 +90,22 @@ def test_a_condition_must_have_held_for_ten_cycles(
 def test_planned_braking(a_plan: tuple[float, ...], a_ego: float, expected: int) -> None:
     """The plan must brake hard, or much harder than the car does now within 2.8 s."""
     assert len(warnings(replace(CAR, a_ego=a_ego), a_plan=a_plan)) == expected
+
+
+def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
+    """With the blinkers long off, the lead itself counts a third a cycle."""
+    checker = FcwChecker()
+    checker._no_blinker = 10.0
+    warned = [checker.update(k * 0.05, CAR, LEAD, BRAKING) for k in range(31)]
+    assert warned == [False] * 30 + [True]
+
+
+def test_a_lead_may_have_moved_before_the_camera_saw_it() -> None:
+    """The fastest speed counts from the radar's first sight on; the other counters wait for the camera."""
+    checker = FcwChecker()
+    checker.update(0.0, CAR, replace(LEAD, v_lead=9.0, fcw=False), BRAKING)
+    standing = replace(LEAD, v_lead=0.0, d_rel=30.0)
+    assert [k for k in range(80) if checker.update(k * 0.05, CAR, standing, BRAKING)] == [60]
 
 
 def test_five_seconds_between_warnings() -> None:

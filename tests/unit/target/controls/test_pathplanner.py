@@ -77,6 +77,12 @@ def test_width_unseen_is_that_of_usual_roads() -> None:
     assert planned(*blind, v_ego=0.0).lane_width == pytest.approx(3.0, abs=1e-3)
 
 
+def test_one_line_alone_tells_no_width() -> None:
+    """The width is certain only as far as both lines are seen."""
+    one = [model(probs=(1.0, 0.0)) for _ in range(10)]
+    assert planned(*one, v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
+
+
 def test_fit_answers_anew_for_each_message() -> None:
     """The kept fit is only for the message it was made of."""
     fit = ModelFit()

@@ -34,6 +34,7 @@ class Drive:
         self.planner = Planner(params, ModelFit())
         self.planner.mpc1, self.planner.mpc2 = mpc1 or FixedMpc(), mpc2 or FixedMpc()
         self.car = CarState(v_ego=20.0, a_ego=0.3)
+        self.lead = LeadData()
         self.frame = -1
 
     def run(
@@ -49,7 +50,7 @@ class Drive:
             self.frame += 1
             t = self.frame * 0.01
             if radar and self.frame % 5 == 0:
-                self.state = RadarState(t, LeadData(), LeadData())
+                self.state = RadarState(t, self.lead, LeadData())
                 self.model = ModelData(
                     t, *([PathData((0.0,) * 50, 1.0, 1.0)] * 3), LeadVision(99.0, 1.0, 0.1)
                 )
@@ -97,6 +98,21 @@ def test_turns_leave_less_to_speed_up(params: CarParams) -> None:
     assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.275, abs=0.01)
 
 
+def test_keeping_up_with_a_lead_allows_more(params: CarParams) -> None:
+    """Behind a lead near by that pulls away, 0.7 m/s^2 are allowed at 20 m/s."""
+    drive = started(params)
+    drive.lead = LeadData(status=True, d_rel=30.0, v_lead=22.0, v_lead_k=22.0, a_lead_k=0.5)
+    assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.7, abs=0.01)
+
+
+def test_cruise_never_goes_backwards(params: CarParams) -> None:
+    """A plan that ended slightly below zero is not cruised on with."""
+    drive = started(params)
+    drive.planner._v_now, drive.planner._a_now = -0.005, -0.4
+    drive.run(1, kph=8.0)
+    assert drive.planner._v_cruise == 0.0
+
+
 def test_the_slowest_wins(params: CarParams) -> None:
     """The plan that is slowest in 0.2 s is taken, if it is for a lead."""
     slow, slower = FixedMpc(-0.1, -0.5, True), FixedMpc(-0.2, -1.0, True)
@@ -113,6 +129,8 @@ def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> Non
     plans = drive.run(6)
     assert [p.a_target for p in plans[:5]] == pytest.approx([-0.05, -0.10, -0.15, -0.20, -0.25])
     assert mpc.start == pytest.approx((plans[4].v_target, -0.25))
+    # speed is the integral of that acceleration
+    assert plans[4].v_target - plans[0].v_target == pytest.approx(-0.25 * 0.05 / 2 + 0.05 * 0.01 / 2)
 
 
 def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:

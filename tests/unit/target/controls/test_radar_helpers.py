@@ -111,6 +111,13 @@ def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> Non
     assert cluster.is_lead(20.0) is expected
 
 
+@pytest.mark.parametrize("v_rel", [-20.0, -30.0])
+def test_one_moving_track_makes_the_vehicle_a_lead(v_rel: float) -> None:
+    """A vehicle stands, or comes on, only if all of its tracks do."""
+    assert not Cluster([track(v_rel=v_rel), track(v_rel=v_rel)]).is_lead(20.0)
+    assert Cluster([track(v_rel=v_rel), track()]).is_lead(20.0)
+
+
 def test_second_lead_is_apart() -> None:
     """Another vehicle is more than 8 m further, or more than 1 m/s different."""
     first = lead(d_rel=40.0)
@@ -129,6 +136,12 @@ def test_clusters_are_what_lies_within_two_and_a_half() -> None:
     ]
     clusters = cluster_tracks(tracks)
     assert sorted(c.d_rel for c in clusters) == [40.0, 41.0, 41.0]
+
+
+@pytest.mark.parametrize(("gap", "vehicles"), [(2.4, 1), (2.6, 2)])
+def test_clusters_reach_two_and_a_half(gap: float, vehicles: int) -> None:
+    """Two tracks 2.4 m apart are one vehicle, 2.6 m apart they are two."""
+    assert len(cluster_tracks([track(d_rel=40.0), track(d_rel=40.0 + gap)])) == vehicles
 
 
 def test_centroids_keep_a_chain_apart() -> None:

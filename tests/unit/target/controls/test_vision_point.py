@@ -1,5 +1,6 @@
 """The camera's lead against radar tracks."""
 
+import numpy as np
 import pytest
 from selfdrive.controls.lib.polynomial import ZERO
 from selfdrive.controls.lib.radar_helpers import Track
@@ -45,6 +46,20 @@ def test_it_is_taken_to_be_on_the_path() -> None:
     bend = (0.0, 0.001, 0.0, 0.0)
     off, on = track(y_rel=0.0), track(y_rel=2.5)
     assert seen().best_match([off, on], bend) is on
+
+
+def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
+    """Distance and speed are those of a Kalman filter with R = std^2 and Q = diag(0.5, 1) a cycle."""
+    point, std = VisionPoint(), 3.0
+    a, x, p = np.array([[1.0, 0.05], [0.0, 1.0]]), np.zeros(2), 1e2 * np.eye(2)
+    for k in range(30):
+        z = 50.0 - 0.4 * k
+        point.update(LeadVision(z, 0.9, std))
+        gain = p[:, 0] / (p[0, 0] + std**2)
+        x = x + gain * (z - x[0])
+        p = p - np.outer(gain, p[0])
+        x, p = a @ x, a @ p @ a.T + np.diag([0.5, 1.0])
+    assert (point._filter.value, point._filter.rate) == pytest.approx(tuple(x))
 
 
 def test_an_unsure_lead_matches_nothing() -> None:
