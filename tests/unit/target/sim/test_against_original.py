@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from selfdrive.sim.run import simulate
-from selfdrive.sim.scenario import parse_scenario
+from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
 
 # HWT of 2 s first at, min HWT, min distance, max brake, max gas, speeds (m/s) at 5, 10, ... s. In S5 what
 # comes below 6 m/s is left out: there the original's simulator sent its speed in the wrong unit.
@@ -12,15 +12,6 @@ MEASURED = {
     "S3": (6.94, 1.820, 37.95, 0.355, 0.092, (24.92, 20.68, 23.01, 24.30, 19.97, 19.01)),
     "S5": (6.94, 1.197, None, None, 0.088, (24.92, 19.51, 6.84)),
 }
-
-CRASH = """
-schema: scenario/1
-name: crash
-title: nobody brakes
-duration_s: {duration}
-host: {{speed_mps: {speed}}}
-lead: {{gap_m: {gap}, speed_mps: {speeds}, at_s: {times}}}
-"""
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -38,20 +29,12 @@ def test_longitudinal_control_is_the_original(fault_free, name):
         assert trace["brake"].max() == pytest.approx(brake, abs=0.005)
 
 
-@pytest.mark.parametrize(
-    ("speed", "gap", "speeds", "times", "duration"),
-    [
-        (30, 100, [20], [0], 13),
-        (20, 35, [20, 0], [3, 23], 14),
-        (20, 35, [20, 0], [3, 9.6], 10),
-        (20, 35, [20, 0], [3, 7], 8),
-    ],
-)
-def test_warning_two_seconds_before_contact(speed, gap, speeds, times, duration):
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("name", ["O17", "O18", "O19", "O20"])
+def test_warning_two_seconds_before_contact(scenarios, name, plant):
     """A driver who is about to run into the lead is warned about two seconds before, as by the original."""
-    text = CRASH.format(speed=speed, gap=gap, speeds=speeds, times=times, duration=duration)
-    result = simulate(parse_scenario(text, "crash", ""), 0)
-    contact = result.trace["t"][result.trace["d_rel"] <= 0.0][0]
+    result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0)
+    contact = result.record["hazards"]["H1"]
     warned = [alert["t"] for alert in result.record["alerts"] if alert["name"] == "fcw"]
     assert contact - warned[0] == pytest.approx(2.0, abs=0.1)
     assert result.record["engaged_from"] is None

@@ -1,0 +1,180 @@
+"""On the reference plant the loop is openpilot v0.4.2 in its own simulator: its recordings and figures.
+
+The recordings are not part of the project. OPENPILOT_TRACES names their folder.
+"""
+
+import csv
+import os
+from dataclasses import replace
+from functools import cache
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+from selfdrive.sim.run import simulate
+from selfdrive.sim.scenario import load_scenario, on_plant
+from selfdrive.sim.simulator import Simulator
+
+REPO = Path(__file__).parents[4]
+TRACES = Path(os.environ.get("OPENPILOT_TRACES", REPO.parent / "shared/reference/openpilot_v0.4.2/traces"))
+SCENARIOS = REPO / "fault_library" / "scenarios"
+RECORDED = ("S1", "S3", "S5", "S1_nolead", *(f"O{k:02}" for k in range(1, 11)))
+LOG_DELAY = 1  # steps by which what the controller published comes later into the recordings
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """Reads a recording: its steps, and columns as arrays, NaN where nothing was published."""
+
+    def read(name):
+        path = TRACES / f"{name}.csv"
+        if not path.exists():
+            pytest.skip(f"no recorded run {path}; set OPENPILOT_TRACES to the folder that holds it")
+        with path.open() as file:
+            rows = list(csv.DictReader(file))
+
+        def column(key):
+            return np.array([float(row[key] or "nan") for row in rows])
+
+        return np.round(100 * column("time")).astype(int), column
+
+    return read
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """Runs a scenario on the reference plant, once; `X_nolead` is X without its lead."""
+
+    def run(name):
+        scenario = on_plant(load_scenario(SCENARIOS / f"{name.removesuffix('_nolead')}.yaml"), "reference")
+        return simulate(replace(scenario, lead=None) if name.endswith("_nolead") else scenario, 0)
+
+    return cache(run)
+
+
+def rms(values):
+    return np.sqrt(np.nanmean(np.square(values)))
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_a_recorded_run(recorded, driven, name):
+    """Speed, distance, headway, braking, engaging and set speed are the original's, within narrow limits."""
+    steps, column = recorded(name)
+    result = driven(name)
+    trace = {channel: values[steps] for channel, values in result.trace.items()}
+    assert rms(trace["v_ego"] - column("speed")) < 0.03
+    assert rms(trace["d_rel"] - column("d_rel")) < 0.03
+    assert np.abs(trace["d_rel"] - column("d_rel")).max() < 0.1
+    assert trace["d_rel"].min() == pytest.approx(column("d_rel").min(), abs=0.05)
+    assert trace["hwt"].min() == pytest.approx(column("headway_time").min(), abs=0.01)
+    assert trace["brake"].max() == pytest.approx(column("brake").max(), abs=0.02)
+    published = np.maximum(steps - LOG_DELAY, 0)
+    enabled = column("enabled") == 1.0
+    assert result.trace["engaged"][published].astype(bool).tolist() == enabled.tolist()
+    set_speed = result.trace["v_cruise"][published] * 3.6
+    assert set_speed[enabled] == pytest.approx(column("vCruise")[enabled])
+    assert result.record["hazards"] == {"H1": None, "H2": None, "H3": None}
+    assert result.record["alert_events"] == []
+
+
+@pytest.mark.parametrize("name", ["S1", "S3", "O02", "O09"])
+def test_what_the_controller_thought(recorded, driven, name):
+    """Its speed estimate, plan and view of the lead follow the recording, from engaging on."""
+    steps, column = recorded(name)
+    trace = driven(name).trace
+    later = steps > 150
+    published = steps[later] - LOG_DELAY
+    assert trace["v_ego_est"][published] == pytest.approx(column("vEgo")[later], abs=0.02)
+    assert trace["v_pid"][published] == pytest.approx(column("vPid")[later], abs=0.02)
+    planned = steps[later]
+    assert trace["v_target"][planned] == pytest.approx(column("plan_vTarget")[later], abs=0.02)
+    assert trace["a_target"][planned] == pytest.approx(column("plan_aTarget")[later], abs=0.02)
+    assert trace["lead_v_lead_k"][planned] == pytest.approx(column("lead_vLeadK")[later], abs=0.05)
+    assert trace["lead_a_lead_k"][planned] == pytest.approx(column("lead_aLeadK")[later], abs=0.05)
+
+
+@pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
+def test_contexts(driven, name, rows):
+    """As many rows of the context table are reached as on the original; S1 just misses its fourth."""
+    result = driven(name)
+    trace = result.trace
+    armed = trace["t"] >= 1.5
+    far, closing = trace["hwt"][armed] > 2.0, trace["v_rel"][armed] < 0.0
+    assert len(set(zip(far.tolist(), closing.tolist(), strict=True))) == rows
+    assert result.record["alert_events"] == []
+    if name == "S1":
+        assert trace["hwt"][-1] == pytest.approx(1.985, abs=0.002)
+
+
+def faulty(scenario, disturb):
+    """Runs a scenario with `disturb(simulator, truths)` applied; `truths` are the ground truths so far."""
+    simulator, truths = Simulator(), []
+    simulator.reset(scenario, 0)
+    observe = simulator._observe
+    simulator._observe = lambda t: truths.append(observe(t)) or truths[-1]
+    disturb(simulator, truths)
+    while not simulator.done:
+        simulator.step()
+    return simulator.result().record
+
+
+@pytest.fixture
+def s1(scenarios):
+    return on_plant(load_scenario(scenarios / "S1.yaml"), "reference")
+
+
+def angle_off(degrees):
+    """The steering angle read is off while the headway time is in 0 .. 2 s."""
+
+    def disturb(simulator, truths):
+        measure = simulator._sensors.measure
+
+        def disturbed(truth, button, frame):
+            off = radians(degrees) if 0.0 <= truth.hwt <= 2.0 else 0.0
+            return measure(truth._replace(steer_angle=truth.steer_angle + off), button, frame)
+
+        simulator._sensors.measure = disturbed
+
+    return disturb
+
+
+@pytest.mark.parametrize(("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.375, 18.3), (0.34, None)])
+def test_steering_angle_off(s1, degrees, leaves):
+    """From 0.86 deg, at 11.9 s, to 0.375 deg, at 18.3 s, an error drives the car out of its lane."""
+    record = faulty(s1, angle_off(degrees))
+    assert record["alerts"] == []
+    if leaves is None:
+        assert record["hazards"]["H3"] is None
+    else:
+        assert record["hazards"]["H3"] == pytest.approx(leaves, abs=0.1)
+
+
+def near(truths):
+    """The headway time has been 2 s or less."""
+    return any(truth.hwt <= 2.0 for truth in truths)
+
+
+def lose_frames(simulator, truths):
+    step = simulator.manager.step
+    simulator.manager.step = lambda t, frames, view: step(t, [] if near(truths) else frames, view)
+
+
+def lose_model(simulator, truths):
+    visiond = simulator.manager.visiond
+    publish = visiond.publish
+    visiond.publish = lambda model: None if near(truths) else publish(model)
+
+
+@pytest.mark.parametrize(
+    ("disturb", "alert", "at", "hit"),
+    [(lose_frames, "can_error", 7.085, 18.28), (lose_model, "model_error", 7.415, 19.30)],
+)
+def test_loss_of_an_input(s1, disturb, alert, at, hit):
+    """Without CAN or model from the closest approach on, alert and contact come when the original's do."""
+    record = faulty(s1, disturb)
+    assert [event["name"] for event in record["alerts"]] == [alert]
+    assert record["alerts"][0]["t"] == pytest.approx(at, abs=0.011)
+    assert record["hazards"]["H1"] == pytest.approx(hit, abs=0.02)
