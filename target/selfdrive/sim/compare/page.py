@@ -21,8 +21,9 @@ font:15px/1.45 system-ui,sans-serif}
 h1{font-size:1.5rem;margin:.4rem 0}h2{font-size:1.15rem;margin:2.2rem 0 .3rem}
 p{margin:.3rem 0;color:var(--dim)}
 h3{font-size:.9rem;margin:.5rem 0 0;font-weight:600}a{color:var(--c0)}
-.scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-variant-numeric:tabular-nums}
-th,td{text-align:right;padding:.12rem .7rem;border-bottom:1px solid var(--grid);white-space:nowrap}
+.scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-size:.82rem;
+font-variant-numeric:tabular-nums}
+th,td{text-align:right;padding:.12rem .5rem;border-bottom:1px solid var(--grid);white-space:nowrap}
 th{font-weight:600;color:var(--dim)}td.t,th.t{text-align:left}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(330px,100%),1fr));gap:.2rem 1rem}
 .key{font-size:.8rem;color:var(--dim)}.key i{display:inline-block;width:1.3em;height:.22em;
@@ -77,7 +78,7 @@ def page(maneuvers: list[Maneuver], plant: str) -> str:
         f"<p>{len(maneuvers)} fault-free runs on the {escape(plant)} plant. Thin lines are the runs, broad "
         "pale lines beneath them the references; time in seconds. Dashed: engaging.</p>"
         f'<div class="scroll"><table><tr><th class="t">run</th><th class="t">what happens</th>'
-        f'<th class="t">reference</th>{head}<th class="t">hazards and alerts</th></tr>'
+        f'<th class="t">reference</th><th class="t">hazards and alerts</th>{head}</tr>'
         f"{rows}</table></div>{''.join(_section(one) for one in maneuvers)}</body></html>\n"
     )
 
@@ -90,7 +91,7 @@ def _overview_row(one: Maneuver) -> str:
         verdict, kind = ("within tolerance", "good") if one.comparison.good else ("beyond tolerance", "bad")
     return (
         f'<tr><td class="t"><a href="#{name}">{name}</a></td><td class="t">{escape(one.run.title)}</td>'
-        f'<td class="t {kind}">{verdict}</td>{cells}<td class="t">{_events_text(one.run)}</td></tr>'
+        f'<td class="t {kind}">{verdict}</td><td class="t">{_events_text(one.run)}</td>{cells}</tr>'
     )
 
 

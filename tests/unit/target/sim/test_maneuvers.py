@@ -1,64 +1,101 @@
-"""The 20 stock maneuvers of openpilot v0.4.2 as scenarios."""
+"""The page of maneuvers: whole, self-contained, light; its lines true to the data."""
 
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
 import pytest
-from selfdrive.common.conversions import MPH_TO_MS
-from selfdrive.sim.scenario import load_scenario
+from selfdrive.sim.compare.svg import Line, Mark, Panel, draw, simplify
+from selfdrive.sim.maneuvers import main
+from selfdrive.sim.replay import main as replay
 
-MPH_20, MPH_40, MPH_60 = 20 * MPH_TO_MS, 40 * MPH_TO_MS, 60 * MPH_TO_MS
-SET, RESUME = 3, 4
-SET_EARLY = ((SET, 120, 130),)
-
-
-def resumed(times):
-    """Set at 1.2 s, then so many presses of RES, each 0.1 s, every 0.2 s."""
-    return (*SET_EARLY, *((RESUME, 140 + 20 * k, 150 + 20 * k) for k in range(times)))
-
-
-STOP_AND_GO = ((10, 0, 0, 10, 0, 10), (10, 20, 30, 40, 50, 60))
-# speed (m/s), gap (m), lead's speeds (m/s) and times (s), buttons (code, down and up in steps), duration (s)
-MANEUVERS = {
-    "O01": (MPH_40, None, None, ((SET, 200, 230), (RESUME, 1000, 1010), (RESUME, 1020, 1030)), 30),
-    "O02": (MPH_60, None, None, ((SET, 200, 230), (SET, 1000, 1010), (SET, 1020, 1030)), 30),
-    "O03": (MPH_20, None, None, SET_EARLY, 25),
-    "O04": (MPH_20, None, None, SET_EARLY, 25),
-    "O05": (MPH_60, 100, ((MPH_40,), (0,)), SET_EARLY, 30),
-    "O06": (MPH_40, 150, ((0,), (0,)), SET_EARLY, 30),
-    "O07": (20, 35, ((20, 20, 0), (0, 15, 35)), SET_EARLY, 50),
-    "O08": (20, 35, ((20, 20, 0), (0, 15, 25)), SET_EARLY, 50),
-    "O09": (0, 100, ((0,), (0,)), resumed(3), 30),
-    "O10": (30, 49, ((30, 30, 29, 31, 29, 31, 29), (0, 6, 8, 12, 16, 20, 24)), resumed(2), 25),
-    "O11": (10, 20, STOP_AND_GO, resumed(2), 70),
-    "O12": (0, 4, ((0, 0, 45), (0, 10, 40)), resumed(5), 30),
-    "O13": (0, 20, ((10, 0, 0, 10, 0, 0), (10, 20, 30, 40, 50, 60)), resumed(2), 70),
-    "O14": (0, 20, ((10, 0, 0, 10, 0, 0), (10, 13, 26, 33, 36, 45)), resumed(2), 45),
-    "O15": (10, 10, ((20, 10), (1, 11)), resumed(5), 30),
-    "O16": (10, 10, ((20, 0), (1, 11)), resumed(5), 30),
-    "O17": (30, 100, ((20,), (0,)), (), 15),
-    "O18": (20, 35, ((20, 0), (3, 23)), (), 18),
-    "O19": (20, 35, ((20, 0), (3, 9.6)), (), 13),
-    "O20": (20, 35, ((20, 0), (3, 7)), (), 8),
-}
-GRADES = {"O03": ((0, 10, 11), (0, 0, 1.0)), "O04": ((0, 10, 11), (0, 0, -1.0))}
+BRIEF = """schema: scenario/1
+name: {name}
+title: into a <standing> lead
+duration_s: 2
+host: {{speed_mps: 20}}
+lead: {{gap_m: 20, speed_mps: 0}}
+"""
 
 
-@pytest.mark.parametrize("name", MANEUVERS)
-def test_it_is_the_stock_maneuver(scenarios, name):
-    """Speed, lead, grade, buttons and duration are the original's; the plant is left to the user."""
-    speed, gap, profile, buttons, duration = MANEUVERS[name]
-    scenario = load_scenario(scenarios / f"{name}.yaml")
-    assert (scenario.name, scenario.steps, scenario.plant) == (name, 100 * duration, "standard")
-    assert scenario.speed == pytest.approx(speed)
-    assert scenario.grade == GRADES.get(name)
-    assert (scenario.curvature, scenario.lateral_offset) == (None, 0.0)
-    assert tuple((press.code, press.press, press.release) for press in scenario.buttons) == buttons
-    if gap is None:
-        assert scenario.lead is None
-    else:
-        assert scenario.lead.gap == gap
-        assert scenario.lead.speeds == pytest.approx(profile[0])
-        assert scenario.lead.times == profile[1]
+@pytest.fixture
+def folder(tmp_path):
+    """Two short scenarios, and a reference for the first."""
+    for name in ("A", "B"):
+        (tmp_path / f"{name}.yaml").write_text(BRIEF.format(name=name))
+    arguments = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path), "--update-references"]
+    assert replay(["A", *arguments]) == 0
+    return tmp_path
 
 
-def test_all_twenty_are_there(scenarios):
-    """O01 to O20, no more and no less."""
-    assert sorted(path.stem for path in scenarios.glob("O*.yaml")) == sorted(MANEUVERS)
+def show(folder, *arguments):
+    code = main(["--out", str(folder / "page"), "--scenarios", str(folder), *arguments])
+    return code, (folder / "page" / "index.html").read_text() if code == 0 else ""
+
+
+def test_page(folder):
+    """All scenarios are on it, with hazards, the reference where there is one, and nothing to be loaded."""
+    code, text = show(folder, "--references", str(folder / "kept"), "--plant", "reference")
+    assert code == 0
+    first, second = re.findall(r"<section.*?</section>", text)
+    assert 'class="c0 r"' in first
+    assert 'class="c0 r"' not in second
+    assert first.count("<svg") == 5
+    assert '<path class="hazard"' in first
+    assert "H1 at 1.0" in first
+    assert "&lt;standing&gt;" in first
+    assert text.count("within tolerance") == 1
+    assert not re.search(r"https?://|<script|<link|src=|@import|url\(", text)
+    for svg in re.findall(r"<svg.*?</svg>", text):
+        ET.fromstring(svg)
+    assert len(text) < 60_000
+
+
+def test_page_is_the_same_again(folder):
+    """The same scenarios give the same bytes."""
+    assert show(folder, "A") == show(folder, "A")
+
+
+def test_road_the_plant_does_not_know(folder, capsys):
+    """A bend is left out of all maneuvers on the reference plant; asked for by name, it is an error."""
+    bend = BRIEF.format(name="B") + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n"
+    (folder / "B.yaml").write_text(bend)
+    code, text = show(folder, "--plant", "reference")
+    assert code == 0
+    assert text.count("<section") == 1
+    assert "left out: B" in capsys.readouterr().out
+    assert show(folder, "--plant", "reference", "B")[0] == 2
+
+
+def test_mistakes(folder, tmp_path, capsys):
+    """No such scenario, none at all, a wrong file and a page that cannot be written end with exit code 2."""
+    assert main(["--out", str(tmp_path / "page"), "--scenarios", str(folder), "X"]) == 2
+    assert main(["--out", str(tmp_path / "page"), "--scenarios", str(tmp_path / "nowhere")]) == 2
+    assert main(["--out", str(folder / "A.yaml"), "--scenarios", str(folder), "A"]) == 2
+    (folder / "B.yaml").write_text("schema: scenario/9\n")
+    assert main(["--out", str(tmp_path / "page"), "--scenarios", str(folder)]) == 2
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) == 4
+    assert all(error.startswith("error: ") for error in errors)
+
+
+def test_simplified_line():
+    """A line drawn through fewer points misses none by more than the slack, and keeps both ends and peaks."""
+    x = np.linspace(0.0, 1000.0, 600)
+    y = 300.0 * np.sin(x / 60.0) + 200.0 * (x > 500.0)
+    few = simplify(np.column_stack((x, y)), 2.5)
+    assert len(few) < 150
+    assert np.abs(np.interp(x, few[:, 0], few[:, 1]) - y).max() <= 2.5
+    assert (few[0, 0], few[-1, 0]) == (0.0, 1000.0)
+
+
+def test_gaps_and_constants_are_drawn():
+    """A line breaks where it has no value; without any it is empty; a constant has an axis all the same."""
+    t = np.arange(10) / 20
+    broken = np.where(np.arange(10) == 5, np.inf, 1.0)
+    panel = Panel(title="a", unit="m", lines=(Line("b", 0, t, broken), Line("c", 1, t, np.full(10, np.nan))))
+    svg = draw(panel, (Mark("alert", "fcw", 0.25),), 0.5)
+    paths = dict(re.findall(r'<path class="(c\d)" d="([^"]*)"/>', svg))
+    assert paths["c0"].count("M") == 2
+    assert paths["c1"] == ""
+    assert ">fcw</text>" in svg
