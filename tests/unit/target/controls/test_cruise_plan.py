@@ -1,6 +1,7 @@
 """Limits of cruising."""
 
 import pytest
+from selfdrive.controls.lib import cruise_plan
 from selfdrive.controls.lib.cruise_plan import cruise_limits, is_following
 from selfdrive.messages import LeadData
 
@@ -21,6 +22,13 @@ def test_limits_over_speed(v_ego: float, following: bool, a_min: float, a_max: f
     """Acceleration limits follow the tables, jerk limits equal them."""
     limits = cruise_limits(v_ego, following, 0.0, slow_down=False)
     assert limits == pytest.approx((a_min, a_max, a_min, a_max))
+
+
+def test_jerk_is_never_limited_to_less_than_a_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the tables allow hardly any acceleration, it may still change by 0.1 m/s^3."""
+    monkeypatch.setattr(cruise_plan, "A_MIN", (-0.01,) * 5)
+    monkeypatch.setattr(cruise_plan, "A_MAX", (0.01,) * 5)
+    assert cruise_limits(20.0, False, 0.0, slow_down=False) == (-0.01, 0.01, -0.1, 0.1)
 
 
 def test_turns_leave_less_to_speed_up() -> None:
