@@ -5,6 +5,8 @@ from math import isfinite
 from selfdrive.sim.compare import figures
 from selfdrive.sim.compare.differences import ChannelResult, Comparison, FigureResult
 
+_SMALLEST = 5e-5  # differences below are rounded to 0, and then their time means nothing
+
 _HEAD = f"  {'channel':<16}{'unit':<6}{'rms':>10}{'largest':>11}{'at [s]':>9}{'lag [s]':>9}  limits"
 
 
@@ -41,10 +43,12 @@ def _channel_line(result: ChannelResult) -> str:
         if value is not None
     ]
     lag = "-" if result.lag is None else f"{result.lag:+.2f}"
+    seen = abs(result.largest) >= _SMALLEST
+    largest, at = (f"{result.largest:+.4f}", f"{result.at:.2f}") if seen else ("0.0000", "-")
     flag = f"  <-- {', '.join(result.failures)} beyond" if result.failures else ""
     return (
-        f"  {result.column.channel:<16}{result.column.unit:<6}{result.rms:>10.4f}{result.largest:>+11.4f}"
-        f"{result.at:>9.2f}{lag:>9}  {', '.join(limits) or '-'}{flag}"
+        f"  {result.column.channel:<16}{result.column.unit:<6}{result.rms:>10.4f}{largest:>11}"
+        f"{at:>9}{lag:>9}  {', '.join(limits) or '-'}{flag}"
     )
 
 

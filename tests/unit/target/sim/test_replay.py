@@ -106,7 +106,7 @@ def test_no_lag_to_be_seen():
 
 
 def test_crossings():
-    """Each stretch beyond the band is one crossing, with its ends and its worst moment; the band itself is inside."""
+    """Each stretch beyond the band is a crossing, with its ends and its worst moment; the band is inside."""
     seconds = np.arange(8) / 20
     found = crossings(seconds, np.array([0.2, 0.5, 0.6, -0.9, 0.5, 0.0, 0.0, 0.7]), 0.5)
     assert [(one.begin, one.end, one.worst, one.at) for one in found] == [
