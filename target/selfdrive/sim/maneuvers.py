@@ -15,7 +15,8 @@ from selfdrive.sim.compare.differences import compare
 from selfdrive.sim.compare.page import Maneuver, page
 from selfdrive.sim.compare.tolerances import Tolerances, load_tolerances
 from selfdrive.sim.compare.trace_csv import Reference, read_reference
-from selfdrive.sim.replay import EXIT_INPUT, TOLERANCES, reference_names
+from selfdrive.sim.replay import TOLERANCES, reference_names
+from selfdrive.sim.run import EXIT_INPUT
 from selfdrive.sim.scenario import PLANTS, STANDARD, Scenario, on_plant
 
 

@@ -15,10 +15,10 @@ from selfdrive.sim.compare import report, runs
 from selfdrive.sim.compare.differences import compare
 from selfdrive.sim.compare.tolerances import load_tolerances
 from selfdrive.sim.compare.trace_csv import read_reference, write_reference
+from selfdrive.sim.run import EXIT_INPUT
 from selfdrive.sim.scenario import PLANTS, REFERENCE, on_plant
 
 EXIT_BEYOND = 1
-EXIT_INPUT = 2
 
 TOLERANCES = runs.SCENARIOS.parent / "references" / "tolerances.yaml"
 
