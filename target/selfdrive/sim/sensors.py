@@ -7,7 +7,7 @@ from selfdrive.common.conversions import MS_TO_KPH, RAD_TO_DEG
 from selfdrive.messages import CanFrame
 from selfdrive.sim.truth import GroundTruth
 
-STANDSTILL_SPEED = 0.3  # m/s; below it the sensors read 0
+STANDSTILL_SPEED = 0.3  # m/s; below it the speed reads 0, though the wheels are known to turn
 
 # Signals with a constant value, by period in steps: a closed, belted car in drive, its main switch on.
 _CONSTANT = {
@@ -28,7 +28,6 @@ _CONSTANT = {
     },
 }
 _COUNTERS = 4  # a two-bit counter makes a constant message one of four frames
-_BRAKES_EVERY = 2  # steps
 
 
 class CarSensors:
@@ -60,9 +59,8 @@ class CarSensors:
             self._wheel_speeds.pack((speed_kph, speed_kph, speed_kph, speed_kph)),
             self._steering.pack((steer_angle_deg, steer_rate_deg), frame),
             self._buttons.pack((button,), frame),
+            self._standstill.pack((truth.v_ego > 0.0,), frame),
         ]
-        if frame % _BRAKES_EVERY == 0:
-            frames.append(self._standstill.pack((speed_kph > 0.0,), frame // _BRAKES_EVERY))
         for period, by_counter in self._constant:
             if frame % period == 0:
                 frames += by_counter[frame // period % _COUNTERS]

@@ -96,6 +96,13 @@ def test_what_the_controller_thought(recorded, driven, name):
     assert trace["lead_a_lead_k"][planned] == pytest.approx(column("lead_aLeadK")[later], abs=0.05)
 
 
+@pytest.mark.parametrize("name", ["S5", "O06", "O08"])
+def test_brake_at_rest(recorded, driven, name):
+    """It is the original's to the last count: raised beyond what holds the car only while the wheels turn."""
+    _, column = recorded(name)
+    assert driven(name).trace["brake"][-1] == pytest.approx(column("brake")[-1], abs=1e-5)
+
+
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
 def test_contexts(driven, name, rows):
     """As many rows of the context table are reached as on the original; S1 just misses its fourth."""

@@ -34,10 +34,10 @@ def test_speed_and_angle_as_cantools_reads_them(truth):
 
 @pytest.mark.parametrize(("speed", "shown"), [(0.29999, 0.0), (0.3, 1.08), (0.0, 0.0)])
 def test_speed_reads_zero_below_its_threshold(truth, speed, shown):
-    """Below 0.3 m/s all speeds read 0 and the wheels count as standing."""
+    """Below 0.3 m/s all speeds read 0, but wheels that turn at all count as moving."""
     values = read(CAR, CarSensors().measure(truth(v_ego=speed), 0, 0))
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(shown)
-    assert values["STANDSTILL"]["WHEELS_MOVING"] == (shown > 0)
+    assert values["STANDSTILL"]["WHEELS_MOVING"] == (speed > 0)
 
 
 def test_every_message_has_its_period_and_counter(truth):
