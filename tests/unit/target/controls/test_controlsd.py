@@ -196,6 +196,7 @@ def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
     drive.controlsd._awareness.status = -0.01
     drive.run(300)
     assert drive.controlsd.plan.a_target == pytest.approx(-0.2, abs=0.01)
+    assert drive.state.alerts[0] == "driver_distracted"
 
 
 def test_warnings_and_permanent_alerts(drive: Drive) -> None:
@@ -225,6 +226,16 @@ def test_driver_actions_keep_the_car_awake(drive: Drive) -> None:
     assert awareness.status == 1.0
     drive.run(100).run(1, buttons=(ButtonEvent("setting", True),))
     assert awareness.status == 1.0
+    drive.run(100).run(1, CAN)
+    assert awareness.status == 1.0 and not drive.state.enabled
+
+
+def test_the_driver_is_shown_whether_there_is_a_lead(drive: Drive) -> None:
+    """The car is asked to show a lead while the first plan is for one."""
+    drive.engage()
+    assert not drive.asked.lead_visible
+    drive.controlsd._planner.mpc1.prev_lead_status = True
+    assert drive.run(1).asked.lead_visible
 
 
 def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:

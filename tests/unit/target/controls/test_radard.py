@@ -87,6 +87,15 @@ def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None
     assert not Drive(params, steer_override=True, **straight).see(point(), cycles=3).lead_one.status
 
 
+@pytest.mark.parametrize("steered", [False, True])
+def test_the_driver_s_steering_gives_no_lead_a_lateral_speed(params: CarParams, steered: bool) -> None:
+    """A lead that moves to the side has a lateral speed, unless the driver steers."""
+    drive = Drive(params, steer_override=steered)
+    for k in range(20):
+        lead = drive.see(point(y_rel=0.05 * k)).lead_one
+    assert (lead.v_lat == 0.0) is steered
+
+
 def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> None:
     """A standing object counts once the camera has seen it three times at the same place."""
     drive = Drive(params)

@@ -63,8 +63,9 @@ def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
 
 
 def test_an_unsure_lead_matches_nothing() -> None:
-    """A lead of 70 % or less is not used."""
+    """A lead of 70 % or less is not used, one of 71 % is."""
     assert seen(prob=0.7).best_match([track()], ZERO) is None
+    assert seen(prob=0.71).best_match([track()], ZERO) is not None
 
 
 def test_becoming_sure_starts_at_the_seen_distance() -> None:
