@@ -101,9 +101,6 @@ class Controlsd:
             self._alerts.add("fcw", t)
         if active:
             self._warn(t, events)
-        else:
-            self._lateral.reset()
-            self._longitudinal.reset(car.v_ego)
         self._learn(car, active)
         gas, brake = self._longitudinal.update(active, car, self.plan)
         steer = self._lateral.update(car, active)

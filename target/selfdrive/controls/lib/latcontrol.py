@@ -33,10 +33,6 @@ class LatControl:
         """The wanted angle has been out of the steering's reach for some time."""
         return self._pid.saturated
 
-    def reset(self) -> None:
-        """Not in control: forget the loop's history."""
-        self._pid.reset()
-
     def plan(self, car: CarState, lanes: Lanes, angle_offset: float) -> None:
         """A new model message: solve for the angle wanted; `angle_offset` in rad at the steering wheel."""
         factor = self.model.curvature_factor(car.v_ego)
