@@ -38,9 +38,9 @@ def compile_filter(text: str, columns: Collection[str]) -> Predicate:
         raise _error(text[:60] + "...", f"a filter of {len(text)} characters", f"at most {_LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
+        return _Compiler(text, columns).predicate(tree.body)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as err:
         raise _error(text, f"not an expression ({getattr(err, 'msg', err)})", _ALLOWED) from None
-    return _Compiler(text, columns).predicate(tree.body)
 
 
 def _error(text: str, got: str, expected: str) -> MutatorError:

@@ -27,7 +27,12 @@ def check_condition(text: str, constants: Mapping[str, float] | None = None) -> 
     Allowed: the variables, numbers, `True`, comparisons, and/or/not, + - * /, abs/min/max. Anything else
     raises MutatorError (without place: the caller knows file and line).
     """
-    return _Writer(text, constants or {}, divide="({} / {})").boolean(_parse(text))
+    try:
+        canonical = _Writer(text, constants or {}, divide="({} / {})").boolean(_parse(text))
+        _function(canonical)  # what the probe is given must be readable and compile too
+    except (SyntaxError, RecursionError, MemoryError):
+        raise _refuse("too much in one expression", text, "write it shorter") from None
+    return canonical
 
 
 def to_code(condition: str) -> str:

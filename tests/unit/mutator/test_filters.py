@@ -54,6 +54,7 @@ def test_expressions(text: str, expected: bool) -> None:
         "f'{value}' == 'x'",
         "1",
         "(" * 500,
+        "value == " + "-" * 1500 + "1",
         "value == " + "1" * 3000,
     ],
 )

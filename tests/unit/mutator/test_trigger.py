@@ -53,6 +53,8 @@ def test_one_text_for_one_condition(text: str, canonical: str) -> None:
         ("t > 1e999", "a number too large"),
         ("t > 1j", "1j"),
         ("t > " + "1" * 2000, "characters"),
+        ("t" + "+t" * 400 + " > 0", "characters"),
+        ("-" * 980 + "t > 0", "too much in one expression"),
     ],
 )
 def test_anything_else_is_refused(text: str, piece: str) -> None:
