@@ -183,7 +183,7 @@ def short_path(where: str | Path | None) -> str:
 def _console(*, stderr: bool) -> "Console":
     from rich.console import Console
 
-    return Console(stderr=stderr, highlight=False)
+    return Console(stderr=stderr, highlight=False, emoji=False)  # `:x:` in a text is no picture
 
 
 def _cell(value: object) -> str:
