@@ -180,10 +180,10 @@ class ReferenceEngine:
 
     def _judge(self, job: Job, ended: _Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
         limits = self.limits
-        if report is not None:
-            return self._judge_report(job, report)
         if ended.out_of_wall:
             return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
+        if report is not None:
+            return self._judge_report(job, report)
         if ended.code == -signal.SIGXCPU or (ended.code == -signal.SIGKILL and ended.cpu_s >= limits.cpu_s):
             return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
         if ended.code < 0 and -ended.code in _OUTSIDE_SIGNALS:
@@ -213,7 +213,8 @@ class ReferenceEngine:
         if report["outside"]:
             return f"the package was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
-        for path in sorted(expected.keys() | report["files"].keys()):
+        more = {path for path in report["files"] if path.endswith(".py")}  # a cache of data may be left there
+        for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
         if job.mutant is not None and (report["probe"] or {}).get("mutant") != job.mutant:
@@ -301,6 +302,7 @@ def _is_full(work: Path, report: dict[str, Any] | None) -> bool:
 
 
 def _steady(detail: str, folder: Path) -> str:
-    """The text without what differs from run to run: scratch paths, addresses; kept short."""
+    """The text without what differs from run to run (scratch paths, addresses), printable, kept short."""
     text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
-    return re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]
+    text = re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

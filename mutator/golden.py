@@ -1,6 +1,7 @@
 """Golden runs and how a faulty run differs from them."""
 
 import json
+import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -50,11 +51,14 @@ def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[str] | No
             names = file.files if channels is None else [manifest.time_channel, *channels]
             trace = {name: np.asarray(file[name]) for name in names}
     except (OSError, ValueError, zipfile.BadZipFile) as err:
-        raise BadOutput(f"not a readable trace ({err})", where=path, expected="an .npz file") from None
+        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
     except KeyError as err:
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
-    if len({values.shape for values in trace.values()}) > 1:
+    shapes = {values.shape for values in trace.values()}
+    if any(len(shape) != 1 for shape in shapes) or len(shapes) > 1:
         raise BadOutput("channels of different lengths", where=path, expected="one value per step")
+    if words := [name for name, values in trace.items() if values.dtype.kind not in "biuf"]:
+        raise BadOutput(f"channel {words[0]} of something else than numbers", where=path)
     return trace
 
 
@@ -64,21 +68,46 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     try:
         data = json.loads(path.read_bytes())
     except (OSError, ValueError) as err:
-        raise BadOutput(f"not a readable record ({err})", where=path, expected="a JSON object") from None
-    if not isinstance(data, dict) or not isinstance(data.get("hazards"), dict):
-        raise BadOutput("no hazards in it", where=path, expected="a JSON object with hazards and alerts")
+        raise BadOutput(
+            f"not a readable record ({_why(err)})", where=path, expected="a JSON object"
+        ) from None
+    if not isinstance(data, dict) or not _has_times(data):
+        expected = "{hazards: {NAME: time or null}, alerts: [{name: NAME, t: time}]}"
+        raise BadOutput("no hazards and alerts with their times", where=path, expected=expected)
     return data
 
 
-def hazards_of(record: Mapping[str, Any]) -> list[tuple[str, float]]:
-    """(hazard, first time) of those that occurred."""
-    return [(name, time) for name, time in record["hazards"].items() if time is not None]
+def _why(err: Exception) -> str:
+    """The error without the path in it, which differs from run to run."""
+    return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
+
+
+def _has_times(record: dict[str, Any]) -> bool:
+    hazards, events = record.get("hazards"), _events(record)
+    if not isinstance(hazards, dict) or not isinstance(events, list):
+        return False
+    times = [time for time in hazards.values() if time is not None]
+    for event in events:
+        if not isinstance(event, dict) or not isinstance(event.get("name"), str):
+            return False
+        times.append(event.get("t"))
+    return all(type(time) in (int, float) and math.isfinite(time) for time in times)
+
+
+def _events(record: Mapping[str, Any]) -> Any:
+    """Every raise of an alert, or its first ones, whichever the record has."""
+    return record.get("alert_events") or record.get("alerts") or []
+
+
+def hazards_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
+    """(hazard, first time) of those that occurred, of the hazards that count."""
+    hazards = record["hazards"].items()
+    return [(name, time) for name, time in hazards if time is not None and name in counted]
 
 
 def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
     """(alert, time) of every raise that the record knows, of the alerts that count."""
-    events = record.get("alert_events") or record.get("alerts") or []
-    return [(event["name"], event["t"]) for event in events if event["name"] in counted]
+    return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
 
 
 def compare(golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str) -> Difference:

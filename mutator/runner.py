@@ -105,9 +105,7 @@ class Runner:
         try:
             record = self._record(experiment, built, execution)
         except BadOutput as err:
-            record = _bare(
-                experiment, Status.HARNESS_ERROR, f"{Path(err.where or '').name}: {err.got}", built
-            )
+            record = _bare(experiment, Status.HARNESS_ERROR, _told(err), built)
         return Finished(
             experiment=experiment,
             record=record,
@@ -126,14 +124,18 @@ class Runner:
             return _bare(experiment, execution.status, execution.detail, built, activation)
         activation = activation_of(execution.probe)
         channels = self.manifest.compared
-        faulty = golden.load_trace(self.manifest, execution.out, [channel.name for channel in channels])
-        difference = golden.compare(
-            self.goldens.trace(experiment), faulty, channels, self.manifest.time_channel
-        )
+        reference = self.goldens.trace(experiment)
+        try:
+            faulty = golden.load_trace(self.manifest, execution.out, [channel.name for channel in channels])
+            said = golden.load_record(self.manifest, execution.out)
+        except BadOutput as err:
+            if activation is None:
+                raise
+            return _bare(experiment, Status.CRASHED, _told(err), built, activation)
+        difference = golden.compare(reference, faulty, channels, self.manifest.time_channel)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
-        said = golden.load_record(self.manifest, execution.out)
-        hazards = first_events(golden.hazards_of(said), activation)
+        hazards = first_events(golden.hazards_of(said, self.manifest.hazards), activation)
         return Record(
             experiment_id=experiment.id,
             status=Status.OK,
@@ -160,6 +162,11 @@ def activation_of(report: Mapping[str, Any]) -> Activation | None:
         last=max(i["last"] for i in ran),
         count=sum(i["count"] for i in ran),
     )
+
+
+def _told(err: BadOutput) -> str:
+    """What is wrong with an output, without the scratch folder that it was in."""
+    return f"{Path(err.where or '').name}: {err.got}"
 
 
 def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:

@@ -73,6 +73,7 @@ def test_a_good_run_leaves_its_files(run: Run) -> None:
             Status.CRASHED,
             "ValueError: <object object at 0x...> (toycar/go.py:1)",
         ),
+        (r"raise ValueError('\udc80 \n')", Status.CRASHED, r"ValueError: \udc80 \n (toycar/go.py:1)"),
         ("import os; os._exit(0)", Status.CRASHED, "left with status 0 without a report"),
         ("import ctypes; ctypes.string_at(0)", Status.CRASHED, "killed by SIGSEGV"),
         ("import os; os.abort()", Status.CRASHED, "killed by SIGABRT"),
@@ -111,6 +112,13 @@ def test_sleeping_hits_the_wall_limit(run: Run) -> None:
     """A run that waits for ever is a timeout after the wall time it was given."""
     execution = run(entry("import time; time.sleep(100)"), replace(LIMITS, wall_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 1 s")
+
+
+def test_who_does_not_end_after_its_work_is_a_timeout(run: Run) -> None:
+    """A run that did its work but leaves a thread behind, and so never ends, did not end well."""
+    body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
+    execution = run(entry(body), replace(LIMITS, wall_s=2))
+    assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
 
 
 def test_steps_are_limited(run: Run) -> None:
@@ -161,11 +169,12 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
 
 
 def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
-    """A file that belongs to no tree of this job makes a harness error."""
+    """A source file that belongs to no tree of this job makes a harness error; a cache of data does not."""
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
     assert "toycar/left.py" in execution.detail
+    assert run(entry(body.replace("left.py", "left.json"))).status is Status.OK
 
 
 def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:

@@ -115,6 +115,10 @@ def test_bad_traces_are_told(tmp_path: Path) -> None:
     np.savez(path, t=T, gas=np.array([{}] * 5, dtype=object))
     with pytest.raises(BadOutput):
         load_trace(MANIFEST, tmp_path, ["gas"])
+    for values in (np.array(["a"] * 5), np.zeros((5, 2))):
+        np.savez(path, t=np.zeros(values.shape), gas=values)
+        with pytest.raises(BadOutput):
+            load_trace(MANIFEST, tmp_path, ["gas"])
 
 
 def test_record_is_read(tmp_path: Path) -> None:
@@ -126,14 +130,24 @@ def test_record_is_read(tmp_path: Path) -> None:
     }
     (tmp_path / "record.json").write_text(json.dumps(said))
     record = load_record(MANIFEST, tmp_path)
-    assert hazards_of(record) == [("H2", 3.5)]
+    assert hazards_of(record, ["H1", "H2"]) == [("H2", 3.5)]
+    assert hazards_of(record, ["H1"]) == []
     assert alerts_of(record, ["fcw"]) == [("fcw", 1.0), ("fcw", 2.0)]
     assert alerts_of(record | {"alert_events": []}, ["fcw"]) == [("fcw", 1.0)]
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"hazards": []}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[]", "{}", '{"hazards": []}', '{"hazards": {"H1": "soon"}}', '{"hazards": {"H1": NaN}}'),
+        *(
+            f'{{"hazards": {{}}, "alerts": {alerts}}}'
+            for alerts in ('{"x": 1}', '["fcw"]', '[{"name": "fcw"}]')
+        ),
+    ],
+)
 def test_bad_record_is_told(tmp_path: Path, text: str) -> None:
-    """A record that says nothing of hazards is BadOutput."""
+    """A record that does not say when which hazards and alerts came is BadOutput."""
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
         load_record(MANIFEST, tmp_path)

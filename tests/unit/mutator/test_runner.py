@@ -126,10 +126,14 @@ def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], r
 
 @pytest.mark.parametrize("outputs", [{"trace": {}}, {"said": []}, {"trace": {"gas": np.zeros(3)}}])
 def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs) -> None:
-    """A run that ended well without a usable trace and record is a harness error."""
+    """A run that ended without a usable trace and record broke down, if its fault was active; if it was not,
+    the harness did."""
     record = judged(ran=RAN, **outputs)
-    assert record.status is Status.HARNESS_ERROR
-    assert record.detail
+    assert (record.status, record.outcome) == (Status.CRASHED, None)
+    assert record.activation is not None
+    assert record.detail.startswith(("log.npz: ", "said.json: "))
+    assert "/" not in record.detail
+    assert judged(ran=NEVER, **outputs).status is Status.HARNESS_ERROR
 
 
 @pytest.mark.parametrize(
