@@ -225,13 +225,13 @@ class _Checks:
         return _Run(
             problem="",
             digest=_digest_of(self.manifest, execution.out),
-            hazards=tuple(golden.hazards_of(record)),
+            hazards=tuple(golden.hazards_of(record, self.manifest.hazards)),
             triggered=bool(execution.probe and execution.probe["triggered"]),
             cpu_s=execution.cpu_s,
         )
 
     def _keep(self, out: Path, place: Path) -> None:
-        place.parent.mkdir(exist_ok=True)
+        place.parent.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(place, ignore_errors=True)
         out.rename(place)
 

@@ -150,8 +150,15 @@ class Expansion:
 
     def _scenario_digest(self, scenario: str) -> str:
         if scenario not in self._digests:
-            with self._placed(self._scenario_keys(scenario)):
-                self._digests[scenario] = digest(self.workspace.scenario(scenario).read_bytes())
+            known = self.workspace.scenario_names()
+            if scenario not in known:  # a file from anywhere could change, or be another one elsewhere
+                raise self.campaign.error(
+                    self._scenario_keys(scenario),
+                    f"no scenario '{scenario}' in the library",
+                    expected=f"one of {', '.join(known) or 'none'}",
+                    remedy="correct the name, or put the file into the library's scenarios/",
+                )
+            self._digests[scenario] = digest(self.workspace.scenario(scenario).read_bytes())
         return self._digests[scenario]
 
     @contextmanager

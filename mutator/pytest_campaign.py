@@ -2,6 +2,7 @@
 
 import os
 import signal
+import traceback
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -37,9 +38,11 @@ class ChunkItem(pytest.Item):
     def runtest(self) -> None:
         try:
             errors = self.worker.get().run(self.pending)
-        except DiskFull as err:
-            self.user_properties.append((_PROBLEM, str(err)))
-            self.session.shouldstop = str(err)
+        except Exception as err:
+            problem = str(err) if isinstance(err, MutatorError) else _defect(err, self.name)
+            self.user_properties.append((_PROBLEM, problem))
+            if isinstance(err, DiskFull):
+                self.session.shouldstop = problem
             raise
         if errors:
             raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
@@ -51,6 +54,13 @@ class ChunkItem(pytest.Item):
 
     def reportinfo(self) -> tuple[Path, None, str]:
         return self.config.rootpath, None, self.name
+
+
+def _defect(err: Exception, chunk: str) -> str:
+    lines = "".join(traceback.format_exception(err))
+    return (
+        f"{chunk} was given up by a defect of mutator; please report it with these lines:\n{lines}".rstrip()
+    )
 
 
 class LazyWorker:

@@ -23,6 +23,7 @@ from mutator.plan import Choices
 from mutator.pytest_campaign import Controller
 from mutator.records import Progress
 from mutator.single import rerun, run_single
+from mutator.worker import Worker
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]
@@ -184,6 +185,35 @@ def test_harness_errors_are_tried_again(
     again = campaign_run.run(toy, "small", out)
     assert (again.exit_code, again.done, again.ran) == (0, 12, 2)
     assert campaign_run.run(toy, "small", out).ran == 0
+
+
+def test_a_defect_in_a_worker_is_told(
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A chunk that a defect of the harness ends is told of, and leaves the others alone."""
+    run, seen = Worker.run, []
+
+    def broken(self: Worker, pending: Pending) -> list[tuple[str, str]]:
+        seen.append(pending)
+        if len(seen) == 2:
+            raise ZeroDivisionError("seven")
+        return run(self, pending)
+
+    monkeypatch.setattr(Worker, "run", broken)
+    summary = campaign_run.run(toy, "small", tmp_path / "run")
+    assert (summary.exit_code, summary.done) == (3, 12 - len(seen[1].places))
+    assert "chunk-00001 was given up by a defect of mutator" in summary.problem
+    assert "ZeroDivisionError: seven" in summary.problem
+
+
+def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
+    """A scenario with a folder in its name runs like any other."""
+    (toy.library / "scenarios" / "more").mkdir()
+    shutil.move(toy.scenario("A"), toy.library / "scenarios" / "more" / "A.yaml")
+    path = toy.campaign("small")
+    path.write_text(path.read_text().replace("[A]", "[more/A]").replace("scenario: A", "scenario: more/A"))
+    summary = campaign_run.run(toy, "small", tmp_path / "run", choices=Choices(limit=2))
+    assert (summary.exit_code, summary.done) == (0, 2)
 
 
 def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:

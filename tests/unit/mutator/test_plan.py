@@ -164,6 +164,19 @@ def test_names_that_do_not_exist_are_told(
     assert (error.value.where, error.value.line) == (str(path), line)
 
 
+def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
+    """A scenario file from anywhere is no scenario of a campaign; one in a folder of the library is."""
+    path, file = toycar.campaign("toy"), toycar.scenario("A")
+    text = path.read_text()
+    path.write_text(text.replace("[A, B]", f"[A, {file}]"))
+    with pytest.raises(MutatorError, match=r"no scenario '.*A\.yaml' in the library; expected one of A, B"):
+        make_plan(toycar, "toy")
+    (file.parent / "more").mkdir()
+    (file.parent / "more" / "C.yaml").write_text(file.read_text())
+    path.write_text(text.replace("[A, B]", "[more/C]"))
+    assert {e.scenario for e in make_plan(toycar, "toy").experiments} == {"more/C"}
+
+
 def test_some_values_of_a_variant(whole: Workspace) -> None:
     """`values` takes that many of each variant's values."""
     path = whole.campaign("toy")
