@@ -234,7 +234,7 @@ def _no_single_hit(
     what, place = _what(verb, anchor.name), f"in {location.function}"
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
-        take = f"`nth: 1` to `nth: {len(hits)}`"
+        take = f"`nth: 1` to `nth: {len(hits)}`" if len(hits) > 1 else "`nth: 1`, or leave it out"
         got = f"{what} matches {len(hits)} statements {place}: lines {lines}"
         remedy = f"add {take}" if anchor.nth is None else f"nth is {anchor.nth}: take {take}"
         line, expected = hits[0][1].first, "exactly one"

@@ -11,19 +11,20 @@ from mutator.errors import MutatorError
 from mutator.expand import expand
 from mutator.fault_models import Example, FaultModel, FaultModels
 from mutator.manifest import TargetManifest
-from mutator.model import Fault, Trigger
+from mutator.model import Fault
 from mutator.mutant import build, injection_edit, unsplice
 from mutator.params import resolve
-from mutator.spec import READINGS, FaultSpec
+from mutator.spec import READINGS, FaultSpec, Variant
 from mutator.stpa import ContextTable
 from mutator.trigger import always
 from mutator.workspace import Workspace
+from mutator.yamlio import Keys
 
 EXAMPLE_TAG = "example"
 T = TypeVar("T")
 
 
-def check_library(workspace: Workspace, target: str = "openpilot") -> list[MutatorError]:
+def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of library, templates and target, in the order of the files; empty when all is well.
 
     Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
@@ -72,24 +73,26 @@ def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -
             yield error
             return
         for variant in spec:
-            name = f"{spec.name}/{variant.name}"
-            fault = next(f for f in faults if f.spec == name)
-            problem = _build(fault, models, manifest, always())
-            if problem:
-                keys = (*variant.keys, reading) if reading in variant.readings else variant.keys
-                yield spec.source.error(
-                    keys, f"{name} ({reading}): {problem}", remedy="correct the spec or the target"
-                )
+            if reading in variant.readings:
+                name = f"{spec.name}/{variant.name}"
+                fault = next(f for f in faults if f.spec == name)
+                yield from _unbuildable(spec, variant, fault, models, manifest)
 
 
-def _build(
-    fault: Fault, models: FaultModels, manifest: TargetManifest, trigger: Trigger
-) -> MutatorError | None:
+def _unbuildable(
+    spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
+) -> Iterator[MutatorError]:
+    """Why a fault of a variant cannot be built, told at its first injection that is to blame, if one is."""
+    keys: Keys = (*variant.keys, fault.reading)
     try:
-        build(manifest, models, fault, trigger)
+        for i, injection in enumerate(fault.injections):
+            keys = (*variant.keys, fault.reading, "injections", i, "at")
+            injection_edit(manifest.tree.parsed(injection.location.path), models, injection, EXAMPLE_TAG)
+        keys = (*variant.keys, fault.reading)
+        build(manifest, models, fault, always())
     except MutatorError as error:
-        return error
-    return None
+        got = f"{fault.spec} ({fault.reading}): {error}"
+        yield spec.source.error(keys, got, remedy="correct the spec or the target")
 
 
 def _unknown_hazards(

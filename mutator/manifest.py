@@ -56,6 +56,7 @@ class TargetManifest:
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
+    armed_after_s: float  # triggers wait so long where nothing else is said: until the controller is at work
     trace_file: str  # an .npz in {out}
     time_channel: str
     compared: tuple[Channel, ...]  # actuator outputs: differing from golden means manifested
@@ -128,6 +129,7 @@ class _ManifestModel(StrictModel):
     files: list[str]
     forbid: list[str] = Field(default_factory=list)
     step_s: float = Field(gt=0.0, allow_inf_nan=False)
+    armed_after_s: float = Field(0.0, ge=0.0, allow_inf_nan=False)
     entry: _EntryModel
     trace_file: str
     time_channel: str
@@ -162,6 +164,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         entry_args=tuple(model.entry.args),
         changes={name: tuple(args) for name, args in model.entry.changes.items()},
         step_s=model.step_s,
+        armed_after_s=model.armed_after_s,
         trace_file=model.trace_file,
         time_channel=model.time_channel,
         compared=_channels(model.compare),

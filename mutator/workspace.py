@@ -47,7 +47,7 @@ class Workspace:
             target=_folder(target, "target", "--target or MUTATOR_TARGET") if target else None,
         )
 
-    def manifest(self, name: str = "openpilot") -> TargetManifest:
+    def manifest(self, name: str) -> TargetManifest:
         """The target `name`, or the manifest file of that path."""
         return load_manifest(self._file("targets", name, "target"), self.target)
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from mutator.stpa import ContextTable
     from mutator.workspace import Workspace
 
-ARMED_AFTER_S = 1.5  # the controller is engaged at 1.3 s; contexts count from 0.2 s later
 RUNS = Path("runs")
 HEAD = "run.json"
 
@@ -89,7 +88,7 @@ def context_tables(workspace: "Workspace") -> tuple["ContextTable", ...]:
     return tuple(workspace.context_table(name) for name in workspace.context_table_names())
 
 
-def find_trigger(workspace: "Workspace", text: str, armed_after_s: float = ARMED_AFTER_S) -> "Trigger":
+def find_trigger(workspace: "Workspace", text: str, armed_after_s: float) -> "Trigger":
     """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
     from mutator.model import Trigger
     from mutator.trigger import always, at_time, check_condition

@@ -54,8 +54,13 @@ def try_fault(
     seed: Seed = None,
     reading: Reading = None,
     armed_after: Annotated[
-        float, typer.Option(min=0, metavar="SECONDS", help="Contexts and `always` count from then on.")
-    ] = choose.ARMED_AFTER_S,
+        float | None,
+        typer.Option(
+            min=0,
+            metavar="SECONDS",
+            help="Contexts and `always` count from then on; default: the manifest's.",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where diff, traces and plot go.")] = Path(
         "runs/try"
     ),
@@ -80,7 +85,8 @@ def try_fault(
     fault, _ = choose.one_of_each_variant(faults)[0]
     if len(faults) > 1:
         terminal.note(f"{choose.fault_words(fault)}, one of {len(faults)} (choose by --variant, --value)")
-    when = choose.find_trigger(workspace, trigger, armed_after)
+    armed_after_s = target.armed_after_s if armed_after is None else armed_after
+    when = choose.find_trigger(workspace, trigger, armed_after_s)
     experiment = _experiment(workspace, fault, scenario, when, seed or 0)
     folder = out / experiment.id
     with terminal.wait(f"driving {scenario}, fault-free and faulty"):
@@ -149,7 +155,7 @@ def diff(
 
     target, models = choose.find_target(workspace, manifest), workspace.fault_models()
     choice = choose.FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
-    when = choose.find_trigger(workspace, trigger)
+    when = choose.find_trigger(workspace, trigger, target.armed_after_s)
     diffs = []
     for fault, of in choose.one_of_each_variant(choice.faults(workspace, target, models)):
         mutant = build(target, models, fault, when)

@@ -90,10 +90,12 @@ def _of_specs(
     if not request.specs:
         raise MutatorError("no spec named", remedy="name specs (`mutator list specs`) or --campaign")
     target, models = choose.find_target(workspace, request.manifest), workspace.fault_models()
-    triggers: list[Trigger] = [choose.find_trigger(workspace, text) for text in request.triggers]
+    triggers: list[Trigger] = [
+        choose.find_trigger(workspace, text, target.armed_after_s) for text in request.triggers
+    ]
     if not triggers:
         for table in choose.context_tables(workspace):
-            triggers += table.triggers(armed_after_s=choose.ARMED_AFTER_S)
+            triggers += table.triggers(armed_after_s=target.armed_after_s)
     pairs = []
     for name in _spec_names(workspace, request.specs):
         choice = choose.FaultChoice(spec=name, seed=request.seed, reading=request.reading)

@@ -45,9 +45,9 @@ def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "line", "said"),
     [
-        ("after_assign: gap", "after_assign: gab", 11, "gap"),  # unknown anchor
+        ("after_assign: gap", "after_assign: gab", 13, "gap"),  # unknown anchor
         ("toycar/sensing.py, function: Sensor.sense, after_assign: gap",
-         "toycar/driver.py, function: Driver.drive, after_assign: wanted", 11, "nth"),  # ambiguous anchor
+         "toycar/driver.py, function: Driver.drive, after_assign: wanted", 13, "nth"),  # ambiguous anchor
         ("toycar/sensing.py", "../../outside.py", 13, "outside"),  # beyond the target's root
         ("toycar/sensing.py", "toycar/world.py", 13, "toycar/world.py"),  # a forbidden place
         ("by_m: error", "by_kph: error", 16, "by_m"),  # a unit of another dimension
@@ -102,7 +102,7 @@ def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = = {{ by }}\n")
     answer = cli("try", own, "-s", "A")
     assert answer.code == 2
-    assert "own.yaml:11: " in answer.err
+    assert "own.yaml:13: " in answer.err
     assert "invalid syntax" in answer.err
     assert not Path("runs").exists()
 

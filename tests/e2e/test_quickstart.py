@@ -82,7 +82,7 @@ def test_times_are_in_order(rows: list[Row]) -> None:
 @pytest.mark.parametrize("scenario", sorted(CONTEXTS))
 def test_contexts_that_fault_free_runs_reach(quickstart: Path, workspace: Workspace, scenario: str) -> None:
     """The golden runs reach as many contexts of the table as the original does."""
-    manifest = workspace.manifest()
+    manifest = workspace.manifest("openpilot")
     trace = load_trace(manifest, quickstart / "golden" / scenario)
     table = workspace.context_table("accelerate_decelerate")
     reached = set()

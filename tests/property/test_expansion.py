@@ -11,7 +11,7 @@ from mutator.spec import AS_CODED, AS_DESCRIBED, READINGS, Draw
 from mutator.workspace import Workspace
 
 CLONE = Workspace.find(root=Path(__file__).parents[2])
-MANIFEST, MODELS, SPECS = CLONE.manifest(), CLONE.fault_models(), CLONE.specs()
+MANIFEST, MODELS, SPECS = CLONE.manifest("openpilot"), CLONE.fault_models(), CLONE.specs()
 SEEDS = st.integers(0, 2**63 - 1)
 RANGES = st.lists(
     st.tuples(st.integers(-1000, 1000), st.integers(0, 100)).map(lambda p: (float(p[0]), float(p[0] + p[1]))),
