@@ -1,5 +1,6 @@
 """Can this machine run campaigns? One finding for each thing a campaign needs."""
 
+import fcntl
 import importlib.metadata
 import os
 import resource
@@ -42,11 +43,11 @@ class Finding:
 
 
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
-    """Look at interpreter, packages, machine, temporary folder, child processes, library and target.
+    """Look at interpreter, packages, machine, the folder here, child processes, library and target.
 
     `workspace` may be the error that finding one gave: that is a finding too.
     """
-    findings = [_python(), *_packages(), _cores(), _memory(), *_disk(), _temporary(), _child()]
+    findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child()]
     if isinstance(workspace, MutatorError):
         remedy = workspace.remedy or ""
         findings.append(Finding(name="library", level=Level.FAIL, found=workspace.got, remedy=remedy))
@@ -95,26 +96,23 @@ def _memory() -> Finding:
     return Finding(name="memory", level=level, found=f"{free / 1e9:.1f} GB free", remedy=remedy)
 
 
-def _disk() -> Iterator[Finding]:
-    for name, folder in (("disk here", Path.cwd()), ("disk for trees", Path(tempfile.gettempdir()))):
-        free = shutil.disk_usage(folder).free
-        level = Level.OK if free > LITTLE_DISK else Level.WARN
-        remedy = "" if level is Level.OK else "make room, or set TMPDIR or --out to a folder with more"
-        yield Finding(name=name, level=level, found=f"{free / 1e9:.1f} GB free in {folder}", remedy=remedy)
+def _disk() -> Finding:
+    free = shutil.disk_usage(Path.cwd()).free
+    level = Level.OK if free > LITTLE_DISK else Level.WARN
+    remedy = "" if level is Level.OK else "make room, or set --out to a folder with more"
+    return Finding(name="disk", level=level, found=f"{free / 1e9:.1f} GB free here", remedy=remedy)
 
 
-def _temporary() -> Finding:
-    """Mutated trees are written here for the time of a run; locks on files must work too."""
-    import fcntl
-
+def _folder() -> Finding:
+    """A run folder must be writable, and its file system must know locks."""
+    here = Path.cwd()
     try:
-        with tempfile.TemporaryFile() as file:
+        with tempfile.TemporaryFile(dir=here) as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as e:
-        remedy = "set TMPDIR to a folder that can be written and locked"
-        return Finding(name="temporary folder", level=Level.FAIL, found=str(e), remedy=remedy)
-    found = f"{tempfile.gettempdir()} can be written and locked"
-    return Finding(name="temporary folder", level=Level.OK, found=found)
+        remedy = "set --out to a folder that can be written and locked"
+        return Finding(name="folder", level=Level.WARN, found=f"{here}: {e.strerror}", remedy=remedy)
+    return Finding(name="folder", level=Level.OK, found=f"{here} can be written and locked")
 
 
 def _child() -> Finding:

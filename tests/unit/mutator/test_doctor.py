@@ -35,6 +35,18 @@ def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     assert finding.found.endswith("wanted >=999")
 
 
+def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where files cannot be locked or written no run folder can be, but one elsewhere can."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(95, "Operation not supported")
+
+    monkeypatch.setattr(doctor.fcntl, "flock", refuse)
+    [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "folder"]
+    assert (finding.level, finding.found.rpartition(": ")[2]) == (Level.WARN, "Operation not supported")
+    assert "--out" in finding.remedy
+
+
 def test_a_child_that_cannot_start_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """An interpreter that does not start its children cannot run experiments."""
     monkeypatch.setattr(doctor.sys, "executable", "/no/such/python")
