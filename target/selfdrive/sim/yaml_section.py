@@ -27,9 +27,8 @@ def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
             remedy="mend the syntax",
         ) from None
     if node is None:
-        raise ConfigError(
-            "an empty file", where=where, line=1, expected="a mapping", remedy="write the keys of a scenario"
-        )
+        remedy = f"write the keys {', '.join(keys)}"
+        raise ConfigError("an empty file", where=where, line=1, expected="a mapping", remedy=remedy)
     return Section(node, where, keys)
 
 

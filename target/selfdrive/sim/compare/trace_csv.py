@@ -93,7 +93,7 @@ def channels_of(trace: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def read_reference(path: Path) -> Reference:
     """Read a file. Raises ConfigError, with the line, for anything that is not such a trace."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:  # some spreadsheets write a mark first
             rows = csv.reader(file)
             names = _header(next(rows, []), path)
             lines = [(rows.line_num, row) for row in rows]

@@ -268,6 +268,13 @@ def test_wrong_reference_file(reference, finished, capsys, line, old, new, expec
     assert expected in error
 
 
+def test_reference_saved_by_a_spreadsheet(reference, finished):
+    """The invisible mark that some programs put before the first column's name is no part of that name."""
+    reference.path.write_bytes(b"\xef\xbb\xbf" + reference.path.read_bytes())
+    assert list(read_reference(reference.path).channels) == list(reference.channels)
+    assert replay(reference, finished()) == 0
+
+
 def test_reference_of_another_length(trace, reference):
     """A reference that ends before the run, or after it, is refused."""
     for steps in (STEPS - 100, STEPS + 100):
@@ -295,6 +302,7 @@ def test_limited_channel_must_be_there(trace, reference):
         (TABLE.replace("{v_ego}", "{}"), "table.yaml:3: no limit"),
         (TABLE.replace("/1", "/9"), "table.yaml:1: schema"),
         (TABLE.replace("engaged_s", "engaged"), "table.yaml:5: unknown key 'engaged'"),
+        ("", "table.yaml:1: an empty file, expected a mapping; write the keys schema, channels, figures"),
     ],
 )
 def test_wrong_tolerance_table(reference, finished, tmp_path, capsys, text, expected):
