@@ -37,7 +37,7 @@ class CarStateReader:
     """Listens to the car bus; `update` gives a CarState of what has been received so far.
 
     The speed estimate starts at 0 like the original's, whatever the car's speed: it overshoots
-    by a few per cent in its first second.
+    by a tenth in its first half second.
     """
 
     def __init__(self) -> None:
