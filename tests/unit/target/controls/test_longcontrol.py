@@ -119,3 +119,11 @@ def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
     control.reset(20.0)
     control.update(False, at(20.0), plan(20.0))
     assert follow(control, at(20.0), plan(20.0)) == (0.0, 0.0)
+
+
+def test_stopping_does_not_wind_up(params: CarParams) -> None:
+    """However long the car rolls, the stopping brake ends at its limit, and is released from there."""
+    control = LongControl(params)
+    follow(control, at(0.4), plan(0.0), 1000)
+    assert control.state == STOPPING
+    assert control.output == -1.0
