@@ -135,3 +135,19 @@ def test_every_alert_can_be_raised() -> None:
 def test_priority_and_duration(name: str, priority: int, duration: float) -> None:
     """Priorities and durations are the original's."""
     assert (ALERTS[name].priority, ALERTS[name].duration) == (priority, duration)
+
+
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [
+        ("can_error", (1.0, 3.0, 4.0)),
+        ("wrong_gear", (1.0, 3.0, 3.0)),
+        ("no_target", (0.4, 2.0, 3.0)),
+        ("can_error_no_entry", (0.4, 2.0, 3.0)),
+        ("fcw", (1.0, 2.0, 2.0)),
+        ("steer_saturated", (1.0, 2.0, 3.0)),
+    ],
+)
+def test_ends_of_sound_picture_and_text(name: str, ends: tuple[float, float, float]) -> None:
+    """An alert's sound, picture and text end one by one."""
+    assert ALERTS[name].ends == ends
