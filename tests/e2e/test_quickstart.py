@@ -1,7 +1,6 @@
 """The quickstart on the controller that ships: whole, and what it must show."""
 
 import csv
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -27,10 +26,8 @@ def workspace() -> Workspace:
 def quickstart(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run folder of the quickstart, run by two workers."""
     out = tmp_path_factory.mktemp("quickstart") / "run"
-    began = time.monotonic()
     summary = campaign_run.run(workspace, "quickstart", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 60)
-    assert time.monotonic() - began < 300.0
     return out
 
 
@@ -60,15 +57,20 @@ def test_lost_data_are_noticed_at_once(rows: list[Row], fault_type: str, alerts:
 
 
 def test_distance_in_the_camera_alone_changes_little(rows: list[Row]) -> None:
-    """The radar's distance matters, the camera's alone hardly."""
+    """A wrong distance in the radar reaches the actuators, in the camera alone it does not.
 
-    def hazards(module: str, fault_type: str) -> int:
-        chosen = [row for row in rows if (row["module"], row["fault_type"]) == (module, fault_type)]
-        assert chosen
-        return sum(row["outcome"] == "hazard" for row in chosen)
+    How many hazards follow, value by value, is held to the original's in `test_published_faults`.
+    """
 
-    assert hazards("vision_output", "relative_distance") == 0
-    assert hazards("radar", "chaff") > 0
+    def manifested(module: str, fault_type: str) -> list[str]:
+        return [
+            row["manifested"]
+            for row in rows
+            if (row["module"], row["fault_type"], row["activated"]) == (module, fault_type, "1")
+        ]
+
+    assert set(manifested("vision_output", "relative_distance")) == {"0"}
+    assert set(manifested("radar", "chaff")) == {"1"}
 
 
 def test_times_are_in_order(rows: list[Row]) -> None:
