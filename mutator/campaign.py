@@ -57,6 +57,8 @@ class Campaign:
 
     `setting` names changes of the manifest that every run of the campaign is made with.
     `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
+    `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
+    random time to the end).
     """
 
     name: str
@@ -73,6 +75,7 @@ class Campaign:
     rows: tuple[str, ...] | None
     armed_after_s: Mapping[str, float]
     random_until_s: float
+    hold_s: float | None
     sample: int | None
     seed: int
     canary: Canary
@@ -100,6 +103,7 @@ class _TriggersModel(StrictModel):
     rows: list[str] | None = Field(None, min_length=1)
     armed_after_s: _ArmingModel
     random_until_s: float = Field(gt=0.0, allow_inf_nan=False)
+    hold_s: float | None = Field(None, gt=0.0, allow_inf_nan=False)
 
     @model_validator(mode="after")
     def _check(self) -> "_TriggersModel":
@@ -133,7 +137,7 @@ class _CampaignModel(StrictModel):
     methods: list[Literal["guided", "random"]] = Field(min_length=1)
     triggers: _TriggersModel
     sample: int | None = Field(None, ge=1)
-    seed: int = Field(ge=0)
+    seed: int = Field(ge=0, lt=2**63)
     canary: _CanaryModel
     limits: _LimitsModel = _LimitsModel()
     chunk: int = Field(20, ge=1, le=1000)
@@ -168,6 +172,7 @@ def load_campaign(path: Path) -> Campaign:
             AS_CODED: triggers.armed_after_s.as_coded,
         },
         random_until_s=triggers.random_until_s,
+        hold_s=triggers.hold_s,
         sample=model.sample,
         seed=model.seed,
         canary=Canary(**model.canary.model_dump()),

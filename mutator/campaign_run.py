@@ -29,7 +29,7 @@ from mutator.ids import digest
 from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
 from mutator.model import Status
-from mutator.plan import Choices, freeze_owned, make_folder, make_plan
+from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
 from mutator.provenance import check_sources, sources
 from mutator.records import Progress, Tail, label, read_records
 from mutator.results import Results
@@ -166,7 +166,7 @@ def session(
     notify: Notify | None = None,
 ) -> Iterator[Session]:
     """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
-    make_folder(out)
+    make_run_folder(out)
     with terminable(), owned(out):
         if RunFolder.exists(out):
             folder = _frozen(workspace, campaign, out, choices)

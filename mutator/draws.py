@@ -9,7 +9,7 @@ from mutator.errors import MutatorError
 
 def generator(seed: int, key: str) -> np.random.Generator:
     """A generator of its own for (seed, key), the same on every machine."""
-    if seed < 0:
-        raise MutatorError(f"seed {seed}", expected="0 or more")
+    if not 0 <= seed < 2**63:
+        raise MutatorError(f"seed {seed}", expected="0 or more, below 2 to the power of 63")
     words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype=">u4")
     return np.random.Generator(np.random.PCG64([seed, *map(int, words)]))

@@ -114,7 +114,9 @@ class Expansion:
         with self._placed(("triggers", "table")):
             table = self.workspace.context_table(self.campaign.table)
         with self._placed(("triggers", "rows")):
-            return table.triggers(armed_after_s=self.armed_after_s, rows=self.campaign.rows)
+            return table.triggers(
+                hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.rows
+            )
 
     def _of_scenario(
         self, scenario: str, faults: list[_Numbered], triggers: tuple[Trigger, ...]
@@ -135,7 +137,7 @@ class Expansion:
             last_s=self.campaign.random_until_s,
             step_s=self.manifest.step_s,
         )
-        return at_time(time, name=f"random/{row.name}")
+        return at_time(time, name=f"random/{row.name}", hold_s=self.campaign.hold_s)
 
     def _experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
         return Experiment(

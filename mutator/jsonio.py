@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import re
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,6 +41,22 @@ def full_disk_told(where: Path) -> Iterator[None]:
         if is_disk_full(err):
             raise disk_full(where) from err
         raise
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder to write into, with those above it; MutatorError when that cannot be."""
+    try:
+        with full_disk_told(path):
+            path.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=path):
+                return
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be written ({err.strerror})",
+            where=path,
+            expected="a folder of one's own",
+            remedy="choose another --out",
+        ) from None
 
 
 def write_atomic(path: Path, data: bytes) -> None:

@@ -14,7 +14,7 @@ from mutator.errors import MutatorError
 from mutator.expansion import Expansion
 from mutator.filters import compile_filter
 from mutator.ids import digest, plain
-from mutator.jsonio import full_disk_told, is_half_written, write_atomic, write_json
+from mutator.jsonio import is_half_written, make_folder, write_atomic, write_json
 from mutator.locks import owned
 from mutator.model import Experiment
 from mutator.provenance import check_sources, sources, versions
@@ -168,12 +168,12 @@ def freeze(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
     A folder that holds the same plan is left as it is; another plan, or other sources than it was frozen
     with, is a MutatorError, as is a folder in use or one that holds other things.
     """
-    make_folder(out)
+    make_run_folder(out)
     with owned(out):
         return freeze_owned(plan, out, workspace)
 
 
-def make_folder(out: Path) -> None:
+def make_run_folder(out: Path) -> None:
     """Make `out` unless it is a run folder; MutatorError when it holds anything else."""
     if out.exists() and not RunFolder.exists(out):
         names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
@@ -185,17 +185,7 @@ def make_folder(out: Path) -> None:
                 expected="a run folder, or a new or empty folder",
                 remedy="choose another --out",
             )
-    try:
-        with full_disk_told(out):
-            out.mkdir(parents=True, exist_ok=True)
-            (out / _OURS[0]).touch()
-    except OSError as err:
-        raise MutatorError(
-            f"cannot be written ({err.strerror})",
-            where=out,
-            expected="a folder of one's own",
-            remedy="choose another --out",
-        ) from None
+    make_folder(out)
 
 
 _OURS = ("owner.lock", "workers", "plan", "plan.csv", "campaign.yaml")  # what a killed freeze leaves

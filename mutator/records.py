@@ -89,16 +89,20 @@ def read_lines(path: Path, schema: str) -> Iterator[dict[str, Any]]:
         except ValueError:
             if number == len(complete) and not torn:
                 return
-            raise MutatorError(
-                f"damaged line: {line[:40]!r}",
-                where=path,
-                line=number,
-                remedy="delete the line; what it told will be run again",
-            ) from None
+            raise _damaged(path, number, line.decode("utf-8", "replace")) from None
         if number == 1:
-            check_schema(value.get("schema"), schema, path)
+            check_schema(value.get("schema") if isinstance(value, dict) else None, schema, path)
         else:
             yield value
+
+
+def _damaged(path: Path, line: int, text: str) -> MutatorError:
+    return MutatorError(
+        f"damaged line: {text[:40]!r}",
+        where=path,
+        line=line,
+        remedy="delete the line; what it told will be run again",
+    )
 
 
 def record_from(data: Mapping[str, Any]) -> Record:
@@ -130,8 +134,11 @@ def read_records(run: Path) -> dict[str, Record]:
     """
     records: dict[str, Record] = {}
     for path in sorted((run / "records").glob("*.jsonl")):
-        for data in read_lines(path, SCHEMA):
-            record = record_from(data)
+        for number, data in enumerate(read_lines(path, SCHEMA), start=2):
+            try:
+                record = record_from(data)
+            except (KeyError, TypeError, ValueError):
+                raise _damaged(path, number, canonical(data)) from None
             known = records.setdefault(record.experiment_id, record)
             if known == record or record.status is Status.HARNESS_ERROR:
                 continue

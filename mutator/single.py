@@ -10,7 +10,7 @@ from mutator import planfile
 from mutator.campaign import Limits
 from mutator.engine import Job, ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed
-from mutator.jsonio import full_disk_told
+from mutator.jsonio import full_disk_told, make_folder
 from mutator.manifest import TargetManifest
 from mutator.model import Experiment, Record, Status
 from mutator.mutant import Mutant
@@ -47,8 +47,7 @@ def run_single(
     `faulty` is an empty folder when the mutant was refused, and holds what the run left when it did not end
     well. CheckFailed when the golden run does not end well.
     """
-    with full_disk_told(out):
-        out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
         goldens = Goldens(manifest, lambda scenario, changes: reference)

@@ -44,9 +44,14 @@ class ContextTable:
     rows: tuple[ContextRow, ...]
 
     def triggers(
-        self, *, hold: Hold = Hold.WHILE, armed_after_s: float = 0.0, rows: tuple[str, ...] | None = None
+        self,
+        *,
+        hold_s: float | None = None,
+        armed_after_s: float = 0.0,
+        rows: tuple[str, ...] | None = None,
     ) -> tuple[Trigger, ...]:
-        """One trigger per row (or row named in `rows`), named as the row; MutatorError for an unknown row."""
+        """One trigger per row (or row named in `rows`), named as the row: it holds while its condition does,
+        or for `hold_s` from then on. MutatorError for an unknown row."""
         by_id = {row.id: row for row in self.rows}
         unknown = [name for name in rows or () if name not in by_id]
         if unknown:
@@ -54,7 +59,13 @@ class ContextTable:
                 f"context '{unknown[0]}'", where=self.path, expected=f"one of {', '.join(by_id)}"
             )
         return tuple(
-            Trigger(name=name, condition=by_id[name].condition, hold=hold, armed_after_s=armed_after_s)
+            Trigger(
+                name=name,
+                condition=by_id[name].condition,
+                hold=Hold.WHILE if hold_s is None else Hold.FOR,
+                hold_s=hold_s,
+                armed_after_s=armed_after_s,
+            )
             for name in (by_id if rows is None else rows)
         )
 

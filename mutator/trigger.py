@@ -56,9 +56,12 @@ def always(*, armed_after_s: float = 0.0) -> Trigger:
     return Trigger(name="always", condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
-def at_time(time_s: float, *, name: str = "random", hold: Hold = Hold.TO_END) -> Trigger:
-    """Fires at the first step whose start is not before `time_s`."""
-    return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold)
+def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
+    """Fires at the first step whose start is not before `time_s`; stays for `hold_s`, or to the end."""
+    if not math.isfinite(time_s):
+        raise MutatorError(f"time {time_s}", expected="a number of seconds")
+    hold = Hold.TO_END if hold_s is None else Hold.FOR
+    return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
 
 
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:

@@ -59,7 +59,10 @@ def plan(
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    made = make_plan(workspace, campaign, seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    with terminal.wait("planning"):
+        made = make_plan(
+            workspace, campaign, seed=seed, reading=reading, only=only, exclude=exclude, limit=limit
+        )
     folder = freeze(made, out, workspace)
     cost = load_plan(folder.path).cost(workers)  # knows what a run took, once one was driven here
     groups = Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in made.experiments)

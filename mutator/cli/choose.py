@@ -95,13 +95,26 @@ def find_trigger(workspace: "Workspace", text: str, armed_after_s: float) -> "Tr
 
     if text == "always":
         return always(armed_after_s=armed_after_s)
-    for table in context_tables(workspace):
-        if text in (row.id for row in table.rows):
-            return table.triggers(armed_after_s=armed_after_s, rows=(text,))[0]
+    named = [
+        (table, row.id)
+        for table in context_tables(workspace)
+        for row in table.rows
+        if text in (row.id, f"{table.name}/{row.id}")
+    ]
+    if len(named) > 1:
+        known = ", ".join(f"{table.name}/{row}" for table, row in named)
+        raise MutatorError(
+            f"context '{text}' in {len(named)} tables", where="--trigger", expected=f"one of {known}"
+        )
+    if named:
+        table, row = named[0]
+        return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
-        return at_time(float(text))
+        time = float(text)
     except ValueError:
         pass
+    else:
+        return at_time(time)
     try:
         condition = check_condition(text)
     except MutatorError as e:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from mutator.cli import choose
 from mutator.cli.console import Terminal
 from mutator.errors import MutatorError
+from mutator.jsonio import make_folder
 
 if TYPE_CHECKING:
     from mutator.manifest import TargetManifest
@@ -58,7 +59,8 @@ def write_mutants(
     """
     from mutator.mutant import build
 
-    if out.exists() and any(out.iterdir()):
+    make_folder(out)
+    if any(out.iterdir()):
         raise MutatorError(
             "not empty", where=out, expected="a new or empty folder", remedy="choose another --out"
         )

@@ -54,7 +54,7 @@ def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
         ("error_m: {values", "error_s: {values", 16, "by_m"),  # a draw of another dimension
         ("by_m: error", "by_m: far", 16, "error"),  # no number
         ("model: offset", "model: ofset", 14, "offset"),  # unknown model
-        ("aim: H1", "aim: H2", 7, "H9"),  # a hazard that the target does not have
+        ("aim: H1", "aim: H2", 7, "TOO_FAST"),  # a hazard that the target does not have
         ("aim: H1", "aims: H1", 7, "aim"),  # unknown key
         ("    about: Something.", "    about: Something.\n    about: Else.", 9, "about"),  # a key twice
         ("values: [30]", "values: [far]", 10, "number"),  # wrong type
@@ -105,6 +105,31 @@ def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path
     assert "own.yaml:13: " in answer.err
     assert "invalid syntax" in answer.err
     assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["try", "own.yaml", "-s", "A", "--trigger", "nan"], "time nan"),
+        (["diff", "own.yaml", "--trigger", "1e999"], "time inf"),
+        (["diff", "own.yaml", "--trigger", "near"], "one of near_far/near, other/near"),
+        (["plan", "toy", "--out", "p", "--seed", str(2**63)], f"seed {2**63}"),
+        (["try", "own.yaml", "-s", "A", "--out", "own.yaml/x"], "own.yaml/x"),
+        (["generate", "own.yaml", "--out", "own.yaml"], "cannot be written"),
+    ],
+)
+def test_a_mistake_on_the_command_line_is_told(
+    cli: Cli, own: Path, root: Path, words: list[str], said: str
+) -> None:
+    """A time, context, seed or folder that cannot be meant is told in words, with exit code 2."""
+    contexts = root / "fault_library" / "stpa" / "contexts"
+    other = (contexts / "near_far.yaml").read_text().replace("name: near_far", "name: other")
+    (contexts / "other.yaml").write_text(other)
+    answer = cli(*words)
+    assert answer.code == 2, answer.err
+    assert said in answer.err
+    assert "Traceback" not in answer.err
+    assert cli("diff", "own.yaml", "--trigger", "other/near").code == 0
 
 
 def test_a_crash_is_a_verdict(cli: Cli, own: Path, root: Path) -> None:

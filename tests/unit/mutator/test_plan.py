@@ -177,6 +177,14 @@ def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
     assert {e.scenario for e in make_plan(toycar, "toy").experiments} == {"more/C"}
 
 
+def test_faults_for_a_time(toycar: Workspace) -> None:
+    """With `hold_s` every fault, guided or random, stays active for that time once triggered."""
+    path = toycar.campaign("toy")
+    path.write_text(path.read_text().replace("  random_until_s", "  hold_s: 1.5\n  random_until_s"))
+    triggers = {e.trigger for e in make_plan(toycar, "toy").experiments}
+    assert {(trigger.hold, trigger.hold_s) for trigger in triggers} == {(Hold.FOR, 1.5)}
+
+
 def test_some_values_of_a_variant(whole: Workspace) -> None:
     """`values` takes that many of each variant's values."""
     path = whole.campaign("toy")

@@ -58,8 +58,12 @@ def test_damage_elsewhere_is_told_with_its_line(tmp_path: Path, record: MakeReco
     """A line in the middle that is no record is no kill's doing, and is not passed over."""
     path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
     lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(lines[0] + b"\0\0\0\n" + lines[2])
-    with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: damaged line"):
+    for damage in (b"\0\0\0\n", b"[1]\n", b'{"experiment_id": 3}\n'):
+        path.write_bytes(lines[0] + damage + lines[2])
+        with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: damaged line"):
+            read_records(tmp_path)
+    path.write_bytes(b"[1]\n" + lines[2])
+    with pytest.raises(MutatorError, match="expected 'records/1'"):
         read_records(tmp_path)
 
 

@@ -13,8 +13,8 @@ from mutator.workspace import Workspace
 
 def test_rows_become_triggers(toy: Workspace) -> None:
     """Each row gives a trigger of its name with the constants put in."""
-    near, far = toy.context_table("pedals").triggers(hold=Hold.TO_END, armed_after_s=1.5)
-    assert near == Trigger(name="near", condition="hwt <= 2.0", hold=Hold.TO_END, armed_after_s=1.5)
+    near, far = toy.context_table("pedals").triggers(hold_s=3.0, armed_after_s=1.5)
+    assert near == Trigger(name="near", condition="hwt <= 2.0", hold=Hold.FOR, hold_s=3.0, armed_after_s=1.5)
     assert far.condition == "not hwt <= 2.0"
     (only,) = toy.context_table("pedals").triggers(rows=("far",))
     assert only.name == "far" and only.hold is Hold.WHILE

@@ -86,6 +86,9 @@ def test_ready_made_triggers() -> None:
     assert always().hold is Hold.TO_END
     assert at_time(3).condition == "t >= 3.0"
     assert at_time(3).hold is Hold.TO_END
+    assert (at_time(3, hold_s=2.0).hold, at_time(3, hold_s=2.0).hold_s) == (Hold.FOR, 2.0)
+    with pytest.raises(MutatorError, match="time nan"):
+        at_time(math.nan)
     assert evaluate(at_time(3).condition, FOLLOWING)
     assert not evaluate(at_time(3.01).condition, FOLLOWING)
 
