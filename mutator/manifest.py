@@ -1,5 +1,6 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
+import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,6 +8,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator.columns import COLUMNS
 from mutator.errors import MutatorError
 from mutator.locations import AtModel, dotted_name
 from mutator.model import FaultLocation
@@ -16,6 +18,7 @@ from mutator.yamlio import Source, StrictModel, read
 
 SCHEMA = "target/1"
 OBSERVED = ("t", "d_rel", "v_ego", "v_lead")
+_READING = (ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.UAdd, ast.USub, ast.Load)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +34,7 @@ class Channel:
 class Observation:
     """Where ground truth is observed, and the target's expressions for it.
 
-    `expressions` gives, for each of t, d_rel, v_ego, v_lead, a dotted name valid at the location.
+    `expressions` gives, for each of t, d_rel, v_ego, v_lead, an expression valid at the location.
     """
 
     location: FaultLocation
@@ -153,6 +156,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
     _check_names(model, source)
+    _check_events(model, source)
     return TargetManifest(
         name=model.name,
         path=path,
@@ -187,6 +191,21 @@ def _check_names(model: _ManifestModel, source: Source) -> None:
             raise source.error((key,), f"'{name}'", expected="a bare file name, made in {out}")
 
 
+def _check_events(model: _ManifestModel, source: Source) -> None:
+    """Hazards become columns of the results, alerts one cell's words: names that fit there, each once."""
+    for key in ("hazards", "alerts"):
+        names = [name.lower() for name in getattr(model, key)]
+        for i, name in enumerate(names):
+            taken = key == "hazards" and name not in ("h1", "h2", "h3") and {name, f"t_{name}"} & {*COLUMNS}
+            if not name.isidentifier() or taken or name in names[:i]:
+                raise source.error(
+                    (key, i),
+                    f"'{getattr(model, key)[i]}'",
+                    expected="a name of letters, digits and _, once, that is no column of the results",
+                    remedy="rename it",
+                )
+
+
 def _channels(channels: Mapping[str, _ChannelModel]) -> tuple[Channel, ...]:
     return tuple(Channel(name=n, unit=c.unit, tolerance=c.tolerance) for n, c in channels.items())
 
@@ -201,13 +220,24 @@ def _observation(model: _ObservationModel, source: Source, root: Path) -> Observ
         ) from None
     expressions = []
     for name in OBSERVED:
-        text = getattr(model, name)
-        if not dotted_name(text):
+        try:
+            expressions.append((name, _expression(getattr(model, name))))
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise source.error(
                 ("observation", name),
-                f"'{text}'",
-                expected="a dotted name",
-                remedy="name a local or attribute",
-            )
-        expressions.append((name, text))
+                f"'{getattr(model, name)}'",
+                expected="a local name or attribute, a number, or a sum, difference or product of them",
+                remedy="say where the value is at that statement",
+            ) from None
     return Observation(location=location, expressions=tuple(expressions))
+
+
+def _expression(text: str) -> str:
+    """The text of an expression that does nothing but read and reckon; ValueError for any other."""
+    tree = ast.parse(text.strip(), mode="eval").body
+    for node in ast.walk(tree):
+        constant = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+        name = isinstance(node, ast.Name | ast.Attribute) and dotted_name(ast.unparse(node))
+        if not (constant or name or isinstance(node, _READING)):
+            raise ValueError(text)
+    return ast.unparse(tree)

@@ -15,7 +15,7 @@ from mutator.runfolder import RunFolder
 from mutator.tables import Count, Row
 
 FOLDER = "report"
-PACKAGES = ("jinja2", "libcst", "numpy", "casadi", "cantools")  # run.json has all of them
+PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

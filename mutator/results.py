@@ -93,7 +93,8 @@ def build(run: Path) -> Results:
     rows = [row(e, records[e.id], hazards) for e in experiments if e.id in records]
     columns = _columns(folder)
     write_atomic(folder.path / "results.csv", _csv(rows, columns))
-    schema = pa.schema([(name, _type(name, pa)) for name in columns])
+    flags = {*_FLAGS, *(name.lower() for name in (*_HAZARDS, *hazards))}
+    schema = pa.schema([(name, pa.int8() if name in flags else _type(name, pa)) for name in columns])
     write_atomic(folder.path / "results.parquet", _parquet(rows, schema))
     write_atomic(folder.path / "timings.parquet", _timings(folder.path))
     return _results(folder, len(rows))
@@ -152,8 +153,6 @@ def _type(name: str, pa: Any) -> "pa.DataType":
         return pa.float64()
     if name in _COUNTS:
         return pa.int64()
-    if name in _FLAGS or (name[:1] == "h" and name[1:].isdigit()):
-        return pa.int8()
     return pa.string()
 
 

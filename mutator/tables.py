@@ -34,6 +34,7 @@ class Row:
     outcome: Outcome | None
     t_activation: float | None
     t_manifest: float | None
+    checked: tuple[str, ...]  # the hazards that the target looked for
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[str, ...]
     t_alert: float | None
@@ -89,8 +90,8 @@ def read_results(path: Path) -> tuple[Row, ...]:
 
 
 def hazard_names(rows: Iterable[Row]) -> tuple[str, ...]:
-    """H1, H2, H3 always (a hazard that never came is a result too), and any other that came."""
-    return tuple(sorted({"H1", "H2", "H3"} | {name for row in rows for name, _ in row.hazards}))
+    """Every hazard that was looked for: one that never came is a result too."""
+    return tuple(sorted({name for row in rows for name in row.checked}))
 
 
 def count(group: str, rows: Sequence[Row], hazards: Sequence[str]) -> Count:
@@ -162,7 +163,8 @@ def outcome_counts(rows: Iterable[Row]) -> dict[str, int]:
 
 def _row(line: dict[str, str]) -> Row:
     # A hazard has a flag and a time of the same name: h1, t_h1.
-    hazards = [(name.upper(), float(line[f"t_{name}"])) for name in line if line.get(f"t_{name}")]
+    checked = [name for name in line if f"t_{name}" in line and line[name]]
+    hazards = [(name.upper(), float(line[f"t_{name}"])) for name in checked if line[f"t_{name}"]]
     return Row(
         experiment_id=line["experiment_id"],
         fault_id=line["fault_id"],
@@ -178,6 +180,7 @@ def _row(line: dict[str, str]) -> Row:
         outcome=Outcome(line["outcome"]) if line["outcome"] else None,
         t_activation=_time(line["t_activation"]),
         t_manifest=_time(line["t_manifest"]),
+        checked=tuple(map(str.upper, checked)),
         hazards=tuple(sorted(hazards, key=lambda h: h[1])),
         alerts=tuple(a for a in line["alerts"].split(";") if a),
         t_alert=_time(line["t_alert"]),

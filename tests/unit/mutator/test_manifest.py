@@ -23,6 +23,15 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     assert dict(manifest.observation.expressions)["v_lead"] == "now.lead_speed"
 
 
+def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
+    """What a target does not hold as such is a sum, difference or product of what it holds, or a constant."""
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text().replace("d_rel: now.gap", "d_rel: now.lead_x - (now.x + 4.5)")
+    path.write_text(text.replace("v_lead: now.lead_speed", "v_lead: '0.0'"))
+    expressions = dict(toy.manifest("toy").observation.expressions)
+    assert (expressions["d_rel"], expressions["v_lead"]) == ("now.lead_x - (now.x + 4.5)", "0.0")
+
+
 def test_arguments(toy: Workspace) -> None:
     """Placeholders are filled and changes add their arguments; an unknown change is refused."""
     manifest = toy.manifest("toy")
@@ -68,8 +77,14 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("step_s: 0.1", "step_s: 0", "7: 0 for 'step_s'; expected greater than 0"),
         ("step_s: 0.1", "step_s: .inf", "7: inf for 'step_s'; expected a finite number"),
         ("tolerance: 0.5", "tolerance: -1", "16: -1 for 'tolerance'"),
-        ("t: now.time", "t: now.time()", "19: 'now.time()'; expected a dotted name"),
+        ("t: now.time", "t: now.time()", "19: 'now.time()'; expected a local name or attribute"),
+        ("t: now.time", "t: now.time / 2", "19: 'now.time / 2'; expected a local name or attribute"),
+        ("t: now.time", "t: '[0][0]'", "19: '[0][0]'; expected a local name or attribute"),
+        ("t: now.time", "t: _fi.x", "19: '_fi.x'; expected a local name or attribute"),
         ("file: toycar/world.py", "file: ../world.py", "18: path '../world.py' leads out of the target"),
+        ("hazards: [H1]", "hazards: [H1, alert]", "23: 'alert'; expected a name"),
+        ("hazards: [H1]", "hazards: [H1, h1]", "23: 'h1'; expected a name"),
+        ("alerts: [beep]", "alerts: [beep;boop]", "24: 'beep;boop'; expected a name"),
         ("v_lead:", "v_leed:", "22: unknown key 'v_leed'; expected one of at, t, d_rel, v_ego, v_lead"),
     ],
 )

@@ -40,10 +40,14 @@ OK = {
     "outcome": "hazard",
     "t_activation": "7.0",
     "t_manifest": "7.1",
+    "h1": "1",
     "t_h1": "18.25",
+    "h2": "0",
+    "h3": "0",
 }
-BAD = OK | {"status": "harness_error", "outcome": "", "t_h1": "", "detail": "the disk | is <gone>"}
-CRASHED = OK | {"status": "crashed", "outcome": "", "t_h1": "", "detail": "IndexError"}
+NONE = {"outcome": "", "h1": "", "t_h1": "", "h2": "", "h3": ""}
+BAD = OK | NONE | {"status": "harness_error", "detail": "the disk | is <gone>"}
+CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 @pytest.fixture

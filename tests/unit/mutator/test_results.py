@@ -146,7 +146,7 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
     table = pq.read_table(built.parquet)
     assert table.column_names == list(rows[0])
     assert tuple(table.column_names[: len(COLUMNS)]) == COLUMNS
-    assert {"h9", "t_h9", "max_dev_wheel"} < set(table.column_names)
+    assert {"too_fast", "t_too_fast", "max_dev_wheel"} < set(table.column_names)
     assert table.column("experiment_id").to_pylist() == ids
     for name in ("value", "t_activation", "max_dev_wheel", "activated"):
         texts = [row[name] for row in rows]

@@ -102,7 +102,7 @@ def test_sdc_from_the_moment_of_activation(judged: Callable[..., Record]) -> Non
 def test_hazards_and_alerts(judged: Callable[..., Record]) -> None:
     """Hazards and counted alerts at or after the activation are kept, in the order of time."""
     said = {
-        "hazards": {"H1": 0.9, "H3": 0.3, "H9": None},
+        "hazards": {"H1": 0.9, "H3": 0.3, "TOO_FAST": None},
         "alert_events": [{"name": "brake_hard", "t": t} for t in (0.1, 0.6, 0.7)] + [{"name": "x", "t": 0.5}],
     }
     record = judged(ran=RAN, trace={"gas": stepped(5)}, said=said)

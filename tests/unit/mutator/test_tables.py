@@ -26,6 +26,9 @@ SEEN = {
     "outcome": "sdc",
     "t_activation": "7.0",
     "t_manifest": "7.1",
+    "h1": "0",
+    "h2": "0",
+    "h3": "0",
 }
 
 
@@ -40,8 +43,8 @@ def write_table(path: Path, *lines: dict[str, str]) -> Path:
 
 def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
     """Each experiment adds to exactly the numbers that its row supports."""
-    hazard = SEEN | {"outcome": "hazard", "t_h1": "18.3", "alerts": ""}
-    warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "t_h3": "19.0"}
+    hazard = SEEN | {"outcome": "hazard", "h1": "1", "t_h1": "18.3", "alerts": ""}
+    warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
     masked = SEEN | {"outcome": "masked", "t_manifest": ""}
     rows = read_results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked))
@@ -88,9 +91,22 @@ def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> N
     assert heads[-1] == "hazard, no alert"
 
 
+def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
+    """A hazard that was looked for is named though it never came; one that nobody looked for is not."""
+    seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
+    assert hazard_names(read_results(write_table(tmp_path / "results.csv", seen, seen))) == ("H2",)
+
+
 def test_rows_are_typed(tmp_path: Path) -> None:
     """Empty cells become None, times become numbers, alerts a tuple, hazards are sorted by time."""
-    line = SEEN | {"outcome": "hazard", "t_h1": "18.5", "t_h3": "11.25", "alerts": "fcw;can_error"}
+    line = SEEN | {
+        "outcome": "hazard",
+        "h1": "1",
+        "t_h1": "18.5",
+        "h3": "1",
+        "t_h3": "11.25",
+        "alerts": "fcw;can_error",
+    }
     [row] = read_results(write_table(tmp_path / "results.csv", line))
     assert row.outcome is Outcome.HAZARD
     assert row.hazards == (("H3", 11.25), ("H1", 18.5))

@@ -13,7 +13,7 @@ class World:
         self.lead_speed = case["lead_speed"]
         self.lead_brakes = case["lead_brakes"]
         self.offset = 0.05
-        self.hazards = {"H1": None, "H3": None, "H9": None}
+        self.hazards = {"H1": None, "H3": None, "TOO_FAST": None}
 
     def advance(self, gas, brake, wheel):
         now = self.frame * STEP
@@ -29,7 +29,7 @@ class World:
         for name, happened in (
             ("H1", self.gap <= 0.0),
             ("H3", abs(self.offset) > 1.0),
-            ("H9", self.speed > 34.0),
+            ("TOO_FAST", self.speed > 34.0),
         ):
             if happened and self.hazards[name] is None:
                 self.hazards[name] = now
