@@ -251,9 +251,20 @@ def _run_pytest(begun: Session) -> None:
         *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(begun.workers)),
     ]
     output = _Silent()
-    code = pytest.main(arguments, plugins=[Controller(begun), output])
+    with _without("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
+        code = pytest.main(arguments, plugins=[Controller(begun), output])
     if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not begun.problem:
         begun.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
+
+
+@contextmanager
+def _without(*names: str) -> Iterator[None]:
+    """Without these variables in the environment, also that of the workers."""
+    kept = {name: os.environ.pop(name) for name in names if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(kept)
 
 
 class _Silent:

@@ -206,6 +206,18 @@ def test_a_defect_in_a_worker_is_told(
     assert "ZeroDivisionError: seven" in summary.problem
 
 
+def test_the_users_pytest_is_another_matter(
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the user's environment tells pytest does not reach the campaign, and is there afterwards."""
+    told = {"PYTEST_ADDOPTS": "--no-such-option", "PYTEST_PLUGINS": "no_such_plugin"}
+    for name, value in told.items():
+        monkeypatch.setenv(name, value)
+    summary = campaign_run.run(toy, "small", tmp_path / "run", workers=1, choices=Choices(limit=2))
+    assert (summary.exit_code, summary.problem) == (0, "")
+    assert {name: os.environ[name] for name in told} == told
+
+
 def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
     """A scenario with a folder in its name runs like any other."""
     (toy.library / "scenarios" / "more").mkdir()
