@@ -32,7 +32,6 @@ from mutator.model import Status
 from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
 from mutator.provenance import check_sources, sources
 from mutator.records import Progress, Tail, label, read_records
-from mutator.results import Results
 from mutator.runfolder import RunFolder
 from mutator.worker import terminable
 from mutator.workspace import Workspace
@@ -54,7 +53,7 @@ class Summary:
     harness_errors: tuple[tuple[str, str], ...]
     problem: str  # empty, or why the session ended early (disk full, a worker died)
     interrupted: bool
-    results: Results | None
+    results: Path | None  # results.csv; None when there was no room for it
     elapsed_s: float
 
     @property
@@ -139,7 +138,7 @@ class Session:
         done = len(records) - len(wrong)
         built = None
         try:
-            built = results.up_to_date(self.folder.path) or results.build(self.folder.path)
+            built = results.build(self.folder.path)
         except DiskFull as err:  # the records are there, the table can be made any time
             self.problem = self.problem or str(err)
         return Summary(

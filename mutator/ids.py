@@ -3,7 +3,6 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Iterable
 from enum import Enum
 from typing import Any
 
@@ -35,8 +34,3 @@ def digest(value: Any) -> str:
 def content_id(value: Any) -> str:
     """The first 16 hex digits of `digest`: among 10^6 things a clash has odds of 1 in 37 million."""
     return digest(value)[:16]
-
-
-def tree_digest(files: Iterable[tuple[str, bytes]]) -> str:
-    """Digest of a source tree given as (path relative to its root, content)."""
-    return digest([[path, digest(data)] for path, data in sorted(files)])

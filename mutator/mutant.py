@@ -1,7 +1,5 @@
 """From a fault and a trigger to changed files: built, compiled, diffed, identified."""
 
-import shutil
-from collections.abc import ItemsView
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,7 +13,6 @@ from mutator.manifest import TargetManifest
 from mutator.model import Fault, Hold, Injection, Trigger
 from mutator.paths import check_location
 from mutator.render import render, snippet
-from mutator.sources import read_tree
 from mutator.trigger import check_condition, to_code
 
 _OBSERVE_TAG = "observe"
@@ -177,28 +174,9 @@ def unsplice(data: bytes) -> bytes:
     return splice.unsplice(data.splitlines(keepends=True))
 
 
-def copy_base(manifest: TargetManifest, dest: Path) -> None:
-    """Write the manifest's pristine tree (its listed files only, so no bytecode) to the new folder `dest`."""
-    dest.mkdir(parents=True)
-    _write(manifest.tree.files.items(), dest)
-
-
-def write_tree(mutant: Mutant, base_tree: Path, dest: Path) -> None:
-    """Copy `base_tree` (made by `copy_base`) to the new folder `dest` and put the mutant's files in."""
-    shutil.copytree(base_tree, dest, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
-    _write(mutant.files.items(), dest)
-
-
-def _write(files: ItemsView[str, bytes], dest: Path) -> None:
-    for path, data in files:
+def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
+    """Write the mutated tree (the manifest's files, so no bytecode) below `dest`."""
+    for path, data in {**manifest.tree.files, **mutant.files}.items():
         place = dest / path
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_bytes(data)
-
-
-def digest_folder(manifest: TargetManifest, root: Path) -> str:
-    """Tree digest of a tree on disk, comparable with `Mutant.tree_digest` and `manifest.tree.digest`.
-
-    Counts the manifest's files and the probe.
-    """
-    return read_tree(root, (*manifest.files, manifest.probe_path)).digest

@@ -234,6 +234,6 @@ def _lines(summary: campaign_run.Summary) -> list[str]:
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
-        f"results: {summary.results.csv}" if summary.results else "",
+        f"results: {summary.results}" if summary.results else "",
     ]
     return [line for line in lines if line]

@@ -3,7 +3,6 @@
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,6 @@ from mutator.runfolder import RunFolder
 from mutator.verdict import reaction_time
 
 if TYPE_CHECKING:
-    import pandas as pd
     import pyarrow as pa  # type: ignore[import-untyped]
 
 _EXTRA = ("variant", "aim", "condition", "detail")
@@ -25,17 +23,6 @@ _FLAGS = ("activated", "manifested")
 _COUNTS = ("seed", "activations")
 _TIMES = ("value", "reaction_time")  # and all that begin with t_ or max_dev_
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Results:
-    """The files of a built table, and how many of the planned experiments are in it."""
-
-    csv: Path
-    parquet: Path
-    timings: Path
-    rows: int
-    planned: int
 
 
 def row(experiment: Experiment, record: Record, hazards: Sequence[str] = _HAZARDS) -> dict[str, object]:
@@ -82,8 +69,9 @@ def _time(value: float | None) -> float | None:
     return None if value is None else round(value, _TIME_DIGITS)
 
 
-def build(run: Path) -> Results:
-    """Write results.csv, results.parquet and timings.parquet of a run folder from its plan and records."""
+def build(run: Path) -> Path:
+    """Write results.csv (returned), results.parquet and timings.parquet of a run folder from its plan and
+    records."""
     import pyarrow as pa
 
     folder = RunFolder.open(run)
@@ -97,39 +85,7 @@ def build(run: Path) -> Results:
     schema = pa.schema([(name, pa.int8() if name in flags else _type(name, pa)) for name in columns])
     write_atomic(folder.path / "results.parquet", _parquet(rows, schema))
     write_atomic(folder.path / "timings.parquet", _timings(folder.path))
-    return _results(folder, len(rows))
-
-
-def up_to_date(run: Path) -> Results | None:
-    """The built table, if it is not older than any record; else None."""
-    folder = RunFolder.open(run)
-    derived = [folder.path / name for name in ("results.csv", "results.parquet", "timings.parquet")]
-    if not all(path.is_file() for path in derived):
-        return None
-    sources = [path.stat().st_mtime_ns for path in (folder.path / "records").glob("*.jsonl")]
-    if max(sources, default=0) >= min(path.stat().st_mtime_ns for path in derived):
-        return None
-    with derived[0].open("rb") as file:
-        return _results(folder, sum(1 for _ in file) - 1)
-
-
-def load(run: Path) -> "pd.DataFrame":
-    """The results table of a run folder, built first if it is older than the records."""
-    import pandas as pd
-
-    results = up_to_date(run) or build(run)
-    return pd.read_parquet(results.parquet)
-
-
-def _results(folder: RunFolder, rows: int) -> Results:
-    path = folder.path
-    return Results(
-        csv=path / "results.csv",
-        parquet=path / "results.parquet",
-        timings=path / "timings.parquet",
-        rows=rows,
-        planned=folder.planned,
-    )
+    return folder.path / "results.csv"
 
 
 def _columns(folder: RunFolder) -> list[str]:

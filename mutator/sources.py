@@ -45,7 +45,7 @@ class SourceTree:
 
 
 def _digest(digests: Mapping[str, str]) -> str:
-    """As `ids.tree_digest`, from the files' own digests."""
+    """Digest of a tree from those of its files."""
     return ids.digest([[path, digest] for path, digest in sorted(digests.items())])
 
 

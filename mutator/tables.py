@@ -21,7 +21,6 @@ class Row:
     """One line of results.csv, typed. Times are s of simulation, None: did not happen."""
 
     experiment_id: str
-    fault_id: str
     module: str
     fault_type: str
     variant: str
@@ -167,7 +166,6 @@ def _row(line: dict[str, str]) -> Row:
     hazards = [(name.upper(), float(line[f"t_{name}"])) for name in checked if line[f"t_{name}"]]
     return Row(
         experiment_id=line["experiment_id"],
-        fault_id=line["fault_id"],
         module=line["module"],
         fault_type=line["fault_type"],
         variant=line["variant"],

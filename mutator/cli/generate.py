@@ -2,7 +2,6 @@
 
 import csv
 import fnmatch
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +69,9 @@ def write_mutants(
     else:
         target, pairs = _of_specs(workspace, request)
     index: dict[str, dict[str, str]] = {}
-    with terminal.count(len(pairs), "mutants") as step, _Writer(target, out, request.trees) as writer:
+    (out / "patches").mkdir()
+    writer = _Writer(target=target, out=out, trees=request.trees)
+    with terminal.count(len(pairs), "mutants") as step:
         for fault, trigger in pairs:
             mutant = build(target, models, fault, trigger)
             if mutant.id not in index:
@@ -131,25 +132,13 @@ def _spec_names(workspace: "Workspace", wanted: tuple[str, ...]) -> Iterator[str
         yield from hits
 
 
+@dataclass(frozen=True, kw_only=True)
 class _Writer:
-    """Writes mutants below a folder; trees are copied from one pristine copy, never from the user's tree."""
+    """Writes mutants below a folder."""
 
-    def __init__(self, target: "TargetManifest", out: Path, trees: bool) -> None:
-        self.target, self.out, self.trees = target, out, trees
-
-    def __enter__(self) -> "_Writer":
-        (self.out / "patches").mkdir(parents=True, exist_ok=True)
-        self.scratch = tempfile.TemporaryDirectory(prefix="mutator-generate-")
-        self.base = Path(self.scratch.name) / "base"
-        if self.trees:
-            from mutator.mutant import copy_base
-
-            (self.out / "trees").mkdir(exist_ok=True)
-            copy_base(self.target, self.base)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.scratch.cleanup()
+    target: "TargetManifest"
+    out: Path
+    trees: bool
 
     def write(self, mutant: "Mutant", fault: "Fault", trigger: "Trigger") -> dict[str, str]:
         """Write one mutant; returns its line of the index."""
@@ -159,7 +148,7 @@ class _Writer:
         (self.out / patch).write_bytes(mutant.patch_bytes)
         tree = Path("trees") / mutant.id
         if self.trees:
-            write_tree(mutant, self.base, self.out / tree)
+            write_tree(self.target, mutant, self.out / tree)
         cells = (
             mutant.id,
             fault.id,

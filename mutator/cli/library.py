@@ -1,4 +1,4 @@
-"""`list` and `check`: what the library holds, and whether all of it can be used."""
+"""`list`, `check`, `doctor`: what the library holds, whether it can be used, and whether this machine can."""
 
 from collections.abc import Callable
 from enum import StrEnum
@@ -9,7 +9,7 @@ import typer
 from mutator.cli.choose import context_tables, target_name
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
-from mutator.errors import EXIT_CHECK_FAILED
+from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -33,6 +33,7 @@ def register(app: typer.Typer) -> None:
     """Add the verbs to the command line."""
     app.command("list", epilog=LIST_EXAMPLES)(list_library)
     app.command("check", epilog=CHECK_EXAMPLES)(check)
+    app.command("doctor")(doctor)
 
 
 LIST_EXAMPLES = """\b
@@ -159,3 +160,29 @@ def check(
 def _line(text: str) -> str:
     """The first sentence's worth of a description, on one line."""
     return " ".join(text.split())
+
+
+@with_place
+def doctor(as_json: Json = False, *, place: Place) -> None:
+    """Can this machine run campaigns?
+
+    Looks at interpreter, packages, machine, library and target; exit code 1 if a campaign could not run.
+    """
+    from mutator.doctor import Level, examine
+
+    terminal = Terminal(as_json)
+    with terminal.wait("looking around"):
+        try:
+            findings = examine(place.workspace())
+        except MutatorError as e:
+            findings = examine(e)
+    if as_json:
+        terminal.emit(findings)
+    terminal.table(
+        ["what", "state", "found", "to do"], [(f.name, f.level.value, f.found, f.remedy) for f in findings]
+    )
+    bad = [f.name for f in findings if f.level is Level.FAIL]
+    if bad:
+        terminal.say(f"not ready: {', '.join(bad)}", style="bold red")
+        raise typer.Exit(EXIT_CHECK_FAILED)
+    terminal.say("ready", style="green")

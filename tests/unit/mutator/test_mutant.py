@@ -14,6 +14,7 @@ from mutator.errors import MutatorError
 from mutator.expand import expand
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
 from mutator.mutant import InvalidMutant
+from mutator.sources import read_tree
 from mutator.trigger import always, at_time
 from mutator.workspace import Workspace
 
@@ -83,13 +84,13 @@ def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
-    mutant.copy_base(manifest, tmp_path / "base")
-    assert mutant.digest_folder(manifest, tmp_path / "base") == before
-    mutant.write_tree(made, tmp_path / "base", tmp_path / "tree")
-    assert mutant.digest_folder(manifest, tmp_path / "tree") == made.tree_digest != before
+    files = (*manifest.files, manifest.probe_path)
+    mutant.write_tree(manifest, made, tmp_path / "tree")
+    assert read_tree(tmp_path / "tree", files).digest == made.tree_digest != before
     if shutil.which("patch"):
-        subprocess.run(["patch", "-p1", "-s"], cwd=tmp_path / "base", input=made.patch_bytes, check=True)
-        assert mutant.digest_folder(manifest, tmp_path / "base") == made.tree_digest
+        shutil.copytree(manifest.root, tmp_path / "copy")
+        subprocess.run(["patch", "-p1", "-s"], cwd=tmp_path / "copy", input=made.patch_bytes, check=True)
+        assert read_tree(tmp_path / "copy", files).digest == made.tree_digest
     assert toy.manifest("toy").tree.digest == before
 
 
@@ -119,8 +120,7 @@ def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
 
 def run(toy: Workspace, made: mutant.Mutant, place: Path, steps: int = 100) -> dict[str, object]:
     """Drive the mutated toy; its positions and the probe's report."""
-    mutant.copy_base(toy.manifest("toy"), place / "base")
-    mutant.write_tree(made, place / "base", place / "tree")
+    mutant.write_tree(toy.manifest("toy"), made, place / "tree")
     program = (
         "import json; from toycar.world import World; from toycar import _fi; w = World(); gaps = []\n"
         f"for _ in range({steps}): w.step(); gaps.append(w.gap)\n"
