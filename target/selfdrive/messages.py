@@ -9,6 +9,10 @@ to create, and thousands are created in every run.
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
+VIEW_LENGTH = 50  # points of a line ahead, a metre apart
+
 
 class CanFrame(NamedTuple):
     """One CAN frame. Bus 0 is the car (and takes the commands), bus 1 the radar."""
@@ -81,22 +85,31 @@ class RadarData:
 
 
 class CameraView(NamedTuple):
-    """What the camera sees at one moment, as geometry in the car's frame (m, left positive)."""
+    """What the camera sees at one moment, as geometry in the car's frame (m, left positive).
+
+    `picture` is what a detector is to work on, 8 bit grey, rows x columns; None where the run has no
+    pictures. Detectors that have it use nothing else of the view.
+    """
 
     left_lane_y: float  # at the car
     right_lane_y: float  # at the car
     path_y: float  # middle of the lane, at the car
     bend: tuple[float, ...]  # how far the lines have moved sideways at 0, 1, ... 49 m ahead
     lead_d_rel: float  # from the front bumper
+    picture: np.ndarray | None = None
 
 
 @dataclass(slots=True)
 class PathData:
-    """A line ahead of the car: lateral positions (m, left positive) at 0, 1, ... 49 m."""
+    """A line ahead of the car: lateral positions (m, left positive) at 0, 1, ... 49 m.
+
+    Where it was not seen `valid` is False, `prob` 0, and the points are where it is expected.
+    """
 
     points: tuple[float, ...]
     prob: float
     std: float  # m
+    valid: bool = True
 
 
 @dataclass(slots=True)

@@ -2,12 +2,11 @@
 
 from math import tan
 
-from selfdrive.messages import CameraView
+from selfdrive.messages import VIEW_LENGTH, CameraView
 from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 
 LANE_WIDTH = 3.7  # m
-VIEW_LENGTH = 50  # points, a metre apart
 
 _STRAIGHT = (0.0,) * VIEW_LENGTH
 _AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))

@@ -19,6 +19,7 @@ import numpy as np
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
+from selfdrive.sim.vision import DEFAULT_CACHE, DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
 
 EXIT_INPUT = 2
 
@@ -34,17 +35,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             scenario = on_plant(scenario, options.plant)
         if options.max_steps is not None:
             scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
-        write(simulate(scenario, options.seed), options.out)
+        write(simulate(scenario, options.seed, _pictures(options)), options.out)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_INPUT
     return 0
 
 
-def simulate(scenario: Scenario, seed: int) -> SimulationResult:
+def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) -> SimulationResult:
     """Run a scenario to its end."""
     simulator = Simulator()
-    simulator.reset(scenario, seed)
+    simulator.reset(scenario, seed, pictures)
     while not simulator.done:
         simulator.step()
     return simulator.result()
@@ -81,8 +82,28 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers")
     parser.add_argument("--no-lead", action="store_true", help="run without the lead vehicle")
     parser.add_argument("--plant", choices=PLANTS, help="plant to drive on, instead of the scenario's")
+    parser.add_argument("--pictures", action="store_true", help="see the road in pictures, not ideally")
+    parser.add_argument("--detector", choices=DETECTORS, default=PAPER, help="lane detector for pictures")
+    parser.add_argument("--marks", choices=MARKS, default=SOLID, help="the rendered road's right line")
+    parser.add_argument("--frames", type=Path, metavar="DIR", help="pictures of your own, not rendered ones")
+    parser.add_argument(
+        "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
+    )
+    parser.add_argument("--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="rendered pictures")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
+
+
+def _pictures(options: argparse.Namespace) -> Pictures | None:
+    if not options.pictures:
+        return None
+    return Pictures(
+        detector=options.detector,
+        marks=options.marks,
+        frames=options.frames,
+        translation=options.translation,
+        cache=options.cache,
+    )
 
 
 def _positive(text: str) -> int:

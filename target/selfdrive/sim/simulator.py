@@ -9,7 +9,6 @@ from selfdrive.car.honda.radar_interface import RadarInterface
 from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, CanFrame
 from selfdrive.sim.actuators import ActuatorReceiver
-from selfdrive.sim.camera import Camera
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.plant import Plant
@@ -20,6 +19,7 @@ from selfdrive.sim.road import Road
 from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
+from selfdrive.sim.vision import Pictures, build_vision
 from selfdrive.visiond.visiond import Visiond
 
 RECORD_SCHEMA = "sim-record/1"
@@ -40,22 +40,26 @@ class SimulationResult:
 class Simulator:
     """Runs one scenario at a time; `reset` starts the next one, with nothing left of the last."""
 
-    def reset(self, scenario: Scenario, seed: int = 0) -> None:
-        """Build car, controller and recorder anew. Nothing is random yet; `seed` is recorded."""
+    def reset(self, scenario: Scenario, seed: int = 0, pictures: Pictures | None = None) -> None:
+        """Build car, controller and recorder anew. `seed` is that of the pictures, if there are any.
+
+        Raises ConfigError where the pictures cannot be had or do not fit the scenario's road.
+        """
         self.frame = 0
         self._scenario, self._seed = scenario, seed
         lead = scenario.lead
         self._road = Road(scenario.grade, scenario.curvature)
         self._lead = LeadVehicle(lead.gap, lead.times, lead.speeds) if lead else None
         self._radar = RadarSensor(self._road)
-        self._camera = Camera(self._road)
+        self._vision = build_vision(pictures, self._road, seed)
+        self._camera = self._vision.camera
         self._receiver = ActuatorReceiver()
         self._actuators = Actuators()
         car = CarInterface()
         make_plant = PLANTS[scenario.plant]
         self._plant = make_plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
         self._sensors = CarSensors(self._plant.gearbox_scale)
-        self.manager = Manager(car, RadarInterface(), Visiond())
+        self.manager = Manager(car, RadarInterface(), Visiond(self._vision.detector))
         self.hazards = HazardMonitor()
         self.recorder = Recorder()
 
@@ -96,6 +100,7 @@ class Simulator:
             "seed": self._seed,
             "no_lead": self._scenario.lead is None,
             "plant": self._scenario.plant,
+            "pictures": self._vision.description,
             "steps": self.frame,
             "engaged_from": recorder.engaged_from,
             "engaged_to": recorder.engaged_to,

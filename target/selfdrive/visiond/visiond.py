@@ -1,31 +1,34 @@
 """visiond: from the camera's view to the road model, 20 times a second."""
 
 from selfdrive.messages import CameraView, LeadVision, ModelData, PathData
+from selfdrive.visiond.detector import LaneDetector, RoadLine, points
 
 LINE_STD = 1.0  # m
 LEAD_STD = 0.1  # m
 
 
 class Visiond:
-    """Ideal vision: the geometry in view, with full confidence.
+    """Has a detector find the lane in each view, and publishes what it found.
 
     `latest` is the newest published ModelData, None before the first; its `t` tells its age.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, detector: LaneDetector) -> None:
+        self._detector = detector
         self.latest: ModelData | None = None
 
     def update(self, view: CameraView, t: float) -> None:
         """Form a road model of the view taken at time `t` (s) and publish it."""
-        left_lane_y = view.left_lane_y
-        right_lane_y = view.right_lane_y
-        path_y = view.path_y
+        lines = self._detector.detect(view)
+        left_lane_y = lines.left.y
+        right_lane_y = lines.right.y
+        path_y = lines.path.y
         lead_d_rel = view.lead_d_rel
         model = ModelData(
             t=t,
-            path=_line(path_y, view.bend),
-            left_lane=_line(left_lane_y, view.bend),
-            right_lane=_line(right_lane_y, view.bend),
+            path=_line(path_y, lines.path),
+            left_lane=_line(left_lane_y, lines.left),
+            right_lane=_line(right_lane_y, lines.right),
             lead=LeadVision(d_rel=lead_d_rel, prob=1.0, std=LEAD_STD),
         )
         self.publish(model)
@@ -35,6 +38,6 @@ class Visiond:
         self.latest = model
 
 
-def _line(y: float, bend: tuple[float, ...]) -> PathData:
-    """A line that passes the car at `y` (m, left positive) and bends with the road."""
-    return PathData(points=tuple([y + b for b in bend]), prob=1.0, std=LINE_STD)
+def _line(y: float, line: RoadLine) -> PathData:
+    """The message of a line that passes the car at `y` (m, left positive)."""
+    return PathData(points=points(y, line), valid=line.prob > 0.0, prob=line.prob, std=LINE_STD)

@@ -4,6 +4,7 @@ import pytest
 from selfdrive.sim.camera import Camera
 from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.road import Road
+from selfdrive.visiond.detector import IdealDetector
 from selfdrive.visiond.visiond import Visiond
 
 STRAIGHT = Road(None, None)
@@ -58,7 +59,7 @@ def test_heading_and_bend_in_view(truth):
 
 def test_ideal_vision_passes_geometry_on(truth):
     """The model holds the view's lines shifted by where they pass the car, and the lead's distance."""
-    visiond = Visiond()
+    visiond = Visiond(IdealDetector())
     assert visiond.latest is None
     visiond.update(Camera(BEND).look(truth(lateral_offset=0.5, d_rel=33.0)), 7.0)
     model = visiond.latest

@@ -1,0 +1,81 @@
+"""The camera's geometry: a pinhole over a flat road, from which all metres of the picture follow.
+
+Car frame: x forward from the camera, y to the left, both in m on the road. Picture: column u to the right,
+row v down, in pixels. The camera looks along x and is pitched down; it has no roll and no lens distortion.
+"""
+
+from dataclasses import dataclass
+from math import atan, cos, sin, tan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraModel:
+    """A calibrated camera. Focal lengths and principal point in pixels, `height` in m, `pitch` in rad (down).
+
+    The defaults are the published calibration of the Caltech lanes set (M. Aly, 2008), at 640 x 480.
+    """
+
+    width: int = 640
+    rows: int = 480
+    fx: float = 309.4
+    fy: float = 344.2
+    cx: float = 317.9
+    cy: float = 256.5
+    height: float = 2.18
+    pitch: float = 0.24434609527920614  # 14 degrees
+
+    @property
+    def horizon(self) -> float:
+        """Row at which a flat road ends."""
+        return self.cy - self.fy * tan(self.pitch)
+
+    def depth(self, row: float) -> float:
+        """Distance (m) along the optical axis of the road seen in `row`, which must be below the horizon."""
+        return self.height / (self._fall(row))
+
+    def distance(self, row: float) -> float:
+        """x (m) of the road seen in `row`, which must be below the horizon."""
+        return (self.depth(row) - self.height * sin(self.pitch)) / cos(self.pitch)
+
+    def row(self, x: float) -> float:
+        """Row in which the road at `x` m ahead is seen."""
+        depth = x * cos(self.pitch) + self.height * sin(self.pitch)
+        return self.horizon + self.fy * self.height / (depth * cos(self.pitch))
+
+    def metres_per_pixel(self, row: float) -> float:
+        """Width on the road (m) of a pixel in `row`, which must be below the horizon."""
+        return self.depth(row) / self.fx
+
+    def spread(self, width: float = 3.7) -> float:
+        """How many pixels further apart two lines of the road `width` m apart are in each row down."""
+        return self.fx * width * cos(self.pitch) / (self.fy * self.height)
+
+    def column(self, x: float, y: float) -> float:
+        """Column in which the point (x, y) of the road is seen."""
+        return self.cx - self.fx * y / (x * cos(self.pitch) + self.height * sin(self.pitch))
+
+    def line_in_picture(self, y: float, slope: float) -> tuple[float, float]:
+        """(a, b) with u = a * v + b for the road's line y + slope * x; the inverse of `line_on_road`."""
+        a = -self.fx * (y - slope * self.height * tan(self.pitch)) * cos(self.pitch) / (self.fy * self.height)
+        return a, self.cx - self.fx * slope / cos(self.pitch) - a * self.horizon
+
+    def line_on_road(self, a: float, b: float) -> tuple[float, float]:
+        """(y, slope) of the road's line that is seen as u = a * v + b: at x = 0 in m, and in m a metre."""
+        slope = (self.cx - a * self.horizon - b) * cos(self.pitch) / self.fx
+        y = -a * self.fy * self.height / (self.fx * cos(self.pitch)) + slope * self.height * tan(self.pitch)
+        return y, slope
+
+    @classmethod
+    def from_view(
+        cls, *, width: int, rows: int, horizon: float, focal: float, height: float
+    ) -> "CameraModel":
+        """The camera with square pixels, looking from the picture's middle, whose horizon is at that row."""
+        pitch = atan((0.5 * (rows - 1) - horizon) / focal)
+        middle = 0.5 * (width - 1), 0.5 * (rows - 1)
+        return cls(
+            width=width, rows=rows, fx=focal, fy=focal, cx=middle[0], cy=middle[1], height=height, pitch=pitch
+        )
+
+    def _fall(self, row: float) -> float:
+        """How far the ray through `row` falls for each metre along the optical axis."""
+        return (row - self.horizon) * cos(self.pitch) / self.fy

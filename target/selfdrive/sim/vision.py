@@ -1,0 +1,80 @@
+"""How the controller sees in a run: ideal geometry, or pictures and a detector that works on them.
+
+Libraries for pictures take long to load, so what needs them is imported only in runs with pictures.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from selfdrive.messages import CameraView
+from selfdrive.sim.camera import Camera
+from selfdrive.sim.road import Road
+from selfdrive.sim.truth import GroundTruth
+from selfdrive.visiond.detector import IdealDetector, LaneDetector
+
+DETECTORS = PAPER, ROBUST = "paper", "robust"
+MARKS = SOLID, DASHED = "solid", "dashed"
+TRANSLATIONS = GROUND, SHIFT = "ground", "shift"
+DEFAULT_CACHE = Path("~/.cache/selfdrive")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pictures:
+    """The pictures of a run and who looks at them.
+
+    `frames` is a folder of a user's own frames; None: a rendered road with these `marks` (left and right
+    both solid, or the right one dashed), kept in `cache`. `translation` is how a frame is moved to the
+    car's offset and heading: by the ground's homography, or shifted as a whole, as in the paper.
+    """
+
+    detector: str = PAPER
+    marks: str = SOLID
+    frames: Path | None = None
+    translation: str = GROUND
+    cache: Path = DEFAULT_CACHE
+
+
+class RoadCamera(Protocol):
+    """A camera of the simulator."""
+
+    def look(self, truth: GroundTruth) -> CameraView:
+        """The view at this moment."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vision:
+    """Camera and detector of one run; `description` goes into its record."""
+
+    camera: RoadCamera
+    detector: LaneDetector
+    description: dict | None
+
+
+def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
+    """Camera and detector for a run on `road`. Raises ConfigError for frames that cannot be used."""
+    if pictures is None:
+        return Vision(camera=Camera(road), detector=IdealDetector(), description=None)
+    from selfdrive.sim.image_library import open_library
+    from selfdrive.sim.picture_camera import PictureCamera
+
+    library = open_library(pictures, seed)
+    camera = PictureCamera(Camera(road), library, pictures.translation)
+    description = {
+        "detector": pictures.detector,
+        "frames": library.name,
+        "frames_digest": library.digest,
+        "translation": pictures.translation,
+    }
+    return Vision(camera=camera, detector=_detector(pictures.detector, library), description=description)
+
+
+def _detector(name: str, library) -> LaneDetector:
+    if name == PAPER:
+        from selfdrive.visiond.paper_detector import PaperDetector
+
+        return PaperDetector(library.model)
+    from selfdrive.visiond.robust_detector import RobustDetector
+
+    return RobustDetector(library.model)

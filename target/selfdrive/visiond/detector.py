@@ -1,0 +1,75 @@
+"""What a lane detector is, and the ideal one."""
+
+from typing import NamedTuple, Protocol
+
+from selfdrive.messages import VIEW_LENGTH, CameraView
+
+LANE_WIDTH = 3.7  # m
+
+
+class RoadLine(NamedTuple):
+    """A line ahead of the car: `y` (m, left positive) at the car, then y + slope * x + bend[x].
+
+    `prob` is 0 where the line was not seen; `y` and `slope` are then where it is expected.
+    """
+
+    y: float
+    slope: float = 0.0
+    prob: float = 1.0
+    bend: tuple[float, ...] | None = None  # m at 0, 1, ... 49 m; None: straight
+
+
+class LaneLines(NamedTuple):
+    """What a detector makes of one picture: the ego lane's two lines and the path between them."""
+
+    left: RoadLine
+    right: RoadLine
+    path: RoadLine
+
+
+class LaneDetector(Protocol):
+    """Finds the lane's lines in the camera's view, 20 times a second."""
+
+    def detect(self, view: CameraView) -> LaneLines:
+        """The lines in this view. A detector may remember earlier views of the same run, nothing else."""
+        ...
+
+
+class IdealDetector:
+    """Knows the view's geometry, and is sure of it: for runs without pictures."""
+
+    def detect(self, view: CameraView) -> LaneLines:
+        """The lines where they are."""
+        return LaneLines(
+            left=RoadLine(y=view.left_lane_y, bend=view.bend),
+            right=RoadLine(y=view.right_lane_y, bend=view.bend),
+            path=RoadLine(y=view.path_y, bend=view.bend),
+        )
+
+
+def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
+    """The lane's middle: between two lines, or half a `width` (m) beside the one that is seen.
+
+    Where none is seen the path goes straight on along the car.
+    """
+    seen = [line for line in (left, right) if line.prob > 0.0]
+    if len(seen) == 2:
+        return RoadLine(
+            y=0.5 * (left.y + right.y),
+            slope=0.5 * (left.slope + right.slope),
+            prob=left.prob * right.prob,
+        )
+    if not seen:
+        return RoadLine(y=0.0, prob=0.0)
+    (line,) = seen
+    return RoadLine(
+        y=line.y + (0.5 if line is right else -0.5) * width, slope=line.slope, prob=0.5 * line.prob
+    )
+
+
+def points(y: float, line: RoadLine) -> tuple[float, ...]:
+    """A message's 50 points (m, a metre apart) of `line`, passing the car at `y`."""
+    if line.bend is not None:
+        return tuple([y + bend for bend in line.bend])
+    slope = line.slope
+    return tuple([y + slope * x for x in range(VIEW_LENGTH)])
