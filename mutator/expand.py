@@ -7,6 +7,7 @@ from mutator import units
 from mutator.draws import generator
 from mutator.errors import MutatorError
 from mutator.fault_models import FaultModels
+from mutator.imports import check_import
 from mutator.injections import InjectionSpec
 from mutator.manifest import TargetManifest
 from mutator.model import Fault, Injection
@@ -129,9 +130,14 @@ class _Expander:
     def _check_injection(self, injection: InjectionSpec) -> None:
         keys: Keys = (*injection.keys, "model")
         try:
-            self.models.get(injection.model)
+            model = self.models.get(injection.model)
             keys = (*injection.keys, "at", "file")
             check_location(self.manifest, injection.location)
+            for param in injection.params:
+                schema = model.param(param.name)
+                if schema and schema.type == "import":
+                    keys = param.keys
+                    check_import(self.manifest, str(param.value))
         except MutatorError as error:
             raise self.spec.source.error(
                 keys, error.got, expected=error.expected, remedy=error.remedy

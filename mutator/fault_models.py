@@ -17,6 +17,9 @@ from mutator.yamlio import Source, StrictModel, read
 SCHEMA = "fault_model/1"
 PROBE_TEMPLATE = "_fi.py.j2"
 TARGET_UNIT = "target"
+# `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
+ParamType = Literal["variable", "import", "number", "integer", "boolean", "seed"]
+NAMES = ("variable", "import")
 
 
 class SnippetKind(StrEnum):
@@ -35,7 +38,7 @@ class ParamSchema:
     """
 
     name: str
-    type: Literal["variable", "number", "integer", "boolean", "seed"]
+    type: ParamType
     about: str
     unit: str | None = None
     optional: bool = False
@@ -96,7 +99,7 @@ class FaultModels:
 
 
 class _ParamModel(StrictModel):
-    type: Literal["variable", "number", "integer", "boolean", "seed"]
+    type: ParamType
     about: str
     unit: str | None = None
     optional: bool = False

@@ -3,7 +3,7 @@
 from mutator import units
 from mutator.draws import generator
 from mutator.errors import MutatorError
-from mutator.fault_models import TARGET_UNIT, FaultModel, ParamSchema
+from mutator.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
 from mutator.injections import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
 from mutator.locations import dotted_name
 from mutator.model import AnchorKind, Injection, Value
@@ -11,6 +11,7 @@ from mutator.shape_errors import shown, suggestion
 from mutator.spec import Draw
 from mutator.yamlio import Source
 
+_NAMED = {"variable": "a name as in the source", "import": "a module of the target and a name in it"}
 _WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
@@ -111,9 +112,9 @@ class _Resolver:
 
     def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """The parameter's value in the template's unit, of the right type and in range."""
-        if schema.type == "variable":
+        if schema.type in NAMES:
             if not isinstance(param.value, str) or not dotted_name(param.value):
-                raise self._wrong(param, "a name as in the source")
+                raise self._wrong(param, _NAMED[schema.type])
             return param.value
         if schema.type == "boolean":
             if not isinstance(param.value, bool):

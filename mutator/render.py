@@ -19,7 +19,7 @@ from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from mutator.errors import MutatorError
-from mutator.fault_models import FaultModel, SnippetKind
+from mutator.fault_models import NAMES, FaultModel, SnippetKind
 from mutator.locations import dotted_name
 from mutator.model import Value
 
@@ -74,7 +74,7 @@ def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[st
     for param in model.params:
         value = names[param.name]
         is_name = isinstance(value, str) and dotted_name(value)
-        if is_name != (param.type == "variable") or (isinstance(value, str) and not is_name):
+        if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
             raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
     text = render(model.template, {"fi": fi, **names}, model.template_path)
     lines = tuple(text.removesuffix("\n").split("\n"))

@@ -26,6 +26,9 @@ UNITS = {
         Unit(suffix="deg", symbol="deg", dimension="angle", factor=math.pi / 180),
         Unit(suffix="s", symbol="s", dimension="time", factor=1.0),
         Unit(suffix="ms", symbol="ms", dimension="time", factor=0.001),
+        Unit(suffix="mmph", symbol="mm/h", dimension="precipitation", factor=1.0),
+        Unit(suffix="lx", symbol="lx", dimension="illuminance", factor=1.0),
+        Unit(suffix="px", symbol="px", dimension="picture", factor=1.0),
     )
 }
 KNOWN = ", ".join(UNITS)

@@ -10,7 +10,18 @@ from mutator.fault_models import SnippetKind, load_fault_models
 from mutator.library_check import check_examples, run_example
 from mutator.workspace import Workspace
 
-NAMES = ["bit_flip", "delay", "drift", "ghost_object", "noise", "offset", "omission", "scale", "stuck"]
+NAMES = [
+    "bit_flip",
+    "delay",
+    "drift",
+    "ghost_object",
+    "image_effect",
+    "noise",
+    "offset",
+    "omission",
+    "scale",
+    "stuck",
+]
 
 
 @pytest.fixture

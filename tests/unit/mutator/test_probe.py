@@ -142,6 +142,19 @@ def test_delay(clone: Workspace) -> None:
     assert seen == [2, 2, 2, 3, 4, 5]
 
 
+def test_kept_for_a_whole_run(clone: Workspace) -> None:
+    """What an injection keeps outlives its stretches of activity, is its own, and ends with the run."""
+    fi = probe(clone)
+    made = iter(range(10))
+    seen = []
+    for run in range(2):
+        for i, mark in enumerate("x.x"):
+            fi.observe(t=i * 0.1, d_rel=40.0, v_ego=20.0, v_lead=15.0 if mark == "x" else 20.0)
+            if fi.active("a"):
+                seen.append((run, fi.kept("a", lambda: next(made)), fi.kept("b", lambda: next(made))))
+    assert seen == [(0, 0, 1), (0, 0, 1), (1, 2, 3), (1, 2, 3)]
+
+
 def test_noise_repeats_with_every_run(clone: Workspace) -> None:
     """Noise depends on its seed alone, differs between seeds, and leaves the shared generator alone."""
     fi = probe(clone, condition="True")

@@ -1,5 +1,6 @@
 """Rendering: values become literals, names are checked, templates cannot reach out."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,16 @@ def test_names_are_checked(name: Value) -> None:
     """Only chains of identifiers get in where a variable is meant."""
     with pytest.raises(MutatorError):
         rendered("{{ target }} = 1\n", target=name)
+
+
+@pytest.mark.parametrize("name", ["os;x", "a.b c", "a..b", ".a", "a.import", 1, None])
+def test_imported_names_are_checked(name: Value) -> None:
+    """What is to be imported is a chain of identifiers too."""
+    imports = ParamSchema(name="what", type="import", about="")
+    made = replace(model("from {{ what }} import x\n"), params=(imports,))
+    assert snippet(made, {"what": "a.b"}, "ab12") == ("from a.b import x",)
+    with pytest.raises(MutatorError):
+        snippet(made, {"what": name}, "ab12")
 
 
 def test_text_is_no_number() -> None:

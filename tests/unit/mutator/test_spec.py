@@ -152,13 +152,14 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "          unit: m\n",
             "",
             "14: model offset without `unit`; expected the changed variable's unit, one of m, mps, kph, mph, "
-            "mps2, rad, deg, s, ms, or '1'; add `unit: m` (or what it is in the source) beside `model`",
+            "mps2, rad, deg, s, ms, mmph, lx, px, or '1'; add `unit: m` (or what it is in the source) beside "
+            "`model`",
         ),
         (
             "          unit: m\n",
             "          unit: feet\n",
-            "16: unit 'feet'; expected one of m, mps, kph, mph, mps2, rad, deg, s, ms, or '1' for a "
-            "plain number; give the unit that the variable has in the source",
+            "16: unit 'feet'; expected one of m, mps, kph, mph, mps2, rad, deg, s, ms, mmph, lx, px, or "
+            "'1' for a plain number; give the unit that the variable has in the source",
         ),
         (
             "by_kph: -error",
@@ -174,7 +175,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "model: offset",
             "model: ofset",
-            "unknown fault model 'ofset'; expected one of bit_flip, delay, drift, ghost_object, noise",
+            "unknown fault model 'ofset'; expected one of bit_flip, delay, drift, ghost_object, image",
         ),
         ("aim: H1", "aim: H9", "7: aim 'H9'; expected one of H1, as in toy.yaml; correct it"),
         (
