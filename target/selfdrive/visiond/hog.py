@@ -1,0 +1,85 @@
+"""Histograms of oriented gradients (N. Dalal and B. Triggs, 2005), for a whole picture at once.
+
+Cells of 4 x 4 pixels, nine unsigned orientations, blocks of 2 x 2 cells, L2 normalised; each pixel votes
+with its gradient's length for the one orientation it falls into. Detection windows of 32 x 32 pixels share
+their cells and blocks, so these are computed once.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+CELL = 4  # pixels
+BINS = 9
+WINDOW = 32  # pixels
+STRIDE = 16  # pixels from window to window
+WINDOW_BLOCKS = WINDOW // CELL - 1  # blocks of 2 x 2 cells in a window, each way
+BLOCK_FEATURES = 4 * BINS
+FEATURES = WINDOW_BLOCKS * WINDOW_BLOCKS * BLOCK_FEATURES
+
+_TINY = 1e-10  # keeps the norm of an empty block from zero
+_STEPS = 511  # differences of two grey levels: -255 .. 255
+_CODE = np.array(
+    [[0, -_STEPS, 0], [-1, 0, 1], [0, _STEPS, 0]], np.float32
+)  # all sums exact in single precision
+
+
+@dataclass(frozen=True, slots=True)
+class _Tables:
+    """Orientation and length of every possible gradient, at (dy + 255) * 511 + dx + 255."""
+
+    orientation: np.ndarray  # intp
+    length: np.ndarray  # divided by the pixels of a cell, so that a cell's sum is its mean
+
+
+def _tables() -> _Tables:
+    step = np.arange(_STEPS) - (_STEPS // 2)
+    dx, dy = step[np.newaxis, :], step[:, np.newaxis]
+    turned = np.degrees(np.arctan2(dy, dx)) % 180.0
+    orientation = np.minimum(turned * BINS / 180.0, BINS - 1).astype(np.intp)
+    return _Tables(orientation.ravel(), (np.hypot(dx, dy) / CELL**2).ravel())
+
+
+class Hog:
+    """Computes the blocks of pictures of one size, whose sides are multiples of a cell's."""
+
+    def __init__(self, rows: int, width: int) -> None:
+        self._cells = rows // CELL, width // CELL
+        row, column = np.ogrid[:rows, :width]
+        cell = (row // CELL) * self._cells[1] + column // CELL
+        self._first_bin = np.ascontiguousarray(cell * BINS).ravel()
+        self._tables = _tables()
+
+    def blocks(self, picture: np.ndarray) -> np.ndarray:
+        """Normalised blocks (rows, columns, 36), float32, of a uint8 picture; no gradient leads across its border."""
+        code = _gradient_codes(picture).ravel()
+        bins = self._tables.orientation.take(code)
+        bins += self._first_bin
+        votes = np.bincount(bins, self._tables.length.take(code), self._cells[0] * self._cells[1] * BINS)
+        cells = votes.astype(np.float32).reshape(*self._cells, BINS)
+        power = np.einsum("ijk,ijk->ij", cells, cells)
+        power = power[:-1] + power[1:]
+        scale = 1.0 / np.sqrt(power[:, :-1] + power[:, 1:] + np.float32(_TINY))
+        down, right, one = cells.strides
+        pairs = np.lib.stride_tricks.as_strided(cells, (*scale.shape, 2, 2 * BINS), (down, right, down, one))
+        return (pairs * scale[:, :, np.newaxis, np.newaxis]).reshape(*scale.shape, BLOCK_FEATURES)
+
+
+def windows(blocks: np.ndarray) -> np.ndarray:
+    """View (rows, columns, 7, 252) of the windows in `blocks`: a window's seven rows of seven blocks each."""
+    step = STRIDE // CELL
+    rows, columns = ((size - WINDOW_BLOCKS) // step + 1 for size in blocks.shape[:2])
+    down, right, one = blocks.strides
+    return np.lib.stride_tricks.as_strided(
+        blocks,
+        (rows, columns, WINDOW_BLOCKS, WINDOW_BLOCKS * BLOCK_FEATURES),
+        (step * down, step * right, down, one),
+        writeable=False,
+    )
+
+
+def _gradient_codes(picture: np.ndarray) -> np.ndarray:
+    """Index of each pixel's gradient (central differences, 0 across the border) in the tables."""
+    code = cv2.filter2D(picture, cv2.CV_32F, _CODE, delta=_STEPS**2 // 2, borderType=cv2.BORDER_REFLECT_101)
+    return code.astype(np.intp)

@@ -1,0 +1,60 @@
+"""The exact DBSCAN on masks against scikit-learn's."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from selfdrive.visiond.dbscan import NOISE, dbscan
+from sklearn.cluster import DBSCAN
+
+
+def expected(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
+    """What scikit-learn makes of the mask's pixels."""
+    points = np.argwhere(mask)
+    if not len(points):
+        return []
+    return DBSCAN(eps=eps, min_samples=min_samples, metric="chebyshev").fit_predict(points).tolist()
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    rows=st.integers(1, 60),
+    width=st.integers(1, 60),
+    share=st.floats(0.0, 0.6),
+    eps=st.integers(1, 6),
+    need=st.floats(0.0, 1.5),
+)
+def test_random_masks_get_the_labels_of_scikit_learn(seed, rows, width, share, eps, need):
+    """Label for label, for sparse and dense masks and few and many samples needed."""
+    mask = (np.random.default_rng(seed).random((rows, width)) < share).astype(np.uint8)
+    min_samples = 1 + int(need * share * (2 * eps + 1) ** 2)
+    assert dbscan(mask, eps, min_samples).tolist() == expected(mask, eps, min_samples)
+
+
+@pytest.mark.parametrize(("eps", "min_samples"), [(1, 2), (3, 6), (4, 10), (6, 30)])
+def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
+    """Label for label on what edges look like: many thin crossing and broken lines."""
+    rng = np.random.default_rng(eps)
+    mask = np.zeros((128, 320), np.uint8)
+    for _ in range(25):
+        ends = rng.integers(0, (320, 128), (2, 2)).tolist()
+        cv2.line(mask, ends[0], ends[1], 1)
+    mask &= (rng.random(mask.shape) < 0.8).astype(np.uint8)
+    assert dbscan(mask, eps, min_samples).tolist() == expected(mask, eps, min_samples)
+
+
+def test_a_pixel_between_two_clusters_belongs_to_the_first():
+    """A border pixel within reach of two clusters is the lower numbered one's, and no bridge between them."""
+    mask = np.array([[1, 1, 1, 0, 0, 0, 1, 1, 1]] * 3, np.uint8)
+    mask[1, 4] = 1
+    assert dbscan(mask, 2, 8).tolist() == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]
+
+
+def test_nothing_makes_no_cluster_and_a_lone_pixel_is_noise():
+    """An empty mask gives no labels, a lone pixel the label of noise."""
+    mask = np.zeros((5, 5), np.uint8)
+    assert dbscan(mask, 2, 3).size == 0
+    mask[2, 2] = 1
+    assert dbscan(mask, 2, 3).tolist() == [NOISE]

@@ -1,0 +1,49 @@
+"""The table-driven histograms of oriented gradients against scikit-image's."""
+
+import numpy as np
+import pytest
+from selfdrive.visiond.hog import BINS, CELL, FEATURES, STRIDE, WINDOW, Hog, windows
+from skimage.feature import hog
+
+TOLERANCE = 1e-6  # features are at most 1
+
+
+def pictures() -> dict[str, np.ndarray]:
+    """Noise, an even grey, a black and white chequer of pixels, a slope that wraps, all 64 x 96."""
+    rng = np.random.default_rng(7)
+    row, column = np.mgrid[:64, :96]
+    return {
+        "noise": rng.integers(0, 256, (64, 96)),
+        "even": np.full((64, 96), 93),
+        "chequer": 255 * ((row // 2 + column // 3) % 2),
+        "slope": (3 * row + 5 * column) % 256,
+    }
+
+
+@pytest.mark.parametrize("name", pictures())
+def test_blocks_equal_those_of_scikit_image(name):
+    """Every block has the features that scikit-image finds, to a millionth."""
+    picture = pictures()[name].astype(np.uint8)
+    expected = hog(picture, BINS, (CELL, CELL), (2, 2), "L2", feature_vector=False)
+    blocks = Hog(*picture.shape).blocks(picture)
+    assert np.abs(blocks.reshape(expected.shape) - expected).max() <= TOLERANCE
+
+
+def test_a_window_has_the_features_of_its_own_part_of_the_picture():
+    """Away from the border of a window, where a picture of its own has no gradient, nothing differs."""
+    picture = pictures()["noise"].astype(np.uint8)
+    shared = windows(Hog(*picture.shape).blocks(picture))
+    assert shared.shape == (3, 5, 7, FEATURES // 7)
+    top, left = 1, 2
+    part = picture[top * STRIDE :, left * STRIDE :][:WINDOW, :WINDOW]
+    alone = hog(part, BINS, (CELL, CELL), (2, 2), "L2", feature_vector=False)
+    inner = shared[top, left].reshape(alone.shape)[1:-1, 1:-1]
+    assert np.abs(inner - alone[1:-1, 1:-1]).max() <= TOLERANCE
+
+
+def test_turning_the_light_up_changes_no_feature():
+    """Twice the contrast and another brightness leave every block as it was."""
+    picture = np.random.default_rng(3).integers(0, 100, (64, 96)).astype(np.uint8)
+    brighter = 2 * picture + 37
+    tables = Hog(64, 96)
+    assert np.abs(tables.blocks(brighter) - tables.blocks(picture)).max() <= TOLERANCE
