@@ -54,6 +54,13 @@ class CameraModel:
         """Column in which the point (x, y) of the road is seen."""
         return self.cx - self.fx * y / (x * cos(self.pitch) + self.height * sin(self.pitch))
 
+    def project(self, x: float, y: float, z: float) -> tuple[float, float]:
+        """(column, row) in which the point `z` m above the road's (x, y) is seen; it must be ahead."""
+        down = self.height - z
+        depth = x * cos(self.pitch) + down * sin(self.pitch)
+        fall = down * cos(self.pitch) - x * sin(self.pitch)
+        return self.cx - self.fx * y / depth, self.cy + self.fy * fall / depth
+
     def line_in_picture(self, y: float, slope: float) -> tuple[float, float]:
         """(a, b) with u = a * v + b for the road's line y + slope * x; the inverse of `line_on_road`."""
         a = -self.fx * (y - slope * self.height * tan(self.pitch)) * cos(self.pitch) / (self.fy * self.height)

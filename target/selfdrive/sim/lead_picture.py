@@ -1,0 +1,119 @@
+"""What stands on the road in a picture, and its colours: to show to people, and to confuse detectors."""
+
+from math import cos, floor, sin, tan
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.road_look import Look, OtherCar
+
+LENGTH = 4.4  # m of a car
+CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, from where the lead's distance counts
+NEAREST, FURTHEST = 4.0, 400.0  # m ahead at which a car can be drawn
+SHIFT = 4  # fractional bits of the coordinates OpenCV draws at
+
+LEAD_PAINT = (70.0, 45.0, 130.0)  # BGR, a dark red
+SKY_TINT, ROAD_TINT, VERGE_TINT = (
+    (1.10, 1.0, 0.97),
+    (1.02, 1.0, 0.99),
+    (0.66, 1.10, 0.93),
+)  # BGR, equally grey
+YELLOW_TINT = (0.40, 1.04, 1.15)
+
+Tone = float | tuple[float, float, float]
+
+
+def draw_car(picture: np.ndarray, model: CameraModel, car: OtherCar) -> None:
+    """Draw a car, seen from behind, into a grey picture."""
+    tone = car.tone
+    _draw(picture, model, car, (tone, 0.75 * tone, 0.4 * tone + 20.0, min(255.0, tone + 70.0), 24.0))
+
+
+def draw_lead(picture: np.ndarray, model: CameraModel, lead: float, offset: float, heading: float) -> None:
+    """Draw a car in the lane's middle, its back `lead` m before the own front bumper, into a BGR picture."""
+    ahead = lead + CAMERA_TO_BUMPER
+    if not NEAREST <= ahead <= FURTHEST:
+        return
+    car = OtherCar(
+        x=ahead * cos(heading) - offset * sin(heading), y=-offset * cos(heading) - ahead * sin(heading)
+    )
+    side = tuple(0.7 * part for part in LEAD_PAINT)
+    _draw(
+        picture, model, car, (LEAD_PAINT, side, (70.0, 62.0, 55.0), (40.0, 40.0, 230.0), (24.0, 24.0, 24.0))
+    )
+
+
+def tinted(
+    grey: np.ndarray, model: CameraModel, look: Look, offset: float = 0.0, heading: float = 0.0
+) -> np.ndarray:
+    """The BGR picture of a grey one: everywhere as grey, in the colours of sky, verge and paint."""
+    tint = np.empty((*grey.shape, 3), np.float32)
+    tint[:] = SKY_TINT
+    tint[max(0, floor(model.horizon) + 1) :] = VERGE_TINT
+    half = 0.5 * look.lane_width
+    edge = 3.0 * half + look.shoulder_width
+    _tint_strip(tint, model, (-edge - offset, edge - offset), heading, ROAD_TINT)
+    painted = (grey > look.exposure * (0.6 * look.asphalt + 0.4 * 182.0))[..., None]
+    for y, paint in ((half, look.left), (-half, look.right)):
+        if paint.yellow:
+            yellow = np.zeros_like(tint)
+            _tint_strip(yellow, model, (y - offset - 0.4, y - offset + 0.4), heading, YELLOW_TINT)
+            tint = np.where(painted & (yellow[..., :1] > 0.0), yellow, tint)
+    return np.clip(grey[..., None] * tint, 0.0, 255.0).astype(np.uint8)
+
+
+def _tint_strip(
+    tint: np.ndarray, model: CameraModel, sides: tuple[float, float], heading: float, colour: Tone
+) -> None:
+    """Give the colour to the road between two lines that pass the car at `sides` (m)."""
+    rows = (max(0, floor(model.horizon) + 1), model.rows - 1)
+    ends = []
+    for y in sides:
+        a, b = model.line_in_picture(y / cos(heading), -tan(heading))
+        ends.append([(a * row + b, row) for row in rows])
+    _fill(tint, [*ends[0], *ends[1][::-1]], colour)
+
+
+def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[Tone, ...]) -> None:
+    """A box with a rear window, lights and wheels; `tones` are of body, side, glass, lights, dark parts."""
+    body, flank, glass, lamps, dark = tones
+    left, right, near, far = car.y + 0.5 * car.width, car.y - 0.5 * car.width, car.x, car.x + LENGTH
+    waist, floor_z = 0.62 * car.height, 0.17 * car.height
+
+    def fill(corners: list[tuple[float, float, float]], tone: Tone) -> None:
+        _fill(picture, [model.project(*corner) for corner in corners], tone)
+
+    def back(y1: float, y2: float, z1: float, z2: float, tone: Tone) -> None:
+        fill([(near, y1, z2), (near, y2, z2), (near, y2, z1), (near, y1, z1)], tone)
+
+    fill([(near, left, 0.0), (near, right, 0.0), (far, right, 0.0), (far, left, 0.0)], dark)
+    if right > 0.0 or left < 0.0:  # beside us: we see its flank
+        y = right if right > 0.0 else left
+        fill([(near, y, waist), (far, y, waist), (far, y, floor_z), (near, y, floor_z)], flank)
+        fill(
+            [
+                (near + 0.5, y, car.height),
+                (far - 1.3, y, car.height),
+                (far - 0.5, y, waist),
+                (near, y, waist),
+            ],
+            glass,
+        )
+    for inner, outer in ((left - 0.24, left), (right + 0.24, right)):
+        back(outer, inner, 0.0, 1.2 * floor_z, dark)
+    back(left, right, floor_z, waist, body)
+    roof = [(near + 0.5, left - 0.2, car.height), (near + 0.5, right + 0.2, car.height)]
+    fill([*roof, (near, right, waist), (near, left, waist)], body)
+    inset = [(near + 0.42, left - 0.28, 0.95 * car.height), (near + 0.42, right + 0.28, 0.95 * car.height)]
+    fill([*inset, (near, right + 0.15, waist), (near, left - 0.15, waist)], glass)
+    for inner, outer in ((left - 0.26, left), (right + 0.26, right)):
+        back(outer, inner, 0.75 * waist, 0.95 * waist, lamps)
+
+
+def _fill(picture: np.ndarray, points: list[tuple[float, float]], tone: Tone) -> None:
+    """Fill a convex polygon, its edges smoothed."""
+    corners = np.round(np.array(points) * 2**SHIFT).clip(-(2**20), 2**20).astype(np.int32)
+    cv2.fillConvexPoly(
+        picture, corners, tone, cv2.LINE_AA if picture.dtype == np.uint8 else cv2.LINE_8, SHIFT
+    )

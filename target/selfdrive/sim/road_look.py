@@ -1,0 +1,88 @@
+"""What a rendered road looks like: paint, asphalt, shadows, other cars. Plain data, no drawing.
+
+Tones are grey levels (0..255) as the camera's picture shows them; lengths in m; lateral positions are from
+the middle of the ego lane, left positive.
+"""
+
+from dataclasses import dataclass, replace
+
+DASH, DASH_PERIOD = 3.05, 12.2  # m: 10 ft painted in every 40 ft (MUTCD, section 3A.06)
+SOLID, DASHED = "solid", "dashed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paint:
+    """One line of paint. `wear` is the share of it that has flaked off, `fade` how far it sank into the road.
+
+    A `double` line is two strips with a gap of their own width, centred where the line is.
+    """
+
+    tone: float = 218.0
+    width: float = 0.12
+    dashed: bool = False
+    dash: float = DASH
+    period: float = DASH_PERIOD
+    phase: float = 0.0  # where along the road a dash begins
+    double: bool = False
+    yellow: bool = False  # for the picture in colour; its `tone` is grey as any
+    wear: float = 0.06
+    fade: float = 0.0  # 0 fresh .. 1 invisible
+
+
+YELLOW_PAINT = Paint(tone=182.0, yellow=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OtherCar:
+    """A vehicle in the picture that keeps its place before the camera: its back at `x`, its middle at `y`."""
+
+    x: float
+    y: float
+    tone: float = 70.0
+    width: float = 1.8
+    height: float = 1.45
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """All that may vary between two roads. The defaults are a clean highway in daylight.
+
+    `left` and `right` bound the ego lane, `far_left` and `far_right` the lanes beside it; None is no line.
+    The shoulder begins beyond the far lines, the verge beyond the shoulder.
+    """
+
+    lane_width: float = 3.7
+    left: Paint = YELLOW_PAINT
+    right: Paint = Paint()
+    far_left: Paint | None = Paint()
+    far_right: Paint | None = Paint()
+    # the ground
+    asphalt: float = 97.0
+    grain: float = 4.0  # standard deviation of its fine texture (grey levels)
+    mottle: float = 3.0  # of its slow changes, over metres
+    tracks: float = 5.0  # how much darker the wheels have made it
+    shoulder: float = 88.0
+    shoulder_width: float = 2.6
+    verge: float = 78.0
+    kerb: float | None = None  # tone of a kerb between shoulder and verge
+    # what lies on it, in pieces for 100 m of road
+    patches: float = 1.0
+    cracks: float = 2.0
+    seams: float = 0.0  # tar seams that run along the road
+    joints: float | None = None  # m between the joints across a concrete road
+    joint_tone: float = -30.0  # of patches, cracks, seams and joints against the ground
+    # light
+    shadows: float = 0.04  # share of the road that trees shade
+    shadow_depth: float = 0.3  # how much of the light they take
+    sky: float = 222.0
+    trees: float = 72.0
+    exposure: float = 1.0  # factor on all tones
+    cars: tuple[OtherCar, ...] = ()
+
+
+def standard_look(marks: str = SOLID) -> Look:
+    """The road of the image library: left line solid yellow, right line white, solid or dashed."""
+    if marks not in (SOLID, DASHED):
+        raise ValueError(f"marks: {marks!r}, expected {SOLID!r} or {DASHED!r}")
+    look = Look()
+    return replace(look, right=replace(look.right, dashed=marks == DASHED))

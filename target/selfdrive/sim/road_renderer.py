@@ -1,0 +1,184 @@
+"""Pictures of a straight road from anywhere on it: what the camera sees, and where the lines truly are.
+
+The road is painted once, from above (`road_texture`). A picture is that strip seen through the camera: each
+band of its rows takes it from a copy just coarse enough for its distance, so the far road does not flicker.
+"""
+
+from dataclasses import dataclass
+from math import ceil, cos, floor, sin, tan
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.lead_picture import draw_car, draw_lead, tinted
+from selfdrive.sim.road_look import Look, standard_look
+from selfdrive.sim.road_texture import HALF_WIDTH, Strip, paint_strip
+
+BAND_RATIO = 1.4  # how much further below the horizon a band of rows ends than it begins
+TREE_HEIGHT = 0.05  # of the focal length: how high trees rise above the horizon
+MARGIN = 2  # texels around what is seen that interpolation reads
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """Rows `first`..`last` - 1 of the picture, and the copy of the road they are taken from."""
+
+    first: int
+    last: int
+    strip: Strip
+
+
+class RoadRenderer:
+    """Draws one road, through one camera. Equal arguments give equal pictures.
+
+    `look` is how the road looks, or the standard look's marks, "solid" or "dashed". The strip of road repeats
+    itself after `periods` dash periods of 12.2 m.
+    """
+
+    def __init__(self, model: CameraModel, look: Look | str, seed: int, *, periods: int = 8) -> None:
+        self.model = model
+        self.look = standard_look(look) if isinstance(look, str) else look
+        rng = np.random.default_rng(seed)
+        self._bands = _bands(model, paint_strip(self.look, periods, rng))
+        self._far = _background(model, self.look, rng)
+        self._seen = _picture_to_road(model)
+
+    def grey(self, position: float, offset: float = 0.0, heading: float = 0.0) -> np.ndarray:
+        """The picture (uint8, rows x width) at `position` m along the road, `offset` m left of the lane's
+        middle, turned left by `heading` rad.
+        """
+        model = self.model
+        picture = np.empty((model.rows, model.width), np.uint8)
+        self._draw_far(picture, heading)
+        to_world = _car_to_road(position, offset, heading) @ self._seen
+        for band in self._bands:
+            _draw_band(picture, band, to_world)
+        for car in sorted(self.look.cars, key=lambda car: -car.x):
+            draw_car(picture, model, car)
+        return picture
+
+    def colour(
+        self, position: float, offset: float = 0.0, heading: float = 0.0, lead: float | None = None
+    ) -> np.ndarray:
+        """The same in colour (uint8, rows x width x BGR), to show to people; with a car `lead` m ahead."""
+        picture = tinted(self.grey(position, offset, heading), self.model, self.look, offset, heading)
+        if lead is not None:
+            draw_lead(picture, self.model, lead, offset, heading)
+        return picture
+
+    def truth(
+        self, offset: float = 0.0, heading: float = 0.0
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        """((y, slope), (y, slope)) of the lane's left and right line in the car's frame: y at the car."""
+        half, slope = 0.5 * self.look.lane_width, -tan(heading)
+        return ((half - offset) / cos(heading), slope), ((-half - offset) / cos(heading), slope)
+
+    def _draw_far(self, picture: np.ndarray, heading: float) -> None:
+        """What is above the horizon: it only pans as the car turns."""
+        rows, width = len(self._far), picture.shape[1]
+        spare = self._far.shape[1] - width
+        pan = round(0.5 * spare - self.model.fx * tan(heading) / cos(self.model.pitch))
+        first = min(max(pan, 0), spare)
+        picture[:rows] = self._far[:, first : first + width]
+
+
+def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
+    """The rows below the horizon, from the bottom up, each band with a strip as coarse as its middle row."""
+    bands = []
+    last, top = model.rows, max(0, floor(model.horizon) + 1)
+    while last > top:
+        below = last - model.horizon
+        first = max(top, min(last - 1, round(model.horizon + below / BAND_RATIO)))
+        middle = model.horizon + max(0.5, (below * max(0.5, first - model.horizon)) ** 0.5)
+        across = model.metres_per_pixel(middle)
+        along = model.depth(middle) / ((middle - model.horizon) * cos(model.pitch))
+        strip = strip.shrunk(max(along, strip.row_length), max(across, strip.column_width))
+        bands.append(Band(first=first, last=last, strip=strip))
+        last = first
+    return tuple(bands)
+
+
+def _picture_to_road(model: CameraModel) -> np.ndarray:
+    """Homography (3 x 3) from (u, v, 1) in the picture to (x, y, 1) on the road in the car's frame."""
+    fall = model.fy * model.height / cos(model.pitch)
+    across = fall / model.fx
+    x = (
+        0.0,
+        -model.height * tan(model.pitch),
+        fall / cos(model.pitch) + model.height * tan(model.pitch) * model.horizon,
+    )
+    return np.array([x, (-across, 0.0, across * model.cx), (0.0, 1.0, -model.horizon)])
+
+
+def _car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
+    """From (x, y, 1) in the car's frame to (along, left of the lane's middle, 1) on the road."""
+    c, s = cos(heading), sin(heading)
+    return np.array([(c, -s, position), (s, c, offset), (0.0, 0.0, 1.0)])
+
+
+def _draw_band(picture: np.ndarray, band: Band, to_world: np.ndarray) -> None:
+    strip, width = band.strip, picture.shape[1]
+    scale = np.array(
+        [
+            (0.0, -1.0 / strip.column_width, HALF_WIDTH / strip.column_width - 0.5),
+            (1.0 / strip.row_length, 0.0, -0.5),
+            (0.0, 0.0, 1.0),
+        ]
+    )
+    matrix = scale @ to_world
+    matrix[:, 2] += matrix[:, 1] * band.first  # the band's first row is row 0 of what is drawn
+    corners = matrix @ np.array(
+        [
+            (0, width - 1, 0, width - 1),
+            (0, 0, band.last - band.first - 1, band.last - band.first - 1),
+            (1,) * 4,
+        ]
+    )
+    columns, rows = corners[:2] / corners[2]
+    first_row, last_row = floor(rows.min()) - MARGIN, ceil(rows.max()) + MARGIN
+    limit = strip.texels.shape[1] - 1
+    first_column = min(max(floor(columns.min()) - MARGIN, 0), limit)
+    last_column = min(max(ceil(columns.max()) + MARGIN, 0), limit)
+    source = strip.texels[:, first_column : last_column + 1].take(
+        range(first_row, last_row + 1), axis=0, mode="wrap"
+    )
+    matrix[0] -= first_column * matrix[2]
+    matrix[1] -= first_row * matrix[2]
+    cv2.warpPerspective(
+        source,
+        matrix,
+        (width, band.last - band.first),
+        dst=picture[band.first : band.last],
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+
+
+def _background(model: CameraModel, look: Look, rng: np.random.Generator) -> np.ndarray:
+    """Sky and trees down to the horizon, wider than the picture by half on either side."""
+    rows, width = max(0, floor(model.horizon) + 1), 2 * model.width
+    if rows == 0:
+        return np.empty((0, width), np.uint8)
+    height = np.arange(rows, dtype=np.float32)[:, None] / rows
+    sky = look.sky - 35.0 * (1.0 - height) + np.zeros((1, width), np.float32)
+    clouds = cv2.resize(
+        rng.standard_normal((12, 24), dtype=np.float32), (width, rows), interpolation=cv2.INTER_CUBIC
+    )
+    sky += 6.0 * clouds
+    outline = sum(
+        cv2.resize(
+            rng.standard_normal((1, width // step), dtype=np.float32),
+            (width, 1),
+            interpolation=cv2.INTER_CUBIC,
+        )
+        * share
+        for step, share in ((160, 0.3), (40, 0.25), (8, 0.12))
+    )
+    top = model.horizon - TREE_HEIGHT * model.fy * np.clip(0.75 + outline, 0.05, 2.0)
+    cover = np.clip(np.arange(rows, dtype=np.float32)[:, None] - top + 0.5, 0.0, 1.0)
+    leaves = look.trees + 9.0 * cv2.GaussianBlur(
+        rng.standard_normal((rows, width), dtype=np.float32), (0, 0), 1.2
+    )
+    picture = sky + cover * (leaves - sky)
+    return np.clip(look.exposure * picture, 0.0, 255.0).astype(np.uint8)
