@@ -35,17 +35,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             scenario = on_plant(scenario, options.plant)
         if options.max_steps is not None:
             scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
-        write(simulate(scenario, options.seed, _pictures(options)), options.out)
+        write(simulate(scenario, options.seed, _pictures(options), options.film), options.out)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_INPUT
     return 0
 
 
-def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) -> SimulationResult:
-    """Run a scenario to its end."""
+def simulate(
+    scenario: Scenario, seed: int, pictures: Pictures | None = None, film: Path | None = None
+) -> SimulationResult:
+    """Run a scenario to its end; a folder `film` gets a film of it."""
     simulator = Simulator()
-    simulator.reset(scenario, seed, pictures)
+    simulator.reset(scenario, seed, pictures, film)
     while not simulator.done:
         simulator.step()
     return simulator.result()
@@ -90,6 +92,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
     )
     parser.add_argument("--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="rendered pictures")
+    parser.add_argument("--film", type=Path, metavar="DIR", help="keep what the camera shows, to be watched")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
 

@@ -1,6 +1,7 @@
 """The closed loop: plant, sensors, camera and the controller, 10 ms a step."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from selfdrive.car.honda.radar_interface import RadarInterface
 from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, CanFrame
 from selfdrive.sim.actuators import ActuatorReceiver
+from selfdrive.sim.film.recorder import Film
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.plant import Plant
@@ -40,10 +42,17 @@ class SimulationResult:
 class Simulator:
     """Runs one scenario at a time; `reset` starts the next one, with nothing left of the last."""
 
-    def reset(self, scenario: Scenario, seed: int = 0, pictures: Pictures | None = None) -> None:
+    def reset(
+        self,
+        scenario: Scenario,
+        seed: int = 0,
+        pictures: Pictures | None = None,
+        film: Path | None = None,
+    ) -> None:
         """Build car, controller and recorder anew. `seed` is that of the pictures, if there are any.
 
-        Raises ConfigError where the pictures cannot be had or do not fit the scenario's road.
+        A folder `film` gets a film of the run. Raises ConfigError where it cannot be written, and where the
+        pictures cannot be had or do not fit the scenario's road.
         """
         self.frame = 0
         self._scenario, self._seed = scenario, seed
@@ -53,6 +62,7 @@ class Simulator:
         self._radar = RadarSensor(self._road)
         self._vision = build_vision(pictures, self._road, seed)
         self._camera = self._vision.camera
+        self._film = Film(film, self._vision.model) if film else None
         self._receiver = ActuatorReceiver()
         self._actuators = Actuators()
         car = CarInterface()
@@ -84,6 +94,8 @@ class Simulator:
         frames.extend(measured)
         sent = self.manager.step(t, frames, view)
         self.recorder.append(truth, self._actuators, self.manager)
+        if self._film and view is not None:
+            self._film.take(truth, view, self.manager, self.hazards.first)
         self._actuators = self._receiver.update(sent, t)
         self.frame += 1
 

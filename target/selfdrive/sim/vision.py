@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim.camera import Camera
 from selfdrive.sim.road import Road
@@ -45,17 +46,21 @@ class RoadCamera(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vision:
-    """Camera and detector of one run; `description` goes into its record."""
+    """Camera and detector of one run; `description` goes into its record.
+
+    `model` is the camera's geometry: to draw what is seen, where nothing takes pictures.
+    """
 
     camera: RoadCamera
     detector: LaneDetector
     description: dict | None
+    model: CameraModel
 
 
 def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
     """Camera and detector for a run on `road`. Raises ConfigError for frames that cannot be used."""
     if pictures is None:
-        return Vision(camera=Camera(road), detector=IdealDetector(), description=None)
+        return Vision(camera=Camera(road), detector=IdealDetector(), description=None, model=CameraModel())
     from selfdrive.sim.image_library import open_library
     from selfdrive.sim.picture_camera import PictureCamera
 
@@ -67,7 +72,12 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
         "frames_digest": library.digest,
         "translation": pictures.translation,
     }
-    return Vision(camera=camera, detector=_detector(pictures.detector, library), description=description)
+    return Vision(
+        camera=camera,
+        detector=_detector(pictures.detector, library),
+        description=description,
+        model=library.model,
+    )
 
 
 def _detector(name: str, library) -> LaneDetector:

@@ -1,0 +1,95 @@
+"""Keeps what the camera showed and what the controller made of it, one picture after the other.
+
+A film is a folder: `film.jsonl`, a heading and a line for each picture, and the pictures as JPEG files. It
+is written as the run goes, so a run that breaks off leaves a film of all that went before. Taking it only
+reads: a run with a film leaves the same bytes as without.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.manager import Manager
+from selfdrive.messages import VIEW_LENGTH, CameraView, ModelData
+from selfdrive.sim.truth import GroundTruth
+
+SCHEMA = "film/1"
+INDEX = "film.jsonl"
+KNOTS = tuple(range(0, VIEW_LENGTH, 7))  # m ahead; where lines are kept
+JPEG_QUALITY = 95  # noise that an effect has added is to be seen as it was
+
+
+class Film:
+    """A film in the making, in `folder`, which is made if need be. Raises ConfigError if it cannot be."""
+
+    def __init__(self, folder: Path, camera: CameraModel) -> None:
+        self._folder = folder
+        self._count = 0
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / INDEX).write_text(_line({"schema": SCHEMA, "camera": asdict(camera)}))
+        except OSError as error:
+            raise ConfigError(
+                str(error.strerror),
+                where=str(folder),
+                expected="a writable folder",
+                remedy="choose another --film",
+            ) from None
+
+    def take(
+        self, truth: GroundTruth, view: CameraView, manager: Manager, hazards: Mapping[str, float | None]
+    ) -> None:
+        """Keep a step that had a picture: `view`, and what the controller has published by its end."""
+        state, radar = manager.controlsd.state, manager.radar_state
+        lead = radar.lead_one if radar else None
+        entry = {
+            "t": truth.t,
+            "position": truth.position,
+            "offset": truth.lateral_offset,
+            "heading": truth.heading,
+            "middle": view.path_y,
+            "v_ego": truth.v_ego,
+            "d_rel": None if truth.free_road else truth.d_rel,
+            "bend": _at_knots(view.bend),
+            "picture": self._keep(view),
+            "seen": _seen(manager.visiond.latest, truth.t),
+            "radar": lead.d_rel if lead and lead.status else None,
+            "alerts": list(state.alerts),
+            "text": state.alert_text1,
+            "hazards": [name for name, t in hazards.items() if t is not None],
+        }
+        with (self._folder / INDEX).open("a") as file:
+            file.write(_line(entry))
+        self._count += 1
+
+    def _keep(self, view: CameraView) -> str | None:
+        """The file of the view's picture."""
+        if view.picture is None:
+            return None
+        import cv2  # runs without pictures do without
+
+        name = f"{self._count:05d}.jpg"
+        cv2.imwrite(str(self._folder / name), view.picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        return name
+
+
+def _seen(model: ModelData | None, t: float) -> dict | None:
+    """What visiond published at `t`; None if it published nothing then."""
+    if model is None or model.t != t:
+        return None
+    lines = {"left": model.left_lane, "right": model.right_lane, "path": model.path}
+    return {
+        **{name: {"y": _at_knots(line.points), "prob": line.prob} for name, line in lines.items()},
+        "lead": model.lead.d_rel,
+    }
+
+
+def _at_knots(values: Sequence[float]) -> list[float]:
+    return [float(values[x]) for x in KNOTS]
+
+
+def _line(entry: dict) -> str:
+    return json.dumps(entry) + "\n"

@@ -1,0 +1,95 @@
+"""Reads a film that a run left."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film.recorder import INDEX, SCHEMA
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenLine:
+    """A line as visiond published it: `y` (m, left positive) at the recorder's KNOTS."""
+
+    y: Sequence[float]
+    prob: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """The moment of one picture: the world, the controller's view of it, what it told the driver. SI units.
+
+    `d_rel` is None on a free road, `lines` where visiond published nothing, `radar` where radard has no lead.
+    In the camera's view the lane's middle is at `middle` beside the car, and has moved by `bend` at KNOTS.
+    """
+
+    t: float
+    position: float
+    offset: float
+    heading: float
+    middle: float
+    v_ego: float
+    d_rel: float | None
+    bend: Sequence[float]
+    picture: Path | None
+    lines: dict[str, SeenLine] | None  # left, right, path
+    camera_lead: float | None
+    radar: float | None
+    alerts: tuple[str, ...]
+    text: str
+    hazards: tuple[str, ...]
+
+    def image(self) -> np.ndarray | None:
+        """The picture, grey; None for a run without. Raises ConfigError if it cannot be read."""
+        if self.picture is None:
+            return None
+        image = cv2.imread(str(self.picture), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise ConfigError(
+                "no picture", where=str(self.picture), expected="a JPEG file", remedy="take the film again"
+            )
+        return image
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reel:
+    """A film: the camera that took it and its frames, a twentieth of a second apart."""
+
+    camera: CameraModel
+    frames: tuple[Frame, ...]
+
+    def at(self, index: int) -> Frame:
+        """The frame of that number, or the last one of a film that is over."""
+        return self.frames[min(index, len(self.frames) - 1)]
+
+
+def read_reel(folder: Path) -> Reel:
+    """The film in `folder`. Raises ConfigError where there is none, or a broken one."""
+    index = folder / INDEX
+    try:
+        head, *lines = [json.loads(line) for line in index.read_text().splitlines()]
+        if head["schema"] != SCHEMA or not lines:
+            raise ValueError(f"schema {head['schema']}, {len(lines)} pictures")
+        frames = tuple(_frame(line, folder) for line in lines)
+        return Reel(camera=CameraModel(**head["camera"]), frames=frames)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(
+            f"no film ({error})", where=str(index), expected=f"a {SCHEMA} file", remedy="take the film again"
+        ) from None
+
+
+def _frame(entry: dict, folder: Path) -> Frame:
+    seen, picture = entry.pop("seen"), entry.pop("picture")
+    entry["alerts"], entry["hazards"] = tuple(entry["alerts"]), tuple(entry["hazards"])
+    return Frame(
+        **entry,
+        picture=folder / picture if picture else None,
+        lines={name: SeenLine(**seen[name]) for name in ("left", "right", "path")} if seen else None,
+        camera_lead=seen["lead"] if seen else None,
+    )
