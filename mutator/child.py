@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 _PR_SET_PDEATHSIG = 1
-_FILE_LIMIT = 1 << 28  # bytes that a run may write into one file
+_FILE_LIMIT = 1 << 30  # bytes that a run may write into one file (a cache of pictures is large)
 _HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 
 
