@@ -13,20 +13,31 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.lead_picture import draw_car, draw_lead, tinted
 from selfdrive.sim.road_look import Look, standard_look
-from selfdrive.sim.road_texture import HALF_WIDTH, Strip, paint_strip
+from selfdrive.sim.road_texture import Strip, paint_strip
 
 BAND_RATIO = 1.4  # how much further below the horizon a band of rows ends than it begins
 TREE_HEIGHT = 0.05  # of the focal length: how high trees rise above the horizon
+LEAST_ROWS = 3  # of a band
 MARGIN = 2  # texels around what is seen that interpolation reads
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """Rows `first`..`last` - 1 of the picture, and the copy of the road they are taken from."""
+    """Rows `first`..`last` - 1 of the picture, and the copy of the road they are taken from.
+
+    Homographies: `to_car` from the band's pixels to the car's frame, `to_texels` from the road to the strip.
+    """
 
     first: int
     last: int
-    strip: Strip
+    texels: np.ndarray
+    to_car: np.ndarray
+    to_texels: np.ndarray
+
+
+def first_road_row(model: CameraModel) -> int:
+    """The highest row of the picture that is all road."""
+    return max(0, ceil(model.horizon + 0.5))
 
 
 class RoadRenderer:
@@ -42,7 +53,6 @@ class RoadRenderer:
         rng = np.random.default_rng(seed)
         self._bands = _bands(model, paint_strip(self.look, periods, rng))
         self._far = _background(model, self.look, rng)
-        self._seen = _picture_to_road(model)
 
     def grey(self, position: float, offset: float = 0.0, heading: float = 0.0) -> np.ndarray:
         """The picture (uint8, rows x width) at `position` m along the road, `offset` m left of the lane's
@@ -51,9 +61,9 @@ class RoadRenderer:
         model = self.model
         picture = np.empty((model.rows, model.width), np.uint8)
         self._draw_far(picture, heading)
-        to_world = _car_to_road(position, offset, heading) @ self._seen
+        to_road = car_to_road(position, offset, heading)
         for band in self._bands:
-            _draw_band(picture, band, to_world)
+            _draw_band(picture, band, to_road)
         for car in sorted(self.look.cars, key=lambda car: -car.x):
             draw_car(picture, model, car)
         return picture
@@ -78,86 +88,93 @@ class RoadRenderer:
         """What is above the horizon: it only pans as the car turns."""
         rows, width = len(self._far), picture.shape[1]
         spare = self._far.shape[1] - width
-        pan = round(0.5 * spare - self.model.fx * tan(heading) / cos(self.model.pitch))
-        first = min(max(pan, 0), spare)
+        first = min(max(spare // 2 - pan(self.model, heading), 0), spare)
         picture[:rows] = self._far[:, first : first + width]
 
 
-def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
-    """The rows below the horizon, from the bottom up, each band with a strip as coarse as its middle row."""
-    bands = []
-    last, top = model.rows, max(0, floor(model.horizon) + 1)
-    while last > top:
-        below = last - model.horizon
-        first = max(top, min(last - 1, round(model.horizon + below / BAND_RATIO)))
-        middle = model.horizon + max(0.5, (below * max(0.5, first - model.horizon)) ** 0.5)
-        across = model.metres_per_pixel(middle)
-        along = model.depth(middle) / ((middle - model.horizon) * cos(model.pitch))
-        strip = strip.shrunk(max(along, strip.row_length), max(across, strip.column_width))
-        bands.append(Band(first=first, last=last, strip=strip))
-        last = first
-    return tuple(bands)
-
-
-def _picture_to_road(model: CameraModel) -> np.ndarray:
-    """Homography (3 x 3) from (u, v, 1) in the picture to (x, y, 1) on the road in the car's frame."""
+def picture_to_car(model: CameraModel, first: int = 0) -> np.ndarray:
+    """Homography (3 x 3) from (u, v - `first`, 1) in the picture to (x, y, 1) on the road, from the car."""
     fall = model.fy * model.height / cos(model.pitch)
+    foot = model.height * tan(model.pitch)
+    below = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, first - model.horizon), (0.0, 0.0, 1.0)])
     across = fall / model.fx
-    x = (
-        0.0,
-        -model.height * tan(model.pitch),
-        fall / cos(model.pitch) + model.height * tan(model.pitch) * model.horizon,
+    return (
+        np.array([(0.0, -foot, fall / cos(model.pitch)), (-across, 0.0, across * model.cx), (0, 1, 0)])
+        @ below
     )
-    return np.array([x, (-across, 0.0, across * model.cx), (0.0, 1.0, -model.horizon)])
 
 
-def _car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
+def car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
     """From (x, y, 1) in the car's frame to (along, left of the lane's middle, 1) on the road."""
     c, s = cos(heading), sin(heading)
     return np.array([(c, -s, position), (s, c, offset), (0.0, 0.0, 1.0)])
 
 
-def _draw_band(picture: np.ndarray, band: Band, to_world: np.ndarray) -> None:
-    strip, width = band.strip, picture.shape[1]
-    scale = np.array(
-        [
-            (0.0, -1.0 / strip.column_width, HALF_WIDTH / strip.column_width - 0.5),
-            (1.0 / strip.row_length, 0.0, -0.5),
-            (0.0, 0.0, 1.0),
-        ]
-    )
-    matrix = scale @ to_world
-    matrix[:, 2] += matrix[:, 1] * band.first  # the band's first row is row 0 of what is drawn
-    corners = matrix @ np.array(
-        [
-            (0, width - 1, 0, width - 1),
-            (0, 0, band.last - band.first - 1, band.last - band.first - 1),
-            (1,) * 4,
-        ]
-    )
-    columns, rows = corners[:2] / corners[2]
-    first_row, last_row = floor(rows.min()) - MARGIN, ceil(rows.max()) + MARGIN
-    limit = strip.texels.shape[1] - 1
-    first_column = min(max(floor(columns.min()) - MARGIN, 0), limit)
-    last_column = min(max(ceil(columns.max()) + MARGIN, 0), limit)
-    source = strip.texels[:, first_column : last_column + 1].take(
-        range(first_row, last_row + 1), axis=0, mode="wrap"
-    )
-    matrix[0] -= first_column * matrix[2]
-    matrix[1] -= first_row * matrix[2]
+def pan(model: CameraModel, heading: float) -> int:
+    """How many pixels what is far away moves to the right as the car turns left by `heading` (rad)."""
+    return round(model.fx * tan(heading) / cos(model.pitch))
+
+
+def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
+    """The rows below the horizon, from the bottom up, each band with a strip as coarse as its middle row."""
+    bands = []
+    last, top = model.rows, first_road_row(model)
+    while last > top:
+        below = last - model.horizon
+        first = max(top, min(last - LEAST_ROWS, round(model.horizon + below / BAND_RATIO)))
+        middle = model.horizon + (below * max(0.5, first - model.horizon)) ** 0.5
+        across = model.metres_per_pixel(middle)
+        along = model.depth(middle) / ((middle - model.horizon) * cos(model.pitch))
+        strip = strip.shrunk(max(along, strip.row_length), max(across, strip.column_width))
+        bands.append(
+            Band(
+                first=first,
+                last=last,
+                texels=strip.texels,
+                to_car=picture_to_car(model, first),
+                to_texels=strip.from_road(),
+            )
+        )
+        last = first
+    return tuple(bands)
+
+
+def _draw_band(picture: np.ndarray, band: Band, to_road: np.ndarray) -> None:
+    """Draw the band's rows, seen from where `to_road` puts the car."""
+    rows, width = band.last - band.first, picture.shape[1]
+    matrix = band.to_texels @ to_road @ band.to_car
+    (columns, lines, scales) = (matrix @ _corners(width, rows)).tolist()
+    across = [column / scale for column, scale in zip(columns, scales, strict=True)]
+    along = [line / scale for line, scale in zip(lines, scales, strict=True)]
+    length, limit = band.texels.shape[0], band.texels.shape[1] - 1
+    left = min(max(floor(min(across)) - MARGIN, 0), limit)
+    right = min(max(ceil(max(across)) + MARGIN, 0), limit) + 1
+    near, far = floor(min(along)) - MARGIN, ceil(max(along)) + MARGIN + 1
+    start = near % length
+    if start + far - near <= length:
+        source = band.texels[start : start + far - near, left:right]
+    else:
+        source = band.texels[:, left:right].take(np.arange(near, far), axis=0, mode="wrap")
+    matrix[0] -= left * matrix[2]
+    matrix[1] -= near * matrix[2]
     cv2.warpPerspective(
         source,
         matrix,
-        (width, band.last - band.first),
+        (width, rows),
         dst=picture[band.first : band.last],
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
     )
 
 
+def _corners(width: int, rows: int) -> np.ndarray:
+    """(u, v, 1) of a band's four corner pixels, as columns."""
+    return np.array([(0, width - 1, 0, width - 1), (0, 0, rows - 1, rows - 1), (1, 1, 1, 1)], float)
+
+
 def _background(model: CameraModel, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Sky and trees down to the horizon, wider than the picture by half on either side."""
-    rows, width = max(0, floor(model.horizon) + 1), 2 * model.width
+    rows, width = first_road_row(model), 2 * model.width
     if rows == 0:
         return np.empty((0, width), np.uint8)
     height = np.arange(rows, dtype=np.float32)[:, None] / rows

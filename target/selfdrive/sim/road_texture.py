@@ -39,6 +39,16 @@ class Strip:
             texels = cv2.resize(texels, (fewer_columns, fewer_rows), interpolation=cv2.INTER_AREA)
         return Strip(texels=texels, row_length=length / fewer_rows, column_width=width / fewer_columns)
 
+    def from_road(self) -> np.ndarray:
+        """Homography (3 x 3) from (along, left, 1) on the road in m to (column, row, 1) of the texels."""
+        return np.array(
+            [
+                (0.0, -1.0 / self.column_width, HALF_WIDTH / self.column_width - 0.5),
+                (1.0 / self.row_length, 0.0, -0.5),
+                (0.0, 0.0, 1.0),
+            ]
+        )
+
 
 def paint_strip(look: Look, periods: int, rng: np.random.Generator) -> Strip:
     """The road of this look, `periods` dash periods long."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.sim.camera import Camera
 from selfdrive.sim.road import Road
@@ -58,12 +59,21 @@ class Vision:
 
 
 def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
-    """Camera and detector for a run on `road`. Raises ConfigError for frames that cannot be used."""
+    """Camera and detector for a run on `road`.
+
+    Raises ConfigError for frames that cannot be used, and for pictures of a road that is not straight.
+    """
     if pictures is None:
         return Vision(camera=Camera(road), detector=IdealDetector(), description=None, model=CameraModel())
     from selfdrive.sim.image_library import open_library
     from selfdrive.sim.picture_camera import PictureCamera
 
+    if road.bend(0.0, 1) is not None:
+        raise ConfigError(
+            "a road with curvature",
+            expected="a straight road, as pictures show",
+            remedy="run it without pictures",
+        )
     library = open_library(pictures, seed)
     camera = PictureCamera(Camera(road), library, pictures.translation)
     description = {

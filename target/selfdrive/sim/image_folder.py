@@ -1,0 +1,184 @@
+"""A folder of a user's own frames, with a `camera.yaml` that says who took them and how far apart."""
+
+import re
+from collections.abc import Iterator
+from hashlib import sha256
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.conversions import DEG_TO_RAD
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.yaml_section import Section, read_yaml
+
+CALIBRATION = "camera.yaml"
+SCHEMA = "camera/1"
+_KEYS = {
+    "schema": f"{SCHEMA!r}, the form of this file",
+    "name": "what the frames are called in a run's record",
+    "files": 'which files are frames, such as "*.png"; they follow each other as their numbers do',
+    "width": "a frame's width in pixels",
+    "rows": "a frame's height in pixels",
+    "resize_width": "the width, if another, to which frames are made smaller (height in proportion)",
+    "fx_px": "horizontal focal length",
+    "fy_px": "vertical focal length",
+    "cx_px": "column of the optical axis",
+    "cy_px": "row of the optical axis",
+    "pitch_deg": "how far the camera looks down",
+    "horizon_row": "the row at which a flat road ends, instead of fx_px, fy_px, cx_px, cy_px and pitch_deg",
+    "focal_px": "focal length of the camera with that horizon, whose axis is in the frame's middle",
+    "height_m": "height of the camera above the road",
+    "fps": "frames a second, for frames that follow the time of a run",
+    "spacing_m": "metres from frame to frame, for frames that follow the distance driven",
+}
+_LARGEST = 8192  # pixels
+_NUMBER = re.compile(r"(\d+)(?!.*\d)")  # the last number in a file's name
+
+
+class ImageFolder:
+    """Knows the calibration and every frame's bytes; `read` decodes them.
+
+    `model` is the camera of the frames as they are read. One of `spacing` (m) and `fps` (1/s) is None.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._calibration = folder / CALIBRATION
+        remedy = "write it as docs/how-to/use-your-own-frames.md says"
+        text = _bytes(self._calibration, "the calibration of the frames in this folder", remedy)
+        root = read_yaml(text.decode(errors="replace"), str(self._calibration), _KEYS)
+        root.text("schema", (SCHEMA,))
+        self.name = root.text("name")
+        self._width, self._rows = (int(root.number(key, 16, _LARGEST)) for key in ("width", "rows"))
+        model = _model(root, self._width, self._rows)
+        width = int(root.number("resize_width", 16, self._width, default=self._width))
+        self.model = _resized(model, width)
+        if ("fps" in root) == ("spacing_m" in root):
+            root.fail("both or none of fps, spacing_m", "exactly one of them", f"fps are {_KEYS['fps']}")
+        self.fps = root.number("fps", 0.1, 1000.0) if "fps" in root else None
+        self.spacing = None if self.fps else root.number("spacing_m", 0.01, 1000.0)
+        self.files = _listed(folder, root)
+        parts = [text, *(_bytes(file, "a frame", "put it there") for file in self.files)]
+        self.digest = sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()
+
+    def read(self) -> Iterator[np.ndarray]:
+        """The frames (uint8, rows x width). Raises ConfigError at the first that is not as it should be."""
+        for path in self.files:
+            frame = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+            if frame is None:
+                raise ConfigError(
+                    "not readable as a picture",
+                    where=str(path),
+                    expected="a picture such as PNG or JPEG",
+                    remedy="replace it",
+                )
+            rows, width = frame.shape
+            if (width, rows) != (self._width, self._rows):
+                raise ConfigError(
+                    f"{width}x{rows}",
+                    where=str(path),
+                    expected=f"{self._width}x{self._rows}",
+                    remedy=f"all frames must have the size that {self._calibration} gives",
+                )
+            if width != self.model.width:
+                size = self.model.width, self.model.rows
+                frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
+            yield frame
+
+
+def _model(root: Section, width: int, rows: int) -> CameraModel:
+    """The camera of the frames as they are in the folder."""
+    height = root.number("height_m", 0.2, 10.0)
+    whole = ("fx_px", "fy_px", "cx_px", "cy_px", "pitch_deg")
+    if "horizon_row" in root or "focal_px" in root:
+        if given := [key for key in whole if key in root]:
+            root.fail(
+                " and ".join(given), "horizon_row, focal_px and height_m alone", "remove one or the other"
+            )
+        horizon = root.number("horizon_row", -rows, rows - 16.0)
+        focal = root.number("focal_px", 16.0, _LARGEST)
+        return CameraModel.from_view(width=width, rows=rows, horizon=horizon, focal=focal, height=height)
+    fx, fy = (root.number(key, 16.0, _LARGEST) for key in whole[:2])
+    cx, cy = (root.number(key, -_LARGEST, _LARGEST) for key in whole[2:4])
+    pitch = root.number("pitch_deg", -30.0, 60.0) * DEG_TO_RAD
+    model = CameraModel(width=width, rows=rows, fx=fx, fy=fy, cx=cx, cy=cy, height=height, pitch=pitch)
+    good = model.horizon < rows - 16.0
+    root.check("pitch_deg", good, "road in the picture", f"the horizon would be at row {model.horizon:.0f}")
+    return model
+
+
+def _resized(model: CameraModel, width: int) -> CameraModel:
+    """The camera whose frames are this wide; pixels stay square if they are."""
+    rows = round(model.rows * width / model.width)
+    across, down = width / model.width, rows / model.rows
+    return CameraModel(
+        width=width,
+        rows=rows,
+        fx=model.fx * across,
+        fy=model.fy * down,
+        cx=(model.cx + 0.5) * across - 0.5,
+        cy=(model.cy + 0.5) * down - 0.5,
+        height=model.height,
+        pitch=model.pitch,
+    )
+
+
+def _listed(folder: Path, root: Section) -> list[Path]:
+    """The frames in the order of the numbers in their names. Raises ConfigError if one is missing."""
+    pattern = root.text("files")
+    root.check(
+        "files",
+        not pattern.startswith("/") and ".." not in pattern,
+        "files below the folder",
+        "put them there",
+    )
+    files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
+    root.check("files", bool(files), f"the name of a file in {folder}", "no file is called so")
+    for missing in _gaps(files):
+        raise ConfigError(
+            "missing",
+            where=str(missing),
+            expected="a frame, as its neighbours are numbered",
+            remedy="put it there, or number the frames anew",
+        )
+    return files
+
+
+def _order(path: Path) -> list[tuple[int, str]]:
+    """Sorts 2 before 10."""
+    parts = re.split(r"(\d+)", str(path))
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
+
+
+def _gaps(files: list[Path]) -> Iterator[Path]:
+    """Frames that are not there although the numbers of those that are make one expect them."""
+    numbered: list[tuple[Path, re.Match[str], int]] = []
+    for path in files:
+        match = _NUMBER.search(path.name)
+        if match is None:
+            return
+        numbered.append((path, match, int(match[1])))
+    pairs = [
+        (before, after)
+        for before, after in pairwise(numbered)
+        if _frame(*before[:2], 0) == _frame(*after[:2], 0)  # of one sequence: nothing but the number differs
+    ]
+    step = min((after[2] - before[2] for before, after in pairs), default=1)
+    for (path, match, number), after in pairs:
+        if after[2] - number != step:
+            yield _frame(path, match, number + step)
+
+
+def _frame(path: Path, match: re.Match[str], number: int) -> Path:
+    """The path of the frame with another number."""
+    name, digits = path.name, len(match[1])
+    return path.with_name(f"{name[: match.start()]}{number:0{digits}}{name[match.end() :]}")
+
+
+def _bytes(path: Path, expected: str, remedy: str) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ConfigError(str(error.strerror), where=str(path), expected=expected, remedy=remedy) from None

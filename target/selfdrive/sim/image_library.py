@@ -1,0 +1,169 @@
+"""The pictures a run drives through: a rendered road, or a folder of a user's frames. Grey, and read-only.
+
+Pictures are made or decoded once and kept in a cache folder, in a file whose name is the digest of all they
+follow from. Processes map that file and so share its memory. A file appears there whole or not at all.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass
+from hashlib import sha256
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
+import cv2
+import numpy as np
+
+from selfdrive.common import camera_model
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim import lead_picture, road_look, road_renderer, road_texture
+from selfdrive.sim.image_folder import ImageFolder
+from selfdrive.sim.road_look import DASH_PERIOD
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.sim.vision import Pictures
+
+FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, after which it repeats itself without a seam
+SPACING = PERIODS * DASH_PERIOD / FRAMES  # m from frame to frame: 1.342, which is 20 a second at 60 mph
+CHECK = np.dtype("<u8")  # a sum over all pixels ends the cache file
+
+Frames = Iterator[np.ndarray]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageLibrary:
+    """Frames (number x rows x width, uint8) in the order they were taken, by `model`, each `spacing` m or,
+    where that is None, 1 / `fps` s after the one before; the first follows the last.
+
+    `digest` stands for all that the frames follow from.
+    """
+
+    name: str
+    digest: str
+    model: CameraModel
+    frames: np.ndarray
+    spacing: float | None
+    fps: float | None
+
+    def frame(self, t: float, position: float) -> np.ndarray:
+        """The picture (rows x width, read-only) at time `t` (s), after `position` m."""
+        number = t * self.fps if self.spacing is None else position / self.spacing
+        return self.frames[int(number + 1e-6) % len(self.frames)]
+
+
+def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
+    """The pictures a run asks for, from the cache where they are there. ConfigError where it cannot be."""
+    cv2.setNumThreads(1)
+    cache = pictures.cache.expanduser()
+    if pictures.frames is not None:
+        return _own(ImageFolder(pictures.frames), cache)
+    return _rendered(CameraModel(), pictures.marks, seed, cache)
+
+
+def _rendered(model: CameraModel, marks: str, seed: int, cache: Path) -> ImageLibrary:
+    made_by = (camera_model, lead_picture, road_look, road_renderer, road_texture)
+    parts = [repr((marks, seed, astuple(model), FRAMES, PERIODS, cv2.__version__, np.__version__)).encode()]
+    digest = _digest(parts + [Path(module.__file__).read_bytes() for module in made_by])
+
+    def draw() -> Frames:
+        renderer = RoadRenderer(model, marks, seed, periods=PERIODS)
+        return (renderer.grey(number * SPACING) for number in range(FRAMES))
+
+    frames = cached(cache, digest, (FRAMES, model.rows, model.width), draw)
+    name = f"rendered, {marks}"
+    return ImageLibrary(name=name, digest=digest, model=model, frames=frames, spacing=SPACING, fps=None)
+
+
+def _own(folder: ImageFolder, cache: Path) -> ImageLibrary:
+    model = folder.model
+    digest = _digest([cv2.__version__.encode(), folder.digest.encode()])
+    shape = (len(folder.files), model.rows, model.width)
+    return ImageLibrary(
+        name=folder.name,
+        digest=digest,
+        model=model,
+        frames=cached(cache, digest, shape, folder.read),
+        spacing=folder.spacing,
+        fps=folder.fps,
+    )
+
+
+def cached(cache: Path, digest: str, shape: tuple[int, int, int], make: Callable[[], Frames]) -> np.ndarray:
+    """The frames `make` gives, as an array of this shape mapped from a file that is made where it is missing
+    or damaged. Processes may do so at the same time.
+    """
+    path = cache / f"frames-{digest[:32]}.npy"
+    try:
+        frames = _mapped(path, shape)
+        if frames is None:
+            cache.mkdir(parents=True, exist_ok=True)
+            _write(path, shape, make())
+            frames = _mapped(path, shape)
+    except OSError as error:
+        raise ConfigError(
+            error.strerror or str(error),
+            where=str(cache),
+            expected=f"a folder that {_size(shape) / 1e6:.0f} MB of pictures can be kept in",
+            remedy="choose another --cache",
+        ) from None
+    if frames is None:
+        raise ConfigError(
+            "pictures that change as they are written",
+            where=str(path),
+            expected="a sound file system",
+            remedy="choose another --cache",
+        )
+    return frames
+
+
+def _write(path: Path, shape: tuple[int, int, int], frames: Frames) -> None:
+    """Write all frames under another name, then give the file its own."""
+    with NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as file:
+        part = Path(file.name)
+        try:
+            header = {"descr": "|u1", "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(file, header)
+            total = 0
+            for frame in frames:
+                file.write(frame.tobytes())
+                total += _sum(frame)
+            file.write(_check(total))
+            file.close()
+            part.chmod(0o644)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def _mapped(path: Path, shape: tuple[int, int, int]) -> np.ndarray | None:
+    """The frames in that file; None where there is no such file, or not a whole one."""
+    try:
+        frames = np.load(path, mmap_mode="r", allow_pickle=False)
+        end = path.stat().st_size - CHECK.itemsize
+        with path.open("rb") as file:
+            file.seek(max(0, end))
+            check = file.read()
+    except (FileNotFoundError, ValueError, EOFError):
+        return None
+    whole = frames.shape == shape and frames.dtype == np.uint8 and frames.offset + frames.size == end
+    if not whole or check != _check(sum(map(_sum, frames))):
+        return None
+    return frames.view(np.ndarray)
+
+
+def _sum(frame: np.ndarray) -> int:
+    """A sum over the frame's bytes, taken eight at a time."""
+    flat = frame.view(np.ndarray).reshape(-1)
+    words = flat.size // CHECK.itemsize * CHECK.itemsize
+    return int(flat[:words].view(CHECK).sum()) + int(flat[words:].sum())
+
+
+def _check(total: int) -> bytes:
+    return (total % 2**64).to_bytes(CHECK.itemsize, "little")
+
+
+def _size(shape: tuple[int, int, int]) -> int:
+    return shape[0] * shape[1] * shape[2]
+
+
+def _digest(parts: list[bytes]) -> str:
+    return sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()
