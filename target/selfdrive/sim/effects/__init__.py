@@ -1,0 +1,31 @@
+"""Weather, dirt and light that come between the road and the camera's picture.
+
+Only faults put these to use: a run without a fault never imports this package. Two presets: the paper's
+effects with its parameters (PaperRain, PaperFog, PaperSnow, PaperOcclusion, and the tone changes), and
+physical ones in real units (Fog, Rain, Snow, LensMud, SunGlare, LowLight).
+"""
+
+from selfdrive.sim.effects.air import Fog
+from selfdrive.sim.effects.lens import LensMud, PaperOcclusion
+from selfdrive.sim.effects.light import LowLight, SunGlare
+from selfdrive.sim.effects.paper_weather import PaperFog, PaperRain, PaperSnow
+from selfdrive.sim.effects.precipitation import Rain, Snow
+from selfdrive.sim.effects.tone import AveragingBlur, Brightness, Contrast, GaussianBlur, MedianBlur
+
+__all__ = [
+    "AveragingBlur",
+    "Brightness",
+    "Contrast",
+    "Fog",
+    "GaussianBlur",
+    "LensMud",
+    "LowLight",
+    "MedianBlur",
+    "PaperFog",
+    "PaperOcclusion",
+    "PaperRain",
+    "PaperSnow",
+    "Rain",
+    "Snow",
+    "SunGlare",
+]

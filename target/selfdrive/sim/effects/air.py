@@ -1,0 +1,63 @@
+"""Light on its way through air: what is left of it, and the airlight that takes its place.
+
+Koschmieder's law: over a distance d through air of extinction b a share exp(-b * d) of an object's light
+arrives, and the rest is replaced by airlight, the level of the horizon. Visibility is the distance over
+which contrast falls to 5 %, so b = -ln(0.05) / visibility (meteorological optical range, WMO No. 8).
+"""
+
+from math import cos, log, sin
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.effects.effect import Effect, Scene
+
+THRESHOLD = 0.05
+LAYER = 100.0  # m: above the road there is clear sky again
+
+
+def extinction(visibility: float) -> float:
+    """Extinction coefficient (1/m) of air with this visibility (m)."""
+    return -log(THRESHOLD) / visibility
+
+
+def ways(camera: CameraModel) -> np.ndarray:
+    """Way of each pixel's light (m) through the layer of air: from the road, or from the layer's top.
+
+    Float32 (rows, width); infinite at the horizon. The road is flat, and nothing stands on it.
+    """
+    right = (np.arange(camera.width) - camera.cx) / camera.fx
+    down = ((np.arange(camera.rows) - camera.cy) / camera.fy)[:, None]
+    fall = (sin(camera.pitch) + down * cos(camera.pitch)) / np.sqrt(1.0 + right**2 + down**2)
+    with np.errstate(divide="ignore"):
+        return np.where(fall > 0.0, camera.height / fall, (LAYER - camera.height) / np.abs(fall)).astype(np.float32)
+
+
+def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
+    """Share of each pixel's light, float32, that air of this extinction coefficient (1/m) lets through."""
+    return np.exp(np.float32(-coefficient) * ways(camera))
+
+
+def airlight(picture: np.ndarray, camera: CameraModel) -> float:
+    """Grey level of the air: the mean above the horizon, or of the uppermost tenth where little is above."""
+    rows = max(int(camera.horizon), camera.rows // 10)
+    return float(picture[:rows:4, ::4].mean())
+
+
+def through_air(picture: np.ndarray, kept: np.ndarray, level: float) -> np.ndarray:
+    """The picture of which a share `kept`, float32 (rows, width), arrives, the rest being of `level`."""
+    air = np.full_like(picture, round(level))
+    return cv2.blendLinear(picture, air, kept, cv2.subtract(1.0, kept))
+
+
+class Fog(Effect):
+    """Even fog of a given visibility."""
+
+    UNIT, LEAST, MOST = "m visibility", 5.0, 20000.0
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._kept = clearness(extinction(self.amount), self.camera)
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return through_air(picture, self._kept, airlight(picture, self.camera))

@@ -1,0 +1,120 @@
+"""Too much light and too little: the sun low ahead, and dusk on a small sensor."""
+
+from math import cos, exp, pi, radians, sin, sqrt
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+
+WHITE_REFLECTANCE = 0.32  # of what daylight's exposure shows as white: asphalt of 0.12 is of level 95
+SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn between
+SUN_SIDE = radians(8.0)  # at most, to either side
+SUN_RADIUS = radians(0.27)
+ASPHALT_SLOPES = 0.25  # rms slope of its facets
+ASPHALT_MIRROR = 0.04  # reflectance at right angles, of a refractive index of 1.5
+
+ELECTRONS = 14.0  # that white light of one lux frees in a pixel in the longest exposure (10 ms)
+FULL_WELL = 10000.0
+LARGEST_GAIN = 16.0
+READ_NOISE = 5.0  # electrons
+QUANTILES = 256
+
+
+class SunGlare(Effect):
+    """The low sun ahead: light scattered in lens and windscreen, and mirrored by the road.
+
+    The amount is how much the glass scatters, as a multiple of Stiles' and Holladay's law for glare,
+    10 * illuminance / angle^2 (cd/m^2, lux, degrees). Light of sun and sky after the Illuminating
+    Engineering Society's clear sky. Where the sun stands is drawn from the seed.
+    """
+
+    UNIT, LEAST, MOST = "times the scatter of a clear eye", 0.0, 10.0
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        height = random.uniform(*SUN_HEIGHT)
+        side = random.uniform(-SUN_SIDE, SUN_SIDE)
+        sun = np.array([sin(side) * cos(height), -sin(height), cos(side) * cos(height)])
+        rays = level_rays(self.camera)
+        beam = 127500.0 * exp(-0.21 / sin(height))  # lux, across the beam
+        ground = beam * sin(height) + 800.0 + 15500.0 * sqrt(sin(height))  # lux, on the road
+        white = WHITE_REFLECTANCE * ground / pi  # cd/m^2
+        angle = np.arccos(np.clip(rays @ sun, -1.0, 1.0))
+        seen = self.amount * 10.0 * beam / np.degrees(np.maximum(angle, SUN_RADIUS)) ** 2
+        seen += mirrored(rays, sun) * beam
+        light = WHITE * seen / white + 2.0 * WHITE * (angle < SUN_RADIUS)
+        self._light = np.clip(np.rint(light), 0, WHITE).astype(np.uint8)
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return cv2.add(picture, self._light)
+
+
+def level_rays(camera: CameraModel) -> np.ndarray:
+    """Direction of each pixel's ray (rows, width, 3): right, down and ahead of a level car."""
+    right = np.broadcast_to((np.arange(camera.width) - camera.cx) / camera.fx, (camera.rows, camera.width))
+    low = np.broadcast_to(((np.arange(camera.rows) - camera.cy) / camera.fy)[:, None], right.shape)
+    down = low * cos(camera.pitch) + sin(camera.pitch)
+    ahead = cos(camera.pitch) - low * sin(camera.pitch)
+    rays = np.stack([right, down, ahead], axis=-1)
+    return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+
+def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
+    """Luminance (cd/m^2) of the sun's mirror image in rough asphalt for each lux of its beam.
+
+    Facets with Beckmann's distribution of slopes, Fresnel's reflectance after Schlick; 0 above the horizon.
+    """
+    down = np.maximum(rays[..., 1], 0.02)
+    half = sun - rays
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    upright = np.maximum(-half[..., 1], 1e-3)
+    slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
+    facets = np.exp(-slope) / (pi * ASPHALT_SLOPES**2 * upright**4)
+    mirror = ASPHALT_MIRROR + (1.0 - ASPHALT_MIRROR) * (1.0 - np.clip(half @ sun, 0.0, 1.0)) ** 5
+    # A rough surface shadows itself where it is seen or lit at a flat angle.
+    shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.clip(half @ sun, 1e-3, 1.0))
+    return np.where(rays[..., 1] > 0.0, mirror * facets * shadow / (4.0 * down), 0.0)
+
+
+class LowLight(Effect):
+    """Little light on the road, in lux: long exposure, then gain, then darkness, and the sensor's noise.
+
+    Each pixel's electrons are Poisson's (shot noise), reading them adds a Gaussian. Noise differs from
+    picture to picture; that of one moment is always the same.
+    """
+
+    UNIT, LEAST, MOST = "lux", 0.05, 100000.0
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        white = min(FULL_WELL, ELECTRONS * self.amount)
+        shown = max(white, FULL_WELL / LARGEST_GAIN)  # electrons of what is shown as white
+        self._table = np.stack([_noisy(white * level / WHITE, shown) for level in range(WHITE + 1)]).ravel()
+        rows, columns = self.camera.rows, self.camera.width
+        self._chance = random.integers(0, QUANTILES, size=(2 * rows, 2 * columns), dtype=np.uint16)
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        moment = np.random.Generator(np.random.PCG64([self.seed, round(1000.0 * abs(scene.t))]))
+        rows, columns = picture.shape
+        top, left = moment.integers(0, (rows, columns))
+        place = picture.astype(np.intp)
+        place *= QUANTILES
+        place += self._chance[top : top + rows, left : left + columns]
+        return np.take(self._table, place)
+
+
+def _noisy(electrons: float, shown: float) -> np.ndarray:
+    """Levels of a pixel with this many electrons on average, one for each quantile of its noise, uint8."""
+    spread = 8.0 * sqrt(electrons) + 10.0
+    numbers = np.arange(max(0, int(electrons - spread)), int(electrons + spread))
+    # Poisson's chances from the ratio of neighbours, relative to the first.
+    steps = np.log(max(electrons, 1e-9) / np.maximum(numbers[1:], 1))
+    chance = np.concatenate([[0.0], np.cumsum(steps)])
+    chance = np.exp(chance - chance.max())
+    reach = int(6.0 * READ_NOISE)
+    reading = np.exp(-0.5 * (np.arange(-reach, reach + 1) / READ_NOISE) ** 2)
+    summed = np.cumsum(np.convolve(chance, reading))
+    counts = np.arange(summed.size) + 0.5 + numbers[0] - reach
+    share = (np.arange(QUANTILES) + 0.5) / QUANTILES
+    values = np.interp(share, summed / summed[-1], counts)
+    return np.clip(np.rint(WHITE * values / shown), 0, WHITE).astype(np.uint8)

@@ -1,0 +1,157 @@
+"""Rain, fog and snow as the paper makes them, by `thickness` from 1 to 10.
+
+Numbers are from the paper's table of effects and its text. Where it gives a range, its mild end belongs to
+thickness 1 and its strong end to 10. What it leaves open (number of snow blocks, shape of a streak, motion)
+is settled here: streaks and flakes lie in layers, the farther ones smaller and slower, that fall across the
+screen, faster the faster the car drives, and enter again at the other side. So no picture ever holds more
+or fewer of them, and the same drop is followed from picture to picture.
+"""
+
+from math import cos, radians, sin
+
+import cv2
+import numpy as np
+
+from selfdrive.sim.effects.canvas import Tile, seamless, splat, strokes
+from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+
+PER_THICKNESS = 1000  # streaks, and blocks of snow: 10,000 at thickness 10
+STREAK_LENGTHS = 8.0, 12.0, 18.0, 26.0, 36.0  # px, far to near
+STREAK_WIDTHS = 1, 1, 2, 2, 3  # px
+STREAK_LEAN = radians(8.0)
+RAIN_SPEED = 30.0, 1.2  # lengths of a streak: in a second, and for each metre driven
+FLAKE_SPEEDS = 1.0, 1.5, 2.0, 3.0, 4.0
+SNOW_SPEED = 40.0, 4.0  # px: in a second, and for each metre driven, times the above
+FOG_SPEED = 6.0, 2.0  # px, likewise
+
+
+class _PaperWeather(Effect):
+    UNIT, LEAST, MOST = "thickness", 1.0, 10.0
+
+    def _between(self, mild: float, strong: float) -> float:
+        return mild + self.thickness * (strong - mild)
+
+    def _count(self, layer: int, layers: int) -> int:
+        """How many of this thickness lie in that layer; over all layers the sum is exact."""
+        total = round(PER_THICKNESS * self.amount)
+        return (total - layer + layers - 1) // layers
+
+
+class PaperRain(_PaperWeather):
+    """1,000 streaks for each thickness on a background that loses contrast and sharpness."""
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        alpha = self._between(0.1, 0.2)
+        self._tiles = []
+        for layer, (length, width) in enumerate(zip(STREAK_LENGTHS, STREAK_WIDTHS, strict=True)):
+            levels = self._streaks(random, layer, length, width)
+            smeared = smeared_round(levels, motion_kernel(2, 45.0))
+            self._tiles.append(Tile(to_levels(alpha * smeared)))
+
+    def _streaks(self, random: np.random.Generator, layer: int, length: float, width: int) -> np.ndarray:
+        """White streaks in random places. A falling drop wobbles: brightness varies along its streak."""
+        rows, columns = self.camera.rows, self.camera.width
+        most = PER_THICKNESS * int(self.MOST)
+        # As many numbers for any thickness: more rain holds all streaks of less.
+        column, row, phase, wobble = random.uniform(size=(4, most))[:, : self._count(layer, len(STREAK_LENGTHS))]
+        start = np.stack([columns * column, rows * row])
+        end = start + length * np.array([[-sin(STREAK_LEAN)], [cos(STREAK_LEAN)]])
+        points = int(length) + 1
+        share, across, down = strokes(start, end, np.full(column.size, points))
+        phase, wobble = np.repeat(phase, points), np.repeat(wobble, points)
+        light = 1.0 + 0.35 * np.sin(2 * np.pi * (phase + (1.0 + 2.0 * wobble) * share))
+        light *= np.sqrt(np.sin(np.pi * share)) * WHITE
+        side = np.arange(width)
+        return splat(
+            (across[:, None] + side).ravel(),
+            np.repeat(down, width),
+            np.repeat(light, width),
+            (rows, columns),
+            wrap=True,
+        )
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        sigma, alpha = self._between(0.5, 1.5), self._between(0.75, 0.65)
+        wet = cv2.convertScaleAbs(cv2.GaussianBlur(picture, (0, 0), sigma), alpha=alpha)
+        lengths = RAIN_SPEED[0] * scene.t + RAIN_SPEED[1] * scene.position
+        for tile, length in zip(self._tiles, STREAK_LENGTHS, strict=True):
+            way = length * lengths
+            wet = cv2.add(wet, tile.moved(-sin(STREAK_LEAN) * way, cos(STREAK_LEAN) * way))
+        return wet
+
+
+class PaperFog(_PaperWeather):
+    """Uniform noise, blurred to droplets, on a background that loses contrast."""
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._haze = haze(random, self.camera.rows, self.camera.width, self.amount / self.MOST, self.thickness)
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return hazed(picture, self._haze, self._between(0.9, 0.4), scene)
+
+
+class PaperSnow(_PaperWeather):
+    """The fog's haze, and before it 1,000 falling white blocks of 2 x 2 pixels for each thickness."""
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        rows, columns = self.camera.rows, self.camera.width
+        self._haze = haze(random, rows, columns, self.amount / self.MOST, self.thickness)
+        sigma, kernel = self._between(0.5, 1.5), motion_kernel(5, 75.0)
+        self._tiles = []
+        for layer in range(len(FLAKE_SPEEDS)):
+            smeared = smeared_round(self._blocks(random, layer), kernel)
+            self._tiles.append(Tile(to_levels(blurred_round(smeared, sigma))))
+
+    def _blocks(self, random: np.random.Generator, layer: int) -> np.ndarray:
+        rows, columns = self.camera.rows, self.camera.width
+        most = PER_THICKNESS * int(self.MOST)
+        places = random.integers(0, rows * columns, size=most)[: self._count(layer, len(FLAKE_SPEEDS))]
+        white = np.zeros(rows * columns, dtype=np.float32)
+        white[places] = WHITE
+        white = white.reshape(rows, columns)
+        return np.maximum.reduce([np.roll(white, (down, right), (0, 1)) for down in (0, 1) for right in (0, 1)])
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        snow = hazed(picture, self._haze, self._between(0.9, 0.4), scene)
+        pixels = SNOW_SPEED[0] * scene.t + SNOW_SPEED[1] * scene.position
+        for tile, speed in zip(self._tiles, FLAKE_SPEEDS, strict=True):
+            way = speed * pixels
+            snow = cv2.add(snow, tile.moved(-cos(radians(75.0)) * way, sin(radians(75.0)) * way))
+        return snow
+
+
+def haze(random: np.random.Generator, rows: int, columns: int, density: float, thickness: float) -> Tile:
+    """Noise of 0 to 255 in a share `density` of all pixels, blurred by 5 to 7 pixels; it repeats seamlessly."""
+    there, level = random.uniform(size=(2, rows, columns)).astype(np.float32)
+    noise = np.where(there < density, WHITE * level, 0.0).astype(np.float32)
+    return Tile(to_levels(blurred_round(noise, 5.0 + 2.0 * thickness)))
+
+
+def hazed(picture: np.ndarray, droplets: Tile, contrast: float, scene: Scene) -> np.ndarray:
+    """The picture with its contrast reduced, and the droplets, drifting slowly, added."""
+    down = FOG_SPEED[0] * scene.t + FOG_SPEED[1] * scene.position
+    return cv2.addWeighted(picture, contrast, droplets.moved(0.3 * down, down), 1.0, 0.0)
+
+
+def blurred_round(levels: np.ndarray, sigma: float) -> np.ndarray:
+    """A Gaussian blur of a tile that repeats."""
+    return seamless(levels, int(4 * sigma) + 1, lambda wide: cv2.GaussianBlur(wide, (0, 0), sigma))
+
+
+def smeared_round(levels: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    """A smear of a tile that repeats."""
+    return seamless(levels, len(kernel), lambda wide: cv2.filter2D(wide, -1, kernel))
+
+
+def motion_kernel(length: int, degrees: float) -> np.ndarray:
+    """The smear of a point that moves `length` pixels at this angle, counted from the row, counter-clockwise."""
+    way = np.linspace(-0.5, 0.5, 16 * length) * (length - 1)
+    middle = length // 2 + 1
+    columns, rows = middle + way * cos(radians(degrees)), middle - way * sin(radians(degrees))
+    size = 2 * middle + 1
+    return splat(columns, rows, np.full(way.size, 1.0 / way.size), (size, size), wrap=False)
+
+
+def to_levels(levels: np.ndarray) -> np.ndarray:
+    """Rounded and limited to grey levels."""
+    return np.clip(np.rint(levels), 0, WHITE).astype(np.uint8)

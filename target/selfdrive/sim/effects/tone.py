@@ -1,0 +1,71 @@
+"""Contrast, brightness and blur, as the paper takes them from DeepTest (Tian and others, 2018)."""
+
+import cv2
+import numpy as np
+
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+
+
+class _Tone(Effect):
+    """A change of every grey level by itself."""
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return cv2.LUT(picture, self._levels)
+
+    def _set(self, levels: np.ndarray) -> None:
+        self._levels = np.clip(np.rint(levels), 0, WHITE).astype(np.uint8)
+
+
+class Contrast(_Tone):
+    """Every level multiplied by a gain; what exceeds white is white. The paper's gains: 1.2 to 3.0."""
+
+    UNIT, LEAST, MOST = "gain", 0.0, 10.0
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._set(self.amount * np.arange(WHITE + 1))
+
+
+class Brightness(_Tone):
+    """A bias added to every level. The paper's: 10 to 100."""
+
+    UNIT, LEAST, MOST = "grey levels", -255.0, 255.0
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._set(self.amount + np.arange(WHITE + 1))
+
+
+class AveragingBlur(Effect):
+    """The mean of a square. The paper's kernels: 3, 4, 5, 6."""
+
+    UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return cv2.blur(picture, (int(self.amount), int(self.amount)))
+
+
+class _OddKernel(Effect):
+    """A blur whose kernel has a middle."""
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        if self.amount % 2 != 1:
+            name, expected = type(self).__name__, f"an odd number of {self.UNIT}"
+            raise ConfigError(f"{name}: amount {self.amount:g}", expected=expected, remedy="correct the amount")
+
+
+class GaussianBlur(_OddKernel):
+    """A Gaussian in a square kernel, its width chosen by the kernel's. The paper's kernels: 3, 5, 7."""
+
+    UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return cv2.GaussianBlur(picture, (int(self.amount), int(self.amount)), 0)
+
+
+class MedianBlur(_OddKernel):
+    """The median of a square. The paper's apertures: 3 and 5."""
+
+    UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return cv2.medianBlur(picture, int(self.amount))
