@@ -89,17 +89,10 @@ def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[T
 
     fill([(near, left, 0.0), (near, right, 0.0), (far, right, 0.0), (far, left, 0.0)], dark)
     if right > 0.0 or left < 0.0:  # beside us: we see its flank
-        y = right if right > 0.0 else left
+        y, roof = (right, right + 0.2) if right > 0.0 else (left, left - 0.2)
         fill([(near, y, waist), (far, y, waist), (far, y, floor_z), (near, y, floor_z)], flank)
-        fill(
-            [
-                (near + 0.5, y, car.height),
-                (far - 1.3, y, car.height),
-                (far - 0.5, y, waist),
-                (near, y, waist),
-            ],
-            glass,
-        )
+        top = [(near + 0.5, roof, car.height), (far - 1.5, roof, car.height)]
+        fill([*top, (far - 0.7, y, waist), (near, y, waist)], glass)
     for inner, outer in ((left - 0.24, left), (right + 0.24, right)):
         back(outer, inner, 0.0, 1.2 * floor_z, dark)
     back(left, right, floor_z, waist, body)

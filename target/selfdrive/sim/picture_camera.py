@@ -5,6 +5,8 @@ A frame was taken in the lane's middle, along the road. Seen from `offset` m fur
 on the road. What is above the horizon only pans. Where the frame ends, its last pixel is repeated.
 """
 
+from math import tan
+
 import cv2
 import numpy as np
 
@@ -25,8 +27,8 @@ SHIFT_DISTANCE = 10.0  # m ahead where a shift of the whole frame is right
 class PictureCamera:
     """Takes the view's geometry from `geometry` and its picture from `library`.
 
-    `translation` is "ground", as above, or "shift": the frame moves sideways as a whole, by what the offset
-    is at 10 m, and does not follow the heading.
+    `translation` is "ground", as above, or "shift": the frame moves sideways as a whole, as far as the lane
+    has moved SHIFT_DISTANCE ahead.
     """
 
     def __init__(self, geometry: Camera, library: ImageLibrary, translation: str) -> None:
@@ -77,9 +79,10 @@ class ShiftedView:
         self._pixels_per_metre = 1.0 / model.metres_per_pixel(model.row(SHIFT_DISTANCE))
 
     def seen(self, frame: np.ndarray, offset: float, heading: float) -> np.ndarray:
-        """The frame (rows x width) as seen `offset` m further left; `heading` has no effect."""
+        """The frame (rows x width) as seen `offset` m further left (m), turned left by `heading` (rad)."""
+        away = offset + SHIFT_DISTANCE * tan(heading)
         picture = np.empty_like(frame)
-        moved(frame, round(offset * self._pixels_per_metre), picture)
+        moved(frame, round(away * self._pixels_per_metre), picture)
         return picture
 
 

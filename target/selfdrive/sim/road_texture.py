@@ -17,7 +17,8 @@ ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * HALF_WIDTH / COL
 TILE_PERIODS = 3  # the finest texture repeats itself, which no camera can tell
 TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: where wheels roll in a lane
 KERB_WIDTH = 0.25  # m
-WEAR_GRAIN = 6  # rows and columns that flake off together
+FLAKE_ROWS, FLAKE_COLUMNS = 3, 3  # about what flakes off together
+VERGE_GRAIN = 3.0  # how much coarser the verge looks than the road
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +71,11 @@ def lines(look: Look) -> tuple[tuple[float, Paint | None], ...]:
     return (3 * half, look.far_left), (half, look.left), (-half, look.right), (-3 * half, look.far_right)
 
 
+def _edge(look: Look) -> float:
+    """Distance (m) from the lane's middle to where the shoulder ends."""
+    return 1.5 * look.lane_width + look.shoulder_width
+
+
 def _lateral() -> np.ndarray:
     """y (m) of the columns' middles."""
     return HALF_WIDTH - (np.arange(COLUMNS) + 0.5) * COLUMN_WIDTH
@@ -78,7 +84,7 @@ def _lateral() -> np.ndarray:
 def _profile(look: Look) -> np.ndarray:
     """Tone of the bare ground across the road."""
     y = _lateral()
-    paved, edge = 1.5 * look.lane_width, 1.5 * look.lane_width + look.shoulder_width
+    paved, edge = 1.5 * look.lane_width, _edge(look)
     tone = np.where(np.abs(y) < paved + 0.15, look.asphalt, look.shoulder)
     tone[np.abs(y) > edge] = look.verge
     if look.kerb is not None:
@@ -93,7 +99,8 @@ def _ground(look: Look, periods: int, rng: np.random.Generator) -> np.ndarray:
     """Verge, shoulder and asphalt with their texture."""
     tile_periods = min(TILE_PERIODS, periods)
     fine = rng.standard_normal((tile_periods * ROWS_PER_PERIOD, COLUMNS), dtype=np.float32)
-    fine = _profile(look) + look.grain * 2.0 * cv2.blur(fine, (2, 2), borderType=cv2.BORDER_REFLECT)
+    coarser = np.where(np.abs(_lateral()) > _edge(look), VERGE_GRAIN, 1.0).astype(np.float32)
+    fine = _profile(look) + 2.0 * look.grain * coarser * cv2.blur(fine, (2, 2), borderType=cv2.BORDER_REFLECT)
     slow = look.mottle * rng.standard_normal((periods * 6, 24), dtype=np.float32)
     texels = np.empty((periods * ROWS_PER_PERIOD, COLUMNS), np.uint8)
     for k in range(periods):
@@ -166,7 +173,7 @@ def _dashes(rows: int, paint: Paint) -> np.ndarray:
 def _flakes(shape: tuple[int, int], share: float, rng: np.random.Generator) -> np.ndarray:
     """1 where paint has come off, which is that share of the area, 0 elsewhere, soft between."""
     rows, columns = shape
-    spots = rng.standard_normal((rows // WEAR_GRAIN + 2, columns // 3 + 2), dtype=np.float32)
+    spots = rng.standard_normal((rows // FLAKE_ROWS + 2, columns // FLAKE_COLUMNS + 2), dtype=np.float32)
     spots = cv2.resize(cv2.GaussianBlur(spots, (0, 0), 0.8), (columns, rows))
     limit = np.quantile(spots[:: max(1, rows // 2000)], 1.0 - share)
     return np.clip((spots - limit) * 12.0 + 0.5, 0.0, 1.0)
@@ -181,10 +188,12 @@ def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
     noise += 0.25 * cv2.GaussianBlur(rng.standard_normal(noise.shape, dtype=np.float32), (0, 0), 0.7)
     noise = noise[small[0] : 2 * small[0]]
     limit = np.quantile(noise, 1.0 - look.shadows)
+    # What lies beyond the strip repeats its edge: no shadow may reach that far.
+    depth = look.shadow_depth * np.clip(HALF_WIDTH - 0.5 - np.abs(_lateral()), 0.0, 1.0).astype(np.float32)
     for k in range(rows // ROWS_PER_PERIOD):
         part = texels[k * ROWS_PER_PERIOD : (k + 1) * ROWS_PER_PERIOD]
         shade = _enlarged(noise, k, rows // ROWS_PER_PERIOD)
-        part[:] = part * (1.0 - look.shadow_depth * np.clip((shade - limit) * 12.0, 0.0, 1.0))
+        part[:] = part * (1.0 - depth * np.clip((shade - limit) * 12.0, 0.0, 1.0))
 
 
 def _enlarged(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
