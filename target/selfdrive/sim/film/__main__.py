@@ -1,0 +1,54 @@
+"""Shows the films of two runs side by side: `python -m selfdrive.sim.film --golden DIR --faulty DIR ...`.
+
+A video for `--out` .mp4 or .gif, a still picture of the moment `--at` for .png. Exit code 2 for wrong input.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film.encode import write_still, write_video
+from selfdrive.sim.film.reel import read_reel
+from selfdrive.sim.film.sheet import Sheet, read_events
+
+EXIT_INPUT = 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = _parse(arguments)
+    cv2.setNumThreads(1)
+    try:
+        sheet = Sheet(read_reel(options.golden), read_reel(options.faulty), read_events(options.events))
+        if options.at is not None:
+            write_still(sheet.draw(sheet.nearest(options.at)), options.out)
+        else:
+            write_video((sheet.draw(index) for index in range(sheet.count)), options.out)
+    except ConfigError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_INPUT
+    return 0
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="selfdrive.sim.film", description="Show the films of two runs side by side."
+    )
+    parser.add_argument(
+        "--golden", type=Path, required=True, metavar="DIR", help="film of the fault-free run"
+    )
+    parser.add_argument("--faulty", type=Path, required=True, metavar="DIR", help="film of the other run")
+    parser.add_argument("--events", type=Path, required=True, metavar="FILE", help="title and marks, JSON")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help=".mp4, .gif, or .png with --at"
+    )
+    parser.add_argument("--at", type=float, metavar="T", help="one still picture, of this time in s")
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,104 @@
+"""The road from above, ahead to the right: where car and lead are, and where the controller sees them."""
+
+from math import cos, isfinite, sin
+
+import cv2
+import numpy as np
+
+from selfdrive.sim.camera import LANE_WIDTH
+from selfdrive.sim.film import pen
+from selfdrive.sim.film.recorder import KNOTS
+from selfdrive.sim.film.reel import Frame, SeenLine
+from selfdrive.sim.hazards import CAR_WIDTH
+from selfdrive.sim.lead_picture import LENGTH
+
+ROAD = (84, 78, 74)
+PAINT = (205, 205, 205)
+YELLOW = (70, 180, 215)
+VERGE = (52, 66, 50)
+LEAD_BODY = (92, 78, 168)
+BEHIND = 8.0  # m of the road behind the car's front that are shown
+SHOULDER = 0.7  # m
+DASH, PERIOD = 3.05, 12.2  # m; of the far lines, so that one sees the car drive
+LINE_WIDTH, FAR_LINE_WIDTH = 2, 1  # pixels
+
+
+class BirdsEye:
+    """Draws frames into strips of `width` x `height` pixels, which three lanes fill; the car has `colour`."""
+
+    def __init__(self, width: int, height: int, colour: pen.Colour) -> None:
+        self._size, self._colour = (width, height), colour
+        self._scale = height / (3.0 * LANE_WIDTH + 2.0 * (SHOULDER + 0.3))
+        self.ahead = width / self._scale - BEHIND  # m that are shown
+
+    def draw(self, frame: Frame) -> np.ndarray:
+        """The strip of a frame, BGR."""
+        strip = np.full((self._size[1], self._size[0], 3), VERGE, np.uint8)
+        self._draw_road(strip, frame.position)
+        if frame.lines:
+            self._draw_seen(strip, frame)
+        if frame.d_rel is not None:
+            self._draw_car(strip, frame.d_rel + LENGTH, 0.0, 0.0, LEAD_BODY)
+        self._draw_car(strip, 0.0, frame.offset, frame.heading, self._colour)
+        self._draw_distances(strip, frame)
+        return strip
+
+    def _draw_road(self, strip: np.ndarray, position: float) -> None:
+        edge = 1.5 * LANE_WIDTH + SHOULDER
+        ends = np.array([-BEHIND, self.ahead])
+        pen.fill(strip, self._places([*ends, *ends[::-1]], [edge, edge, -edge, -edge]), ROAD)
+        half = 0.5 * LANE_WIDTH
+        for y, colour in ((half, YELLOW), (-half, PAINT)):
+            pen.stroke(strip, self._places(ends, [y, y]), colour, LINE_WIDTH)
+        first = -((position - BEHIND) % PERIOD) - BEHIND
+        for y in (3.0 * half, -3.0 * half):
+            for start in np.arange(first, self.ahead, PERIOD):
+                pen.stroke(strip, self._places([start, start + DASH], [y, y]), PAINT, FAR_LINE_WIDTH)
+
+    def _draw_seen(self, strip: np.ndarray, frame: Frame) -> None:
+        """Lines and path as seen, beside the true lane: the road is drawn straight, whatever its bends."""
+        for name, line in frame.lines.items():
+            if not isfinite(line.prob) or line.prob <= 0.0 or not np.isfinite(line.y).all():
+                continue
+            y = np.array(line.y) - frame.bend - frame.middle
+            colour = pen.PATH if name == "path" else _line_colour(line)
+            pen.stroke(strip, self._places(KNOTS, y), colour, 1 if name == "path" else 2)
+
+    def _draw_car(
+        self, strip: np.ndarray, front: float, offset: float, heading: float, colour: pen.Colour
+    ) -> None:
+        """A car whose front bumper is at `front` m, with its windscreen, which tells where it goes."""
+        for x, y, tone in (
+            ([0.0, 0.0, -LENGTH, -LENGTH], 1.0, colour),
+            ([-1.2, -1.2, -1.9, -1.9], 0.8, pen.PAPER),
+        ):
+            along = np.array(x)
+            across = 0.5 * CAR_WIDTH * y * np.array([1.0, -1.0, -1.0, 1.0])
+            c, s = cos(heading), sin(heading)
+            pen.fill(
+                strip, self._places(front + along * c - across * s, offset + along * s + across * c), tone
+            )
+
+    def _draw_distances(self, strip: np.ndarray, frame: Frame) -> None:
+        """Where radar and camera have the lead: a pin each beside the lane."""
+        for name, distance, colour, side in (
+            ("radar", frame.radar, pen.FAULTY, 1.0),
+            ("camera", frame.camera_lead if frame.d_rel is not None else None, pen.DOUBTED, -1.0),
+        ):
+            if distance is None or not 0.0 < distance < self.ahead:
+                continue
+            ends = self._places([distance, distance], [0.0, side * 2.4])
+            pen.stroke(strip, ends, colour, 1)
+            column, row = ends[1].astype(int).tolist()
+            cv2.circle(strip, (column, row), 3, colour, cv2.FILLED, cv2.LINE_AA)
+            pen.write(strip, f"{name} {distance:.1f} m", (column + 7, row + 4), colour, pen.SMALL)
+
+    def _places(self, x: object, y: object) -> np.ndarray:
+        """Points `x` m ahead and `y` m left of the lane's middle, in the strip."""
+        columns = (np.asarray(x, float) + BEHIND) * self._scale
+        rows = 0.5 * self._size[1] - np.asarray(y, float) * self._scale
+        return np.stack([columns, rows], axis=1)
+
+
+def _line_colour(line: SeenLine) -> pen.Colour:
+    return pen.SEEN if line.prob >= 0.5 else pen.DOUBTED

@@ -1,0 +1,150 @@
+"""What the camera showed, with the lines, path and lead that were seen drawn in."""
+
+from math import cos, isfinite, sin
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.film import pen
+from selfdrive.sim.film.recorder import KNOTS
+from selfdrive.sim.film.reel import Frame, SeenLine
+from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FURTHEST, NEAREST, draw_lead
+from selfdrive.sim.road_renderer import RoadRenderer
+
+LINE_HALF, PATH_HALF = 0.06, 0.8  # m; half the width at which they are drawn
+DOUBTFUL = 0.5  # lines of a lower probability are drawn as doubted
+CAR_HALF, CAR_HEIGHT = 1.0, 1.55  # m; of the frame around the lead
+FRAME_MARGIN = 4  # pixels
+WRONG_DISTANCE = 2.0  # m between a lead and where the camera's message has it, to be worth a frame
+
+
+class CameraPane:
+    """Draws frames of one camera into panes of `width` x `height` pixels."""
+
+    def __init__(self, model: CameraModel, width: int, height: int) -> None:
+        self._model, self._width = model, width
+        self._scale = width / model.width
+        self._top = height - round(model.rows * self._scale)  # row at which the picture begins; it may be < 0
+        self._road = RoadRenderer(model, "solid", 0)
+        near = max(0.0, model.distance(model.rows - 1.0))
+        self._x = np.concatenate([[near], np.arange(np.ceil(near + 0.1), KNOTS[-1] + 1.0)])
+
+    def draw(self, frame: Frame) -> np.ndarray:
+        """The pane of a frame, BGR."""
+        pane = self._fitted(self._picture(frame))
+        if frame.lines:
+            self._draw_path(pane, frame.lines["path"])
+            for name in ("left", "right"):
+                self._draw_line(pane, frame.lines[name])
+        self._draw_leads(pane, frame)
+        return pane
+
+    def _picture(self, frame: Frame) -> np.ndarray:
+        """The grey picture that the detector had, or, without one, the road in colour; with the lead."""
+        grey = frame.image()
+        if grey is None:
+            picture = self._road.colour(frame.position, -frame.middle, frame.heading)
+            picture = self._bent(picture, frame)
+        else:
+            picture = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+        if frame.d_rel is not None:
+            turn = -self._sideways(frame, frame.d_rel) / max(frame.d_rel, NEAREST)
+            draw_lead(picture, self._model, frame.d_rel, -frame.middle, turn)
+        return picture
+
+    def _bent(self, picture: np.ndarray, frame: Frame) -> np.ndarray:
+        """A straight road's picture with each row shifted as the road bends there."""
+        model = self._model
+        bend = np.array(frame.bend) + np.tan(frame.heading) * np.array(KNOTS)
+        if np.allclose(bend, 0.0, atol=1e-6):
+            return picture
+        rows = np.arange(model.rows)
+        below = np.maximum(rows - model.horizon, 1.0)
+        depth = model.height * model.fy / (below * cos(model.pitch))
+        x = np.maximum((depth - model.height * sin(model.pitch)) / cos(model.pitch), 0.0)
+        beyond = np.maximum(x - KNOTS[-1], 0.0) * (bend[-1] - bend[-2]) / (KNOTS[-1] - KNOTS[-2])
+        shift = model.fx * (np.interp(x, KNOTS, bend) + beyond) / depth
+        columns = np.arange(model.width)[None, :] + shift[:, None]
+        lines = np.broadcast_to(rows[:, None], columns.shape)
+        return cv2.remap(
+            picture,
+            columns.astype(np.float32),
+            lines.astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+
+    def _fitted(self, picture: np.ndarray) -> np.ndarray:
+        """The picture at the pane's width, its foot at the pane's."""
+        width = self._width
+        rows = round(self._model.rows * self._scale)
+        scaled = cv2.resize(picture, (width, rows), interpolation=cv2.INTER_LINEAR)
+        if self._top <= 0:
+            return np.ascontiguousarray(scaled[-self._top :])
+        return np.concatenate([np.full((self._top, width, 3), pen.PANEL, np.uint8), scaled])
+
+    def _draw_path(self, pane: np.ndarray, path: SeenLine) -> None:
+        if _drawable(path):
+            pen.glaze(pane, self._strip(path, PATH_HALF), pen.PATH, 0.12 + 0.2 * path.prob)
+
+    def _draw_line(self, pane: np.ndarray, line: SeenLine) -> None:
+        if _drawable(line) and line.prob > 0.0:
+            colour = pen.SEEN if line.prob >= DOUBTFUL else pen.DOUBTED
+            pen.glaze(pane, self._strip(line, LINE_HALF), colour, 0.8)
+
+    def _draw_leads(self, pane: np.ndarray, frame: Frame) -> None:
+        """A frame around the lead with its distance, and one where the camera's message has it instead."""
+        told = frame.camera_lead
+        if frame.d_rel is not None:
+            self._frame_lead(pane, frame, frame.d_rel, pen.INK, f"{frame.d_rel:.1f} m")
+        wrong = told is not None and isfinite(told) and frame.d_rel is not None
+        if wrong and abs(told - frame.d_rel) > WRONG_DISTANCE:
+            self._frame_lead(pane, frame, told, pen.DOUBTED, f"seen at {told:.1f} m")
+
+    def _frame_lead(
+        self, pane: np.ndarray, frame: Frame, distance: float, colour: pen.Colour, label: str
+    ) -> None:
+        x = distance + CAMERA_TO_BUMPER
+        if not NEAREST <= x <= FURTHEST:
+            return
+        y = frame.middle + self._sideways(frame, distance)
+        corners = [(x, y + CAR_HALF, CAR_HEIGHT), (x, y - CAR_HALF, 0.0)]
+        left, top, right, bottom = (
+            round(part) for corner in corners for part in self._in_pane(*self._model.project(*corner))
+        )
+        left, top, right, bottom = left - FRAME_MARGIN, top - FRAME_MARGIN, right + FRAME_MARGIN, bottom + 2
+        arm = max(4, (right - left) // 4)
+        for at, way in ((left, 1), (right, -1)):
+            for end in (top, bottom):
+                up = arm if end == top else -arm
+                shape = np.array([(at + way * arm, end), (at, end), (at, end + up)], float)
+                pen.stroke(pane, shape, colour, 1)
+        pen.write(pane, label, (right + 6, top + 8), colour, pen.SMALL)
+
+    def _sideways(self, frame: Frame, distance: float) -> float:
+        """How far (m) the lane has moved to the left in view where the lead is."""
+        beyond = max(0.0, distance - KNOTS[-1]) * (frame.bend[-1] - frame.bend[-2]) / (KNOTS[-1] - KNOTS[-2])
+        return float(np.interp(distance, KNOTS, frame.bend)) + beyond
+
+    def _strip(self, line: SeenLine, half: float) -> np.ndarray:
+        """The outline of a strip of the road along a line."""
+        y = np.interp(self._x, KNOTS, line.y)
+        sides = [self._seen_at(self._x, y + half), self._seen_at(self._x, y - half)[::-1]]
+        return np.concatenate(sides)
+
+    def _seen_at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Where in the pane points (x, y) of the road are."""
+        model = self._model
+        depth = x * cos(model.pitch) + model.height * sin(model.pitch)
+        row = model.horizon + model.fy * model.height / (depth * cos(model.pitch))
+        return np.stack(self._in_pane(model.cx - model.fx * y / depth, row), axis=1)
+
+    def _in_pane(self, column: float, row: float) -> tuple[float, float]:
+        """Where a place of the picture is in the pane."""
+        return (column + 0.5) * self._scale - 0.5, (row + 0.5) * self._scale - 0.5 + self._top
+
+
+def _drawable(line: SeenLine) -> bool:
+    """Faults may make anything of a line."""
+    return isfinite(line.prob) and bool(np.isfinite(line.y).all())

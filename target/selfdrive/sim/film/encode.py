@@ -1,0 +1,98 @@
+"""Writes pictures as a video: H.264 or VP9 in an .mp4, or an animated .gif."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from selfdrive.common.errors import ConfigError
+
+PICTURES_PER_S = 20
+GIF_EVERY = 4  # of the pictures are left out in a GIF, whose files grow large
+GIF_WIDTH = 800
+GIF_COLOURS = 128
+H264 = {"crf": "22", "preset": "veryfast"}
+VP9 = cv2.VideoWriter.fourcc(*"vp09")  # what browsers play of all that OpenCV's own library can write
+
+
+def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
+    """Write BGR pictures of one size, a twentieth of a second each, to `path`. Raises ConfigError."""
+    writers: dict[str, Callable[[Iterable[np.ndarray], Path], None]] = {
+        ".mp4": _write_mp4,
+        ".gif": _write_gif,
+    }
+    if path.suffix not in writers:
+        raise ConfigError(
+            f"a video {path.name}",
+            expected=f"a name that ends in {' or '.join(writers)}",
+            remedy="choose another --out",
+        )
+    _check_writable(path)
+    writers[path.suffix](pictures, path)
+
+
+def write_still(picture: np.ndarray, path: Path) -> None:
+    """Write one BGR picture to `path`, a .png. Raises ConfigError."""
+    if path.suffix != ".png":
+        raise ConfigError(
+            f"a still {path.name}", expected="a name that ends in .png", remedy="choose another --out"
+        )
+    _check_writable(path)
+    cv2.imwrite(str(path), picture)
+
+
+def _check_writable(path: Path) -> None:
+    """Find out before the work is done."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    except OSError as error:
+        raise ConfigError(
+            str(error.strerror), where=str(path), expected="a writable file", remedy="choose another --out"
+        ) from None
+
+
+def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
+    """With PyAV H.264, which all players know; without it VP9, twenty times as slow, which browsers know."""
+    try:
+        import av
+    except ImportError:
+        _write_vp9(pictures, path)
+        return
+    with av.open(str(path), "w", options={"movflags": "faststart"}) as file:
+        stream = None
+        for picture in pictures:
+            if stream is None:
+                stream = file.add_stream("libx264", rate=PICTURES_PER_S, options=H264)
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt = "yuv420p"
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
+        if stream is not None:
+            file.mux(stream.encode())
+
+
+def _write_vp9(pictures: Iterable[np.ndarray], path: Path) -> None:
+    writer = cv2.VideoWriter()
+    for picture in pictures:
+        if not writer.isOpened():
+            rows, columns = picture.shape[:2]
+            writer.open(str(path), cv2.CAP_FFMPEG, VP9, float(PICTURES_PER_S), (columns, rows))
+        writer.write(picture)
+    writer.release()
+
+
+def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
+    """Smaller and with fewer pictures; colours from one palette, so that what stands still costs nothing."""
+    from PIL import Image
+
+    small = []
+    for index, picture in enumerate(pictures):
+        if index % GIF_EVERY == 0:
+            rows = round(picture.shape[0] * GIF_WIDTH / picture.shape[1])
+            scaled = cv2.resize(picture, (GIF_WIDTH, rows), interpolation=cv2.INTER_AREA)
+            small.append(Image.fromarray(cv2.cvtColor(scaled, cv2.COLOR_BGR2RGB)))
+    palette = small[len(small) // 2].quantize(GIF_COLOURS, method=Image.Quantize.MEDIANCUT)
+    indexed = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in small]
+    duration = round(1000 * GIF_EVERY / PICTURES_PER_S)
+    indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=duration, loop=0, optimize=False)

@@ -1,0 +1,88 @@
+"""Colours, words and smooth shapes of a film's sheet. Colours are BGR, places (x, y) pixels."""
+
+import cv2
+import numpy as np
+
+Colour = tuple[int, int, int]
+
+PAPER = (28, 24, 21)
+PANEL = (40, 35, 31)
+RULE = (74, 66, 60)
+DIM = (160, 150, 142)
+INK = (238, 234, 230)
+GOLDEN = (224, 160, 76)  # blue and vermilion: told apart by colour-blind people and in grey
+FAULTY = (62, 122, 240)
+SEEN = (120, 232, 96)  # lane lines, as detected
+DOUBTED = (60, 190, 250)  # the same, with a low probability
+PATH = (190, 200, 70)
+TRIGGER = (200, 196, 192)
+MANIFESTED = (150, 190, 60)
+ALERT = (40, 178, 245)
+HAZARD = (62, 52, 225)
+
+SMALL, NORMAL, LARGE = 0.42, 0.5, 0.66  # of text
+SHIFT = 4  # fractional bits of the coordinates OpenCV draws at
+FAR = 1 << 14  # pixels; what is further out is drawn from there
+
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+def write(
+    canvas: np.ndarray,
+    text: str,
+    at: tuple[int, int],
+    colour: Colour = INK,
+    size: float = NORMAL,
+    *,
+    bold: bool = False,
+) -> None:
+    """Text whose base line begins at `at`."""
+    cv2.putText(canvas, text, at, _FONT, size, colour, 2 if bold else 1, cv2.LINE_AA)
+
+
+def width(text: str, size: float = NORMAL, *, bold: bool = False) -> int:
+    """How wide `write` would draw it."""
+    (columns, _), _ = cv2.getTextSize(text, _FONT, size, 2 if bold else 1)
+    return columns
+
+
+def shortened(text: str, room: int, size: float = NORMAL, *, bold: bool = False) -> str:
+    """The text, or as much of its beginning as fits into `room` pixels."""
+    if width(text, size, bold=bold) <= room:
+        return text
+    while text and width(text + "...", size, bold=bold) > room:
+        text = text[:-1]
+    return text.rstrip() + "..."
+
+
+def chip(canvas: np.ndarray, text: str, at: tuple[int, int], fill: Colour, ink: Colour = PAPER) -> None:
+    """Bold text on a filled box with its upper left corner at `at`."""
+    x, y = at
+    cv2.rectangle(canvas, at, (x + width(text, bold=True) + 16, y + 22), fill, cv2.FILLED)
+    write(canvas, text, (x + 8, y + 16), ink, bold=True)
+
+
+def chip_width(text: str) -> int:
+    """How wide `chip` would draw it."""
+    return width(text, bold=True) + 16
+
+
+def fill(canvas: np.ndarray, points: np.ndarray, colour: Colour) -> None:
+    """A filled polygon; `points` is n x 2."""
+    cv2.fillPoly(canvas, [_fixed(points)], colour, cv2.LINE_AA, SHIFT)
+
+
+def stroke(canvas: np.ndarray, points: np.ndarray, colour: Colour, thickness: int = 1) -> None:
+    """A line through `points`, n x 2."""
+    cv2.polylines(canvas, [_fixed(points)], False, colour, thickness, cv2.LINE_AA, SHIFT)
+
+
+def glaze(canvas: np.ndarray, points: np.ndarray, colour: Colour, share: float) -> None:
+    """A filled polygon that covers what is beneath by `share`."""
+    layer = canvas.copy()
+    fill(layer, points, colour)
+    cv2.addWeighted(layer, share, canvas, 1.0 - share, 0.0, dst=canvas)
+
+
+def _fixed(points: np.ndarray) -> np.ndarray:
+    return np.round(np.clip(points, -FAR, FAR) * (1 << SHIFT)).astype(np.int32)

@@ -1,0 +1,170 @@
+"""One picture of a film of two runs: golden on the left, faulty on the right, their story beneath."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from selfdrive.common.conversions import MPH_TO_MS
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film import pen
+from selfdrive.sim.film.birds_eye import BirdsEye
+from selfdrive.sim.film.camera_pane import CameraPane
+from selfdrive.sim.film.reel import Frame, Reel
+from selfdrive.sim.film.timeline import Mark, Timeline
+from selfdrive.sim.recorder import COUNTED_ALERTS
+
+SCHEMA = "film-events/1"
+WIDTH, HEIGHT = 1280, 720
+MARGIN = 8
+HEADING = 42
+PANE = 628, 404
+CAPTION = 26
+STRIP = 104
+CAPTION_COLUMNS = (0, 104, 204, 330, 468)  # pixels; of the words under a pane
+OUTCOMES = {"hazard": pen.HAZARD, "sdc": pen.ALERT, "masked": pen.MANIFESTED}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Events:
+    """What the harness knows of the faulty run. Times in s; `active` spans its activations, if there were.
+
+    `names` are short words on hazards, by their id.
+    """
+
+    title: str
+    outcome: str
+    active: tuple[float, float] | None
+    marks: tuple[Mark, ...]
+    names: dict[str, str]
+
+
+def read_events(path: Path) -> Events:
+    """The events in a JSON file. Raises ConfigError for any other file."""
+    try:
+        data = json.loads(path.read_text())
+        if data["schema"] != SCHEMA:
+            raise ValueError(f"schema {data['schema']}")
+        return Events(
+            title=data["title"],
+            outcome=data["outcome"],
+            active=tuple(data["active"]) if data["active"] else None,
+            marks=tuple(Mark(**mark) for mark in data["marks"]),
+            names=data["names"],
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(
+            f"no events ({error})", where=str(path), expected=f"a {SCHEMA} file", remedy="correct --events"
+        ) from None
+
+
+class Sheet:
+    """Draws the sheet of any moment of two films."""
+
+    def __init__(self, golden: Reel, faulty: Reel, events: Events) -> None:
+        self._events = events
+        self._sides = tuple(
+            _Side(reel, name, colour, events)
+            for reel, name, colour in ((golden, "golden", pen.GOLDEN), (faulty, "faulty", pen.FAULTY))
+        )
+        self.count = max(len(golden.frames), len(faulty.frames))
+        self._reels = golden, faulty
+        top = HEADING + PANE[1] + CAPTION + STRIP + MARGIN
+        self._timeline = Timeline(WIDTH, HEIGHT - top, golden, faulty, events.marks)
+        self._canvas = np.full((HEIGHT, WIDTH, 3), pen.PAPER, np.uint8)
+        self._draw_heading()
+
+    def time(self, index: int) -> float:
+        """Time (s) of a frame."""
+        return max(reel.at(index).t for reel in self._reels)
+
+    def nearest(self, t: float) -> int:
+        """The frame nearest to a time."""
+        return min(range(self.count), key=lambda index: abs(self.time(index) - t))
+
+    def draw(self, index: int) -> np.ndarray:
+        """The sheet of frame `index`, BGR."""
+        canvas, t = self._canvas.copy(), self.time(index)
+        for side, left in zip(self._sides, (MARGIN, WIDTH - MARGIN - PANE[0]), strict=True):
+            block = side.draw(index)
+            canvas[HEADING : HEADING + len(block), left : left + PANE[0]] = block
+        timeline = self._timeline.draw(t)
+        canvas[HEIGHT - len(timeline) :] = timeline
+        return canvas
+
+    def _draw_heading(self) -> None:
+        outcome = self._events.outcome.replace("_", " ").upper()
+        left = WIDTH - MARGIN - pen.chip_width(outcome)
+        colour = OUTCOMES.get(self._events.outcome, pen.DIM)
+        pen.chip(self._canvas, outcome, (left, 10), colour, pen.INK if colour == pen.HAZARD else pen.PAPER)
+        title = pen.shortened(self._events.title, left - 3 * MARGIN, pen.LARGE, bold=True)
+        pen.write(self._canvas, title, (MARGIN + 2, 28), pen.INK, pen.LARGE, bold=True)
+
+
+class _Side:
+    """One run's half of the sheet: picture, caption, bird's-eye strip."""
+
+    def __init__(self, reel: Reel, name: str, colour: pen.Colour, events: Events) -> None:
+        self._reel, self._name, self._colour, self._events = reel, name, colour, events
+        self._pane = CameraPane(reel.camera, *PANE)
+        self._strip = BirdsEye(PANE[0], STRIP, colour)
+
+    def draw(self, index: int) -> np.ndarray:
+        frame = self._reel.at(index)
+        pane = self._pane.draw(frame)
+        if index >= len(self._reel.frames):
+            cv2.addWeighted(pane, 0.4, pane, 0.0, 0.0, dst=pane)
+            pen.chip(pane, "the run broke off", (PANE[0] // 2 - 70, PANE[1] // 2), pen.DIM)
+        self._draw_chips(pane, frame)
+        self._draw_warnings(pane, frame)
+        caption = np.full((CAPTION, PANE[0], 3), pen.PAPER, np.uint8)
+        self._draw_caption(caption, frame)
+        return np.concatenate([pane, caption, self._strip.draw(frame)])
+
+    def _draw_chips(self, pane: np.ndarray, frame: Frame) -> None:
+        pen.chip(pane, self._name, (8, 8), self._colour)
+        active = self._events.active if self._name == "faulty" else None
+        if active and active[0] <= frame.t <= active[1]:
+            words = "fault active"
+            pen.chip(pane, words, (PANE[0] - 8 - pen.chip_width(words), 8), pen.TRIGGER)
+
+    def _draw_warnings(self, pane: np.ndarray, frame: Frame) -> None:
+        """The alert that the driver gets, and a frame in red from the first hazard on."""
+        alerts = [name for name in frame.alerts if name in COUNTED_ALERTS]
+        foot = PANE[1]
+        if frame.hazards:
+            words = ", ".join(f"{name} {self._events.names.get(name, '')}".strip() for name in frame.hazards)
+            foot = _bar(pane, foot, f"HAZARD {words}", pen.HAZARD, pen.INK)
+            cv2.rectangle(pane, (1, 1), (PANE[0] - 2, PANE[1] - 2), pen.HAZARD, 3)
+        if alerts:
+            _bar(pane, foot, f"{frame.text}   [{', '.join(alerts)}]", pen.ALERT, pen.PAPER)
+
+    def _draw_caption(self, caption: np.ndarray, frame: Frame) -> None:
+        lead = "free road" if frame.d_rel is None else f"lead {frame.d_rel:6.1f} m"
+        words = (
+            f"t = {frame.t:.2f} s",
+            f"{frame.v_ego / MPH_TO_MS:5.1f} mph",
+            lead,
+            f"offset {frame.offset:+.2f} m",
+            _probabilities(frame),
+        )
+        for column, text in zip(CAPTION_COLUMNS, words, strict=True):
+            pen.write(caption, text, (4 + column, 18), self._colour if column == 0 else pen.INK, pen.NORMAL)
+
+
+def _probabilities(frame: Frame) -> str:
+    if frame.lines is None:
+        return "no camera message"
+    return f"lines {frame.lines['left'].prob:.2f} | {frame.lines['right'].prob:.2f}"
+
+
+def _bar(pane: np.ndarray, foot: int, text: str, colour: pen.Colour, ink: pen.Colour) -> int:
+    """A bar of text across the pane that ends at row `foot`; returns the row it begins at."""
+    top = foot - 30
+    layer = np.full((30, pane.shape[1], 3), colour, np.uint8)
+    cv2.addWeighted(layer, 0.9, pane[top:foot], 0.1, 0.0, dst=pane[top:foot])
+    text = pen.shortened(text, pane.shape[1] - 20, bold=True)
+    pen.write(pane, text, ((pane.shape[1] - pen.width(text, bold=True)) // 2, top + 20), ink, bold=True)
+    return top

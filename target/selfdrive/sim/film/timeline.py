@@ -1,0 +1,139 @@
+"""Offset and distance of both runs over time, with marks where things happened and a hand that moves."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import cv2
+import numpy as np
+
+from selfdrive.sim.film import pen
+from selfdrive.sim.film.reel import Frame, Reel
+from selfdrive.sim.hazards import LANE_OFFSET
+
+KINDS = {
+    "trigger": pen.TRIGGER,
+    "manifest": pen.MANIFESTED,
+    "alert": pen.ALERT,
+    "hazard": pen.HAZARD,
+}
+GUTTER = 86  # pixels to the left of the plots, for their names
+FOOT, HEAD = 18, 18  # pixels beneath the plots for seconds, above them for marks
+GAP = 6  # pixels between plots and between labels
+TICKS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
+MOST_TICKS = 16
+LEAST_OFFSET, LEAST_DISTANCE = 0.3, 10.0  # m that a plot shows at least
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """Something that happened at `t` (s): `kind` is trigger, manifest, alert or hazard."""
+
+    kind: str
+    t: float
+    label: str
+
+
+class Timeline:
+    """The plots are drawn once; `draw` adds the hand."""
+
+    def __init__(self, width: int, height: int, golden: Reel, faulty: Reel, marks: Sequence[Mark]) -> None:
+        self._size = width, height
+        self._end = max(reel.frames[-1].t for reel in (golden, faulty)) or 1.0
+        self._canvas = np.full((height, width, 3), pen.PAPER, np.uint8)
+        self._draw_seconds()
+        rows = (height - FOOT - HEAD - GAP) // 2
+        reels = ((golden, pen.GOLDEN, 2), (faulty, pen.FAULTY, 1))
+        self._plot("offset [m]", HEAD, rows, _offset, reels, LANE_OFFSET)
+        self._plot("lead [m]", HEAD + rows + GAP, rows, _distance, reels, None)
+        self._draw_marks(marks)
+
+    def draw(self, t: float) -> np.ndarray:
+        """The timeline with its hand at `t` (s)."""
+        canvas = self._canvas.copy()
+        x = round(self._x(t))
+        cv2.line(canvas, (x, HEAD - 2), (x, self._size[1] - FOOT), pen.INK, 1)
+        cv2.circle(canvas, (x, HEAD - 2), 4, pen.INK, cv2.FILLED, cv2.LINE_AA)
+        return canvas
+
+    def _x(self, t: float) -> float:
+        return GUTTER + (self._size[0] - GUTTER - 10) * t / self._end
+
+    def _draw_seconds(self) -> None:
+        step = next((tick for tick in TICKS if self._end / tick <= MOST_TICKS), TICKS[-1])
+        foot = self._size[1] - FOOT
+        for i in range(ceil(self._end / step + 1e-9)):
+            x = round(self._x(i * step))
+            cv2.line(self._canvas, (x, HEAD), (x, foot + 3), pen.RULE, 1)
+            label = f"{i * step:g}"
+            pen.write(
+                self._canvas, label, (x - pen.width(label, pen.SMALL) // 2, foot + 16), pen.DIM, pen.SMALL
+            )
+        pen.write(self._canvas, "time [s]", (8, foot + 16), pen.DIM, pen.SMALL)
+
+    def _plot(
+        self,
+        name: str,
+        top: int,
+        rows: int,
+        value: Callable[[Frame], float],
+        reels: Sequence[tuple[Reel, pen.Colour, int]],
+        limit: float | None,
+    ) -> None:
+        """One plot of both runs; `limit` is drawn on either side of zero where a value comes near it."""
+        cv2.rectangle(self._canvas, (GUTTER, top), (self._size[0] - 10, top + rows), pen.PANEL, cv2.FILLED)
+        series = [(np.array([value(frame) for frame in reel.frames]), reel) for reel, _, _ in reels]
+        low, high = _span(np.concatenate([values for values, _ in series]), symmetric=limit is not None)
+
+        def y(values: np.ndarray) -> np.ndarray:
+            return top + 3 + (rows - 6) * (high - np.clip(values, low, high)) / (high - low)
+
+        for level in () if limit is None or high < limit else (limit, -limit):
+            row = round(float(y(np.array(level))))
+            for x in range(GUTTER, self._size[0] - 10, 8):
+                cv2.line(self._canvas, (x, row), (x + 3, row), pen.HAZARD, 1)
+        for (values, reel), (_, colour, thickness) in zip(series, reels, strict=True):
+            x = self._x(np.array([frame.t for frame in reel.frames]))
+            for part in _pieces(np.isfinite(values)):
+                pen.stroke(self._canvas, np.stack([x[part], y(values[part])], axis=1), colour, thickness)
+        pen.write(self._canvas, name, (8, top + rows // 2 + 5), pen.DIM, pen.SMALL)
+        for level, row in ((high, top + 9), (low, top + rows)):
+            label = f"{level:.3g}"
+            pen.write(self._canvas, label, (GUTTER - 6 - pen.width(label, 0.34), row), pen.DIM, 0.34)
+
+    def _draw_marks(self, marks: Sequence[Mark]) -> None:
+        """A line for each mark, and its name above where there is room."""
+        taken = 0
+        for mark in sorted(marks, key=lambda mark: mark.t):
+            x, colour = round(self._x(mark.t)), KINDS.get(mark.kind, pen.DIM)
+            cv2.line(self._canvas, (x, HEAD - 4), (x, self._size[1] - FOOT), colour, 1)
+            label = f"{mark.label} {mark.t:.2f}"
+            columns = pen.width(label, pen.SMALL)
+            left = max(taken, min(x - 2, self._size[0] - columns - 4))
+            if left + columns <= self._size[0]:
+                pen.write(self._canvas, label, (left, HEAD - 7), colour, pen.SMALL)
+                taken = left + columns + 2 * GAP
+
+
+def _offset(frame: Frame) -> float:
+    return frame.offset
+
+
+def _distance(frame: Frame) -> float:
+    return float("nan") if frame.d_rel is None else frame.d_rel
+
+
+def _span(values: np.ndarray, *, symmetric: bool) -> tuple[float, float]:
+    """The lowest and highest value that a plot shows."""
+    finite = values[np.isfinite(values)]
+    if symmetric:
+        most = max(LEAST_OFFSET, 1.1 * float(np.abs(finite).max(initial=0.0)))
+        return -most, most
+    most = float(finite.max(initial=LEAST_DISTANCE))
+    return min(0.0, float(finite.min(initial=0.0))), most
+
+
+def _pieces(there: np.ndarray) -> list[slice]:
+    """The runs of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    return [slice(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True)]
