@@ -1,0 +1,78 @@
+"""The picture seen as a map of the road: rows by distance ahead, columns by metres to the left or right.
+
+In the map every lane mark is equally wide, and a line along the car's heading stands upright. Near rows are taken
+from a reduced picture, whose pixels are the mean of many, so nothing in between is lost.
+"""
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+
+CELL = 0.04  # m, a column of the map
+REACH = 5.2  # m, to the left and to the right
+FINEST = 1.3 / 0.12  # px/m; where fewer, a mark of 0.12 m is too narrow to be told from texture
+FARTHEST = 35.0  # m
+LEVELS = 3  # the picture, at half and at a quarter of its size
+BLEND = 40.0  # px/m beyond which the next smaller picture is used
+
+
+class RoadView:
+    """Maps pictures of one camera.
+
+    Per row of the map, nearest last: `drop` (px below the horizon), `scale` (px of the picture per m of road)
+    and `share` (rows of the picture it stands for). `y` (m, left positive) by column, largest first.
+    """
+
+    def __init__(self, model: CameraModel) -> None:
+        self._levels: list[tuple[np.ndarray, np.ndarray]] = []
+        self.y = np.arange(REACH, -REACH, -CELL, dtype=np.float32)
+        rows, shares = [], []
+        for level in range(LEVELS):
+            of_level = _rows_of(model, level)
+            if of_level:
+                self._levels.append(_maps(model, of_level, self.y, level))
+                rows += of_level
+                shares += [2.0**level] * len(of_level)
+        self.drop = np.array(rows, np.float32) - np.float32(model.horizon)
+        self.scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows], np.float32)
+        self.share = np.array(shares, np.float32)
+
+    def map(self, picture: np.ndarray) -> np.ndarray:
+        """The map (float32, rows x columns) of an 8 bit grey picture."""
+        parts = []
+        for level, (columns, rows) in enumerate(self._levels):
+            if level:
+                picture = cv2.resize(picture, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+            parts.append(cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+        return np.concatenate(parts)
+
+    def rows_with_content(self, road: np.ndarray) -> float:
+        """How many of the picture's rows the map's rows that are not all of one tone stand for."""
+        return float(self.share @ (road.max(axis=1) > road.min(axis=1)))
+
+
+def _rows_of(model: CameraModel, level: int) -> list[float]:
+    """The picture's rows (full size) that are taken from this level, one for each row of its picture."""
+    step = 2**level
+    finest = BLEND * step / 2 if level else 0.0
+    coarsest = BLEND * step if level < LEVELS - 1 else np.inf
+    rows = [step * (row + 0.5) - 0.5 for row in range(model.rows // step)]
+    return [
+        row
+        for row in rows
+        if row > model.horizon + 1.0
+        and model.distance(row) < FARTHEST
+        and max(finest, FINEST) <= 1.0 / model.metres_per_pixel(row) < coarsest
+    ]
+
+
+def _maps(
+    model: CameraModel, rows: list[float], y: np.ndarray, level: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows of the level's picture to take each point of the map from."""
+    scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows])
+    columns = model.cx - scale[:, None] * y
+    there = np.broadcast_to(np.array(rows)[:, None], columns.shape)
+    small = [((full + 0.5) / 2**level - 0.5).astype(np.float32) for full in (columns, there)]
+    return cv2.convertMaps(small[0], small[1], cv2.CV_16SC2)

@@ -1,0 +1,91 @@
+"""The geometric lane detector: bands as wide as marks, votes for two parallel lines, and a memory.
+
+What it saw last tells where to look next, so that rain, snow or dirt, which give points anywhere, hardly
+count; a line that is not seen stays where the other one puts it, and both stay for a while when none is.
+"""
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.visiond.band_filter import mark_points
+from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
+from selfdrive.visiond.road_view import RoadView
+from selfdrive.visiond.voting import Belief, Pose, Voters, elect, fit
+
+SURE = 0.15  # share of rows from which on a line is surely there: in dash gaps it is a quarter
+FAINT = 0.03  # share below which it may as well be chance
+FADING = 0.92  # by how much a line not seen is less probable with each picture
+FORGET = 20  # pictures without any line after which it may be anywhere
+GONE = 0.05  # a line less probable than this is given up
+MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m a picture; rad: how the car may have moved
+WIDTH_SIGMA, DIP_SIGMA = 0.10, 1.5  # m, px: how lane and pitch may have changed
+BEYOND = 0.3  # m over a line from which on the car is in the next lane
+
+
+class RobustDetector:
+    """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last."""
+
+    def __init__(self, model: CameraModel) -> None:
+        self._model = model
+        self._view = RoadView(model)
+        self._pose: Pose | None = None
+        self._missed = 0  # pictures since a line was seen
+        self._probs = (0.0, 0.0)
+
+    def detect(self, view: CameraView) -> LaneLines:
+        """The lines in the view's picture, which is of the camera's size."""
+        road = self._view.map(view.picture)
+        voters = Voters(self._view, mark_points(road), self._view.rows_with_content(road))
+        belief = self._belief()
+        pose = fit(elect(voters, belief), voters, belief)
+        self._remember(pose)
+        return self._lines()
+
+    def _belief(self) -> Belief:
+        """Where lines are expected."""
+        pose = self._pose
+        if pose is None:
+            return Belief()
+        return Belief(
+            middle=(pose.middle, MIDDLE_SIGMA[0] + MIDDLE_SIGMA[1] * self._missed),
+            width=(pose.width, WIDTH_SIGMA),
+            left=(pose.left, LEFT_RATE * self._model.fx * (1.0 + 0.5 * self._missed)),
+            dip=(pose.dip, DIP_SIGMA),
+        )
+
+    def _remember(self, pose: Pose) -> None:
+        """Take over what was seen, if anything was."""
+        seen = (pose.seen_left, pose.seen_right)
+        if max(seen) > FAINT or self._pose is None:
+            self._pose, self._missed = pose, 0
+        else:
+            self._missed += 1
+        probs = [
+            max(min(max(now / SURE, 0.0), 1.0), FADING * before)
+            for now, before in zip(seen, self._probs, strict=True)
+        ]
+        self._probs = tuple(prob if prob > GONE else 0.0 for prob in probs)
+        if self._missed > FORGET or self._probs == (0.0, 0.0):
+            self._pose = None
+        elif abs(self._pose.middle) > 0.5 * self._pose.width + BEYOND:
+            self._change_lane()
+
+    def _change_lane(self) -> None:
+        """Look for the lane the car is in now."""
+        lane = self._pose.width if self._pose.middle < 0.0 else -self._pose.width
+        self._pose = self._pose._replace(y_left=self._pose.y_left + lane, y_right=self._pose.y_right + lane)
+
+    def _lines(self) -> LaneLines:
+        if self._pose is None:
+            left, right = (RoadLine(y=side * 0.5 * LANE_WIDTH, prob=0.0) for side in (1.0, -1.0))
+            return LaneLines(left=left, right=right, path=path_between(left, right))
+        left = self._line(self._pose.y_left, self._probs[0])
+        right = self._line(self._pose.y_right, self._probs[1])
+        return LaneLines(left=left, right=right, path=path_between(left, right, self._pose.width))
+
+    def _line(self, y: float, prob: float) -> RoadLine:
+        """The road's line that is seen where the pose has it."""
+        model, pose = self._model, self._pose
+        a = -y * model.spread(1.0)
+        b = model.cx - pose.left - a * (model.horizon - pose.dip)
+        at_camera, slope = model.line_on_road(a, b)
+        return RoadLine(y=at_camera, slope=slope, prob=prob)

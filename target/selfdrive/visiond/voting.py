@@ -1,0 +1,151 @@
+"""Which two parallel lines explain the points where marks may be: first votes, then a fit.
+
+Lines along the road meet in one point of the picture: the car's heading moves it sideways, and a camera pitched
+otherwise than it was calibrated moves it up or down. A line `y` m beside the camera is seen, `drop` px
+below the known horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from selfdrive.visiond.band_filter import Points
+from selfdrive.visiond.road_view import REACH, RoadView
+
+BIN = 0.1  # m, of the votes
+SIDEWAYS = 4.0  # m, how far to the left and to the right lines are looked for
+LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
+SCATTER = 0.005  # share of a line's rows in which points lie by chance, on the cleanest road
+ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m, how far from a line points count in each round of the fit
+ALIKE = 10.0  # points that err alike, as neighbours do: so many tell no more than one
+BLUR = 0.5, 0.05  # px and m: by how much a point may be beside its mark
+
+
+class Pose(NamedTuple):
+    """Two lines: the point where they meet (px), y (m) of each at the camera, and in which share of the
+    picture's rows each was seen, above what chance gives.
+    """
+
+    left: float
+    dip: float
+    y_left: float
+    y_right: float
+    seen_left: float = 0.0
+    seen_right: float = 0.0
+
+    @property
+    def middle(self) -> float:
+        """Of the lane (m, left positive)."""
+        return 0.5 * (self.y_left + self.y_right)
+
+    @property
+    def width(self) -> float:
+        """Of the lane (m)."""
+        return self.y_left - self.y_right
+
+
+class Belief(NamedTuple):
+    """What is expected before looking, each with its standard deviation.
+
+    Without a past: the lane is 3.7 m wide and the car well inside it, heading nearly along the road.
+    """
+
+    middle: tuple[float, float] = (0.0, 1.0)  # m
+    width: tuple[float, float] = (3.7, 0.5)  # m
+    left: tuple[float, float] = (0.0, 40.0)  # px
+    dip: tuple[float, float] = (0.0, 6.0)  # px
+
+
+class Voters:
+    """The points, as numbers of px left of the camera's column and below the horizon; `weight` in rows.
+
+    `rows` are the picture's rows that could have given points.
+    """
+
+    def __init__(self, view: RoadView, points: Points, rows: float) -> None:
+        scale = view.scale[points.row]
+        self.left = view.y[points.column] * scale
+        self.drop = view.drop[points.row]
+        self.metre = scale / self.drop
+        self.weight = points.weight * view.share[points.row]
+        self.precision = self.weight / (ALIKE * (BLUR[0] + BLUR[1] * scale) ** 2)
+        self.rows = max(rows, 1.0)
+        self.density = float(self.weight.sum()) / (self.rows * 2.0 * REACH)  # points in a row, by m
+
+
+def elect(voters: Voters, belief: Belief) -> Pose:
+    """The pair of lines with the most support from points and belief."""
+    left = _candidates(*belief.left, LEFT_STEP)
+    dip = _candidates(*belief.dip, DIP_STEP)
+    left, dip = np.repeat(left, len(dip)), np.tile(dip, len(left))
+    votes = _votes(voters, left, dip)
+    support = np.log1p(votes / np.float32(SCATTER + 0.5 * BIN * voters.density))
+    support -= (0.25 * (_unlikely(left, *belief.left) + _unlikely(dip, *belief.dip)))[:, None]
+    y = SIDEWAYS - BIN * (np.arange(votes.shape[1]) + 0.5)
+    best, found = -np.inf, (0, 0, 0)
+    for width in _candidates(*belief.width, BIN):
+        lane = round(float(width) / BIN)
+        pairs = support[:, :-lane] + support[:, lane:]
+        middle = 0.5 * (y[:-lane] + y[lane:])
+        pairs -= 0.5 * (_unlikely(middle, *belief.middle) + _unlikely(width, *belief.width))
+        at = int(np.argmax(pairs))
+        if pairs.flat[at] > best:
+            best, found = float(pairs.flat[at]), (*divmod(at, pairs.shape[1]), lane)
+    which, column, lane = found
+    return Pose(float(left[which]), float(dip[which]), float(y[column]), float(y[column + lane]))
+
+
+def _candidates(mean: float, sigma: float, step: float) -> np.ndarray:
+    """Values `step` apart that reach two standard deviations to both sides."""
+    n = int(2.0 * sigma / step)
+    return (mean + step * np.arange(-n, n + 1)).astype(np.float32)
+
+
+def _unlikely(value: np.ndarray, mean: float, sigma: float) -> np.ndarray:
+    return (((value - mean) / sigma) ** 2).astype(np.float32)
+
+
+def _votes(voters: Voters, left: np.ndarray, dip: np.ndarray) -> np.ndarray:
+    """Share of rows with a point, by candidate and by y; each point counts in about three bins of y."""
+    bins, outside = round(2 * SIDEWAYS / BIN), 1
+    y = (voters.left - left[:, None]) / (voters.metre * (voters.drop + dip[:, None]))
+    column = ((SIDEWAYS - y) * np.float32(1.0 / BIN) + outside).astype(np.int32)
+    np.clip(column, 0, bins + outside, out=column)
+    column += (np.arange(len(left), dtype=np.int32) * (bins + 2 * outside))[:, None]
+    votes = np.bincount(
+        column.ravel(),
+        weights=np.broadcast_to(voters.weight, column.shape).ravel(),
+        minlength=len(left) * (bins + 2 * outside),
+    )
+    votes = votes.reshape(len(left), -1)[:, outside:-outside].astype(np.float32) / voters.rows
+    return cv2.filter2D(votes, -1, np.float32([[0.5, 1.0, 0.5]]), borderType=cv2.BORDER_CONSTANT)
+
+
+def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
+    """`pose` moved to where the points around its lines are, by weighted Gauss-Newton steps.
+
+    Unknown are left, dip, y_left and y_right; belief decides what points leave open.
+    """
+    means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
+    expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
+    believed = means / sigmas
+    state = np.array(pose[:4])
+    n = len(voters.left)
+    terms = np.zeros((2, n, 4))
+    terms[:, :, 0] = 1.0
+    for near in ROUNDS:
+        metre = voters.metre * (voters.drop + state[1])
+        y = state[2:, None]
+        error = voters.left - state[0] - y * metre
+        count = np.maximum(1.0 - (error / (metre * near)) ** 2, 0.0)
+        terms[:, :, 1] = y * voters.metre
+        terms[0, :, 2] = terms[1, :, 3] = metre
+        design = terms.reshape(2 * n, 4)
+        weighted = design * (count * voters.precision).reshape(-1, 1)
+        information = design.T @ weighted + expected.T @ expected
+        pull = error.ravel() @ weighted + expected.T @ (believed - expected @ state)
+        state = state + np.linalg.solve(information, pull)
+    chance = 4.0 / 3.0 * near * voters.density
+    seen = count @ voters.weight / voters.rows - chance
+    return Pose(*state.tolist(), *seen.tolist())
