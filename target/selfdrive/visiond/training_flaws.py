@@ -1,0 +1,81 @@
+"""What rendered roads lack and real pictures have: verges by the lane, long shadows, bends, bad cameras."""
+
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+
+LEAST_BEND = 250.0  # m of a curve's radius
+NEAR_HORIZON = 4.0  # rows below it in which the road is taken to end
+
+
+class Ground:
+    """A verge that may begin right beside the lane, and bands along the road that are darker or lighter.
+
+    Such bands are shadows of barriers, strips of newer asphalt, gutters. Drawn once for a scene.
+    """
+
+    def __init__(self, model: CameraModel, lane_width: float, rng: np.random.Generator) -> None:
+        rows = np.maximum(np.arange(model.rows), model.horizon + NEAR_HORIZON)
+        self._ahead = np.array([model.distance(row) for row in rows], np.float32)[:, np.newaxis]
+        across = np.array([model.metres_per_pixel(row) for row in rows], np.float32)[:, np.newaxis]
+        self._left = across * (np.float32(model.cx) - np.arange(model.width, dtype=np.float32))
+        self._below = np.arange(model.rows)[:, np.newaxis] > model.horizon
+        half = 0.5 * lane_width
+        self._verges = [half + rng.gamma(2.0, 1.6) + 0.2 if rng.random() < 0.6 else 50.0 for _ in range(2)]
+        self._tone = rng.uniform(35.0, 200.0)
+        self._growth = self._texture(rng)
+        self._bands = [_band(rng) for _ in range(int(rng.integers(0, 4)))]
+
+    def changed(
+        self, picture: np.ndarray, paint: np.ndarray, offset: float, heading: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The picture of a road seen from there, with verges and bands, and what is left of its paint."""
+        y = self._left + np.float32(heading) * self._ahead + np.float32(offset)
+        tones = picture.astype(np.float32)
+        for start, width, factor, soft in self._bands:
+            cover = np.clip((y - start) / soft, 0.0, 1.0) * np.clip((start + width - y) / soft, 0.0, 1.0)
+            tones *= 1.0 + (factor - 1.0) * np.where(self._below, cover, 0.0)
+        left, right = self._verges
+        grown = ((y > left) | (y < -right)) & self._below
+        tones = np.where(grown, self._growth, tones)
+        return np.clip(tones, 0.0, 255.0).astype(np.uint8), np.where(grown, np.uint8(0), paint)
+
+    def _texture(self, rng: np.random.Generator) -> np.ndarray:
+        """Grass, stones, dry earth: grey levels for the whole picture."""
+        fine = rng.standard_normal(self._left.shape, dtype=np.float32)
+        fine = cv2.GaussianBlur(fine, (0, 0), rng.uniform(0.6, 2.5), sigmaY=rng.uniform(0.6, 6.0))
+        return self._tone + fine * (rng.uniform(2.0, 40.0) / max(float(fine.std()), 1e-6))
+
+
+def bent(model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
+    """The pictures with the straight road made a bend, mostly a slight one."""
+    bend = rng.uniform(-1.0, 1.0) ** 3 / LEAST_BEND
+    rows = np.maximum(np.arange(model.rows), model.horizon + NEAR_HORIZON)
+    shift = [0.5 * bend * model.distance(row) ** 2 / model.metres_per_pixel(row) for row in rows]
+    column = np.arange(model.width, dtype=np.float32) + np.array(shift, np.float32)[:, np.newaxis]
+    row = np.repeat(np.arange(model.rows, dtype=np.float32)[:, np.newaxis], model.width, axis=1)
+    return [
+        cv2.remap(image, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for image in images
+    ]
+
+
+def taken(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The picture as a camera and its file make it: soft, noisy, compressed, with some other contrast."""
+    if rng.random() < 0.6:
+        picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.3, 1.6))
+    tones = picture * rng.uniform(0.5, 1.3) + rng.uniform(-25.0, 60.0)
+    if rng.random() < 0.7:
+        tones += rng.standard_normal(picture.shape, dtype=np.float32) * rng.uniform(0.0, 6.0)
+    picture = np.clip(tones, 0.0, 255.0).astype(np.uint8)
+    if rng.random() < 0.6:
+        quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(45, 97))]
+        picture = cv2.imdecode(cv2.imencode(".jpg", picture, quality)[1], cv2.IMREAD_GRAYSCALE)
+    return picture
+
+
+def _band(rng: np.random.Generator) -> tuple[float, float, float, float]:
+    """A band's beginning (m left of the lane's middle), width (m), factor on tones, and soft edge (m)."""
+    return rng.uniform(-8.0, 6.0), rng.gamma(1.5, 1.5) + 0.3, rng.uniform(0.45, 1.3), rng.uniform(0.02, 0.4)

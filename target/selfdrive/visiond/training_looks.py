@@ -1,0 +1,101 @@
+"""Roads and cameras to train the lane detector on, drawn far wider than the road that is driven on.
+
+What is learned then is what a lane mark is, not what that road's marks look like. Tones are grey levels.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.road_look import Look, OtherCar, Paint
+
+LEAST_CONTRAST = 14.0  # grey levels between paint and asphalt
+
+
+def random_camera(rng: np.random.Generator) -> CameraModel:
+    """A camera behind a windscreen or on a roof; every third one is much like the default's."""
+    if rng.random() < 0.33:
+        default = CameraModel()
+        return replace(
+            default,
+            pitch=default.pitch + rng.normal(0.0, 0.01),
+            height=default.height * rng.uniform(0.9, 1.1),
+        )
+    return CameraModel.from_view(
+        width=640,
+        rows=480,
+        horizon=rng.uniform(150.0, 230.0),
+        focal=rng.uniform(380.0, 640.0),
+        height=rng.uniform(1.1, 2.0),
+    )
+
+
+def random_look(rng: np.random.Generator) -> Look:
+    """A road that might be anywhere, at any time of day."""
+    asphalt = _either(rng, (45.0, 120.0), (110.0, 185.0))
+    paints = [_paint(asphalt, rng) for _ in range(4)]
+    return Look(
+        lane_width=rng.uniform(3.0, 4.1),
+        left=paints[0],
+        right=paints[1],
+        far_left=paints[2] if rng.random() < 0.7 else None,
+        far_right=paints[3] if rng.random() < 0.7 else None,
+        asphalt=asphalt,
+        grain=rng.uniform(0.5, 9.0),
+        mottle=rng.uniform(0.0, 10.0),
+        tracks=rng.uniform(-10.0, 14.0),
+        shoulder=np.clip(asphalt + rng.normal(0.0, 35.0), 30.0, 210.0),
+        shoulder_width=rng.uniform(0.3, 3.5),
+        verge=rng.uniform(35.0, 200.0),
+        kerb=rng.uniform(40.0, 220.0) if rng.random() < 0.3 else None,
+        patches=rng.uniform(0.0, 8.0),
+        cracks=rng.uniform(0.0, 16.0),
+        seams=_sometimes(rng, 0.4, 0.5, 6.0),
+        joints=rng.uniform(4.0, 12.0) if rng.random() < 0.25 else None,
+        joint_tone=_either(rng, (-65.0, -10.0), (5.0, 20.0)),
+        shadows=_sometimes(rng, 0.6, 0.05, 0.6),
+        shadow_depth=rng.uniform(0.2, 0.7),
+        sky=rng.uniform(150.0, 250.0),
+        trees=rng.uniform(30.0, 130.0),
+        exposure=rng.uniform(0.65, 1.25),
+        cars=tuple(_car(rng) for _ in range(int(rng.integers(0, 4)))),
+    )
+
+
+def _paint(asphalt: float, rng: np.random.Generator) -> Paint:
+    """A line that stands out from the road, if sometimes only just."""
+    room = 245.0 - asphalt
+    tone = asphalt + room * rng.uniform(0.25, 1.0)
+    most = max(0.0, 1.0 - LEAST_CONTRAST / (tone - asphalt))
+    return Paint(
+        tone=tone,
+        width=rng.uniform(0.09, 0.20),
+        dashed=rng.random() < 0.45,
+        dash=rng.uniform(2.0, 5.0),
+        period=rng.uniform(8.0, 13.0),
+        phase=rng.uniform(0.0, 12.0),
+        double=rng.random() < 0.12,
+        wear=_sometimes(rng, 0.6, 0.02, 0.5),
+        fade=most * rng.uniform(0.0, 0.9) ** 2,
+    )
+
+
+def _car(rng: np.random.Generator) -> OtherCar:
+    lane = rng.choice([-3.7, 0.0, 3.7], p=[0.42, 0.16, 0.42])
+    return OtherCar(
+        x=rng.uniform(14.0, 60.0) if lane == 0.0 else rng.uniform(5.0, 60.0),
+        y=lane + rng.normal(0.0, 0.3),
+        tone=rng.uniform(15.0, 225.0),
+        width=rng.uniform(1.6, 2.5),
+        height=rng.uniform(1.3, 3.2),
+    )
+
+
+def _either(rng: np.random.Generator, first: tuple[float, float], second: tuple[float, float]) -> float:
+    return rng.uniform(*(first if rng.random() < 0.6 else second))
+
+
+def _sometimes(rng: np.random.Generator, share: float, least: float, most: float) -> float:
+    """0, or with the probability `share` something from `least` to `most`."""
+    return rng.uniform(least, most) if rng.random() < share else 0.0

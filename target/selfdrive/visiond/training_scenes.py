@@ -1,0 +1,66 @@
+"""Scenes to train the lane detector on: rendered roads of all kinds, seen by all kinds of cameras.
+
+Every draw comes from one Generator, so a seed gives the same scenes again.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.road_look import Look, Paint
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond.training_flaws import Ground, bent, taken
+from selfdrive.visiond.training_looks import random_camera, random_look
+
+PERIODS = 4  # of 12.2 m: the length of a scene's road
+VIEWS = 4  # pictures of each scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """A picture (uint8) and how much of each pixel is lane paint (uint8, 255 is all)."""
+
+    model: CameraModel
+    picture: np.ndarray
+    paint: np.ndarray
+
+
+def views(scenes: int, rng: np.random.Generator) -> Iterator[View]:
+    """`VIEWS` pictures of each of that many scenes."""
+    for _ in range(scenes):
+        look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
+        road = RoadRenderer(model, look, seed, periods=PERIODS)
+        marks = RoadRenderer(model, _only_paint(look), seed, periods=PERIODS)
+        marks_behind_cars = RoadRenderer(
+            model, replace(_only_paint(look), cars=look.cars), seed, periods=PERIODS
+        )
+        ground = Ground(model, look.lane_width, rng)
+        for _ in range(VIEWS):
+            pose = rng.uniform(0.0, 50.0), rng.normal(0.0, 0.45), rng.normal(0.0, 0.02)
+            paint = np.minimum(marks.grey(*pose), marks_behind_cars.grey(*pose))
+            picture, paint = ground.changed(road.grey(*pose), paint, offset=pose[1], heading=pose[2])
+            picture, paint = bent(model, (picture, paint), rng)
+            yield View(model=model, picture=taken(picture, rng), paint=paint)
+
+
+def _only_paint(look: Look) -> Look:
+    """The same road in black, its paint alone white, nobody on it."""
+
+    def line(old: Paint | None) -> Paint | None:
+        return old and replace(old, tone=255.0, wear=0.0, fade=0.0)
+
+    return replace(
+        look,
+        left=line(look.left),
+        right=line(look.right),
+        far_left=line(look.far_left),
+        far_right=line(look.far_right),
+        **dict.fromkeys(("asphalt", "grain", "mottle", "tracks", "shoulder", "verge", "patches"), 0.0),
+        **dict.fromkeys(("cracks", "seams", "shadows", "sky", "trees"), 0.0),
+        kerb=None,
+        joints=None,
+        exposure=1.0,
+        cars=(),
+    )

@@ -1,0 +1,52 @@
+"""Labelled detection windows from training scenes: the features of each, and whether it holds a lane mark."""
+
+import cv2
+import numpy as np
+
+from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
+from selfdrive.visiond.road_region import RoadRegion
+from selfdrive.visiond.training_scenes import VIEWS, View, views
+
+EACH = 12  # windows with a mark, and as many without, taken from each picture at most
+LEAST_PAINT = 40.0  # pixels of paint that make a mark; windows with less, but some, are not used
+LEAST_CONTRAST = 6.0  # grey levels between paint and what is around it; less is not used either
+NO_PAINT = 2.0  # pixels
+RING = np.ones((7, 7), np.uint8)  # how far around paint lies what it is compared with
+
+
+def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Features (windows x 1764, float32) and labels (bool) from that many scenes, in equal parts."""
+    features = np.empty((2 * EACH * VIEWS * scenes, FEATURES), np.float32)
+    labels = np.empty(len(features), bool)
+    used = 0
+    for view in views(scenes, rng):
+        region = RoadRegion(view.model)
+        found = windows(Hog(*region.shape).blocks(view.picture[region.part]))
+        for label, fit in zip((True, False), _with_and_without(view, region), strict=True):
+            chosen = rng.permutation(np.flatnonzero(fit & region.windows))[:EACH]
+            row, column = np.unravel_index(chosen, fit.shape)
+            features[used : used + len(chosen)] = found[row, column].reshape(-1, FEATURES)
+            labels[used : used + len(chosen)] = label
+            used += len(chosen)
+    return features[:used], labels[:used]
+
+
+def _with_and_without(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
+    """Which windows (rows x columns, bool) hold a mark that can be seen, and which hold none."""
+    picture = view.picture[region.part].astype(np.float32)
+    paint = (view.paint[region.part] > 127).view(np.uint8)
+    ring = (cv2.dilate(paint, RING) - paint).astype(np.float32)
+    paint = paint.astype(np.float32)
+    amount, around = _sums(paint), _sums(ring)
+    contrast = _sums(picture * paint) / np.maximum(amount, 1.0) - _sums(picture * ring) / np.maximum(
+        around, 1.0
+    )
+    return (amount >= LEAST_PAINT) & (contrast >= LEAST_CONTRAST), amount <= NO_PAINT
+
+
+def _sums(image: np.ndarray) -> np.ndarray:
+    """The sum of each window's pixels (rows x columns)."""
+    rows, columns = (size // STRIDE for size in image.shape)
+    tiles = image.reshape(rows, STRIDE, columns, STRIDE).sum(axis=(1, 3))
+    assert WINDOW == 2 * STRIDE
+    return tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]
