@@ -1,5 +1,6 @@
 """The check of library, templates and target; and the library that ships."""
 
+import ast
 from collections import Counter
 from pathlib import Path
 
@@ -9,11 +10,15 @@ from mutator import mutant
 from mutator.expand import expand
 from mutator.library_check import check_library
 from mutator.model import Fault, Hold
+from mutator.sources import matches
 from mutator.spec import READINGS
+from mutator.trigger import always
 from mutator.workspace import Workspace
 
-# Values per trigger of the fault types that need no image.
+# Values per trigger of the published fault types.
 COUNTS = {
+    **{("vision_input", name): 10 for name in ("rain", "fog", "snow", "occlusion", "contrast", "brightness")},
+    ("vision_input", "blur"): 9,
     ("radar", "chaff"): 24,
     ("radar", "invisible_vehicle"): 6,
     ("radar", "ghost_vehicle"): 31,
@@ -27,8 +32,11 @@ COUNTS = {
 }
 
 
+BEYOND = ("vision_weather",)  # modules of faults that are not published ones
+
+
 @pytest.fixture(scope="module")
-def faults() -> dict[str, tuple[Fault, ...]]:
+def everything() -> dict[str, tuple[Fault, ...]]:
     """All faults of the library in both readings, seed 1."""
     clone = Workspace.find(root=Path(__file__).parents[3])
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
@@ -42,6 +50,12 @@ def faults() -> dict[str, tuple[Fault, ...]]:
     }
 
 
+@pytest.fixture(scope="module")
+def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, ...]]:
+    """Those of the published experiments."""
+    return {name: tuple(f for f in found if f.module not in BEYOND) for name, found in everything.items()}
+
+
 def test_the_library_that_ships_has_no_problem(clone: Workspace) -> None:
     """Every spec expands, every anchor is found once, every shape compiles and un-splices."""
     assert check_library(clone, "openpilot") == []
@@ -51,7 +65,7 @@ def test_counts(faults: dict[str, tuple[Fault, ...]]) -> None:
     """Each fault type has as many values as the experiments it reproduces, in both readings."""
     for reading in READINGS:
         assert Counter((f.module, f.fault_type) for f in faults[reading]) == COUNTS
-        assert len({f.id for f in faults[reading]}) == 213
+        assert len({f.id for f in faults[reading]}) == 282
 
 
 def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
@@ -84,12 +98,14 @@ def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Faults without lead aim at H2, steering and lanes at H3, the rest at H1; lost data stay lost."""
+    """Without lead they aim at H2, at steering, lanes and pictures at H3, else at H1; lost data stay lost."""
     for fault in faults["as_described"]:
-        lateral = fault.fault_type in ("steer", "path_model", "camera_unavailable")
+        seen = fault.module == "vision_input"
+        lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")
+        assert ("pictures" in fault.changes) == seen
         assert fault.aim == ("H3" if lateral else "H2" if fault.changes == ("no_lead",) else "H1")
         assert (fault.hold is Hold.TO_END) == (fault.fault_type in ("jamming", "camera_unavailable"))
-    alone = Counter(f.fault_type for f in faults["as_described"] if f.changes)
+    alone = Counter(f.fault_type for f in faults["as_described"] if "no_lead" in f.changes)
     assert alone == {"ghost_vehicle": 31, "speed": 6, "relative_distance": 50}
 
 
@@ -126,20 +142,81 @@ def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) 
         assert values[f"{module}/relative_distance/shorter"] == shorter
 
 
+def test_levels_of_disturbed_pictures(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Levels, gains, biases and kernels are those of the published table, and reach the effect unchanged."""
+    levels: dict[str, list[object]] = {}
+    for fault in faults["as_described"]:
+        if fault.module == "vision_input":
+            levels.setdefault(fault.spec.removeprefix("vision_input/"), []).append(fault.value)
+            assert dict(fault.injections[0].params)["amount"] == fault.value
+    ten = list(range(1, 11))
+    assert levels == {
+        **{f"{name}/thickness": ten for name in ("rain", "fog", "snow")},
+        "occlusion/blobs": ten,
+        "contrast/gain": [1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.4, 2.6, 2.8, 3.0],
+        "brightness/bias": list(range(10, 101, 10)),
+        "blur/averaging": [3, 4, 5, 6],
+        "blur/gaussian": [3, 5, 7],
+        "blur/median": [3, 5],
+    }
+
+
+def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ...]]) -> None:
+    """Each level and each of two effects in one picture is seeded differently, and alike in both readings."""
+    seeds = {
+        reading: [dict(i.params)["seed"] for f in found for i in f.injections if i.model == "image_effect"]
+        for reading, found in everything.items()
+    }
+    assert seeds["as_described"] == seeds["as_coded"]
+    assert len(set(seeds["as_described"])) == len(seeds["as_described"])
+
+
+def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
+    """Rain falls in front of a foggy road: the effects of a spec act in its order."""
+    manifest, models = clone.manifest("openpilot"), clone.fault_models()
+    fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
+    made = mutant.build(manifest, models, fault, always())
+    text = made.files["selfdrive/sim/picture_camera.py"].decode()
+    assert 0 < text.index(f"import Fog  # fi:{made.injections[0]}") < text.index("lambda: Rain(5.0, ")
+
+
+def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
+    """Whatever draws the road or reads frames is closed to faults: runs share what it leaves behind."""
+    manifest = clone.manifest("openpilot")
+    todo, closed = ["selfdrive/sim/road_renderer.py", "selfdrive/sim/image_folder.py"], set()
+    while todo:
+        path = todo.pop()
+        closed.add(path)
+        for node in ast.walk(ast.parse(manifest.tree.files[path])):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                base = node.module.replace(".", "/")
+                needed = {f"{base}.py", *(f"{base}/{alias.name}.py" for alias in node.names)}
+                todo += (needed & manifest.tree.files.keys()) - closed
+    assert {"selfdrive/common/camera_model.py", "selfdrive/sim/road_look.py"} <= closed
+    harmless = {
+        "selfdrive/common/errors.py",
+        "selfdrive/common/conversions.py",
+    }  # compute nothing
+    open_to_faults = {path for path in closed if not matches(path, manifest.forbid)}
+    assert open_to_faults <= harmless
+    assert matches("selfdrive/sim/image_library.py", manifest.forbid)
+
+
 @pytest.mark.slow
-def test_every_mutant_of_the_library(clone: Workspace, faults: dict[str, tuple[Fault, ...]]) -> None:
+def test_every_mutant_of_the_library(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
     """Every fault, in both readings and all four contexts, compiles and un-splices to the original bytes."""
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     triggers = clone.context_table("accelerate_decelerate").triggers(armed_after_s=1.5)
     ids = set()
-    for fault in (*faults["as_described"], *faults["as_coded"]):
+    found = (*everything["as_described"], *everything["as_coded"])
+    for fault in found:
         for trigger in triggers:
             made = mutant.build(manifest, models, fault, trigger)
             ids.add(made.id)
             for path, data in made.files.items():
                 if path != manifest.probe_path:
                     assert mutant.unsplice(data) == manifest.tree.files[path]
-    assert len(ids) == 2 * 213 * 4
+    assert len(ids) == len(found) * 4
 
 
 def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
