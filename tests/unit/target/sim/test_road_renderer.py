@@ -1,0 +1,224 @@
+"""Rendered roads: lines where the truth says, no flicker far away, equal bytes for equal seeds."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER
+from selfdrive.sim.road_look import DASH, DASH_PERIOD, Look, OtherCar, Paint, standard_look
+from selfdrive.sim.road_renderer import RoadRenderer, first_road_row
+
+CALTECH = CameraModel()
+UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0, height=1.22)
+FRESH = Paint(wear=0.0)
+BARE = Look(
+    left=FRESH,
+    right=FRESH,
+    far_left=None,
+    far_right=None,
+    grain=0.0,
+    mottle=0.0,
+    tracks=0.0,
+    patches=0.0,
+    cracks=0.0,
+    shadows=0.0,
+)
+
+
+def finer(model, times):
+    """The same camera with that many times the pixels in each direction."""
+    return replace(
+        model,
+        width=model.width * times,
+        rows=model.rows * times,
+        fx=model.fx * times,
+        fy=model.fy * times,
+        cx=(model.cx + 0.5) * times - 0.5,
+        cy=(model.cy + 0.5) * times - 0.5,
+    )
+
+
+@pytest.fixture(scope="module")
+def standard():
+    """The library's road with dashes, a short piece of it."""
+    return RoadRenderer(CALTECH, "dashed", 3, periods=2)
+
+
+@pytest.mark.parametrize("model", [CALTECH, UDACITY])
+@pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.4, 0.01), (-0.6, -0.03)])
+def test_lines_are_where_the_truth_says(model, offset, heading):
+    """The middle of each line in each row is the analytic one, to a fraction of a pixel."""
+    renderer = RoadRenderer(model, BARE, 0, periods=1)
+    picture = renderer.grey(5.0, offset, heading).astype(float) - BARE.asphalt
+    errors = []
+    for line in renderer.truth(offset, heading):
+        a, b = model.line_in_picture(*line)
+        for row in range(int(model.horizon) + 8, model.rows):
+            half = 0.2 / model.metres_per_pixel(row) + 3.0
+            first, last = int(a * row + b - half), int(a * row + b + half) + 2
+            if first >= 0 and last <= model.width:
+                light = picture[row, first:last]
+                errors.append(light @ np.arange(first, last) / light.sum() - (a * row + b))
+    assert len(errors) > 300
+    assert np.abs(errors).max() < 0.2
+    assert np.std(errors) < 0.05
+    assert abs(np.mean(errors)) < 0.01
+
+
+def test_a_line_is_as_wide_as_its_paint_down_to_where_it_is_a_fraction_of_a_pixel():
+    """A line's light in a row is that of its width on the road, from a few metres to over a hundred."""
+    renderer = RoadRenderer(CALTECH, BARE, 0, periods=1)
+    contrast = renderer.grey(0.0).astype(float) - BARE.asphalt
+    a, b = CALTECH.line_in_picture(*renderer.truth()[0])
+    for row in [round(CALTECH.row(x)) for x in (3.0, 10.0, 30.0, 60.0, 120.0)]:
+        scale = CALTECH.metres_per_pixel(row)
+        half = 0.2 / scale + 3.0
+        light = contrast[row, int(a * row + b - half) : int(a * row + b + half) + 2].sum()
+        assert light * scale / (218.0 - BARE.asphalt) == pytest.approx(0.12, rel=0.12)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.02])
+def test_the_far_field_is_anti_aliased(heading):
+    """A picture is what a camera with sixteen times the pixels sees, averaged, up to the horizon."""
+    look = replace(BARE, right=replace(FRESH, dashed=True))
+    coarse = RoadRenderer(CALTECH, look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
+    fine = RoadRenderer(finer(CALTECH, 4), look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
+    averaged = cv2.resize(fine, (CALTECH.width, CALTECH.rows), interpolation=cv2.INTER_AREA)
+    top = first_road_row(CALTECH) + 1
+    for first, last in ((top, top + 15), (top + 15, top + 60), (top + 60, CALTECH.rows)):
+        difference = (coarse - averaged)[first:last]
+        assert np.sqrt((difference**2).mean()) < 2.0
+
+
+def test_far_dashes_do_not_flicker():
+    """Beyond 150 m, where a row spans two dash periods, a line hardly changes from picture to picture."""
+    renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
+    last = int(CALTECH.row(150.0))
+    pictures = np.stack([renderer.grey(1.342 * k) for k in range(9)]).astype(int)
+    far = pictures[:, first_road_row(CALTECH) : last]
+    assert np.ptp(far, axis=0).max() <= 10
+
+
+def test_dashes_have_us_dimensions():
+    """A dashed line is painted for 3.05 m in every 12.2 m, beginning where the road does."""
+    renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
+    row = CALTECH.rows - 1
+    x = CALTECH.distance(row)
+    column = round(CALTECH.column(x, -1.85))
+    positions = np.arange(0.0, 2 * DASH_PERIOD, 0.05)
+    painted = np.array([renderer.grey(position)[row, column] > 160 for position in positions])
+    expected = np.mod(positions + x, DASH_PERIOD) < DASH
+    assert np.mean(painted != expected) < 0.015
+
+
+def test_the_road_closes_on_itself():
+    """After the strip's length the same picture comes again."""
+    renderer = RoadRenderer(CALTECH, "dashed", 3, periods=2)
+    assert np.array_equal(renderer.grey(4.0, 0.2, 0.01), renderer.grey(4.0 + 2 * DASH_PERIOD, 0.2, 0.01))
+
+
+def test_equal_seeds_give_equal_bytes_in_any_order(standard):
+    """A picture follows from model, look, seed and pose alone, not from the pictures drawn before."""
+    again = RoadRenderer(CALTECH, standard_look("dashed"), 3, periods=2)
+    poses = [(0.0, 0.0, 0.0), (7.7, 0.3, -0.01), (19.0, -0.5, 0.02)]
+    forth = [standard.grey(*pose) for pose in poses]
+    back = [again.grey(*pose) for pose in reversed(poses)][::-1]
+    assert all(np.array_equal(one, other) for one, other in zip(forth, back, strict=True))
+
+
+def test_another_seed_gives_another_road(standard):
+    """The texture depends on the seed."""
+    assert not np.array_equal(standard.grey(0.0), RoadRenderer(CALTECH, "dashed", 4, periods=2).grey(0.0))
+
+
+def test_the_standard_road_has_the_tones_of_a_road():
+    """Asphalt is mid grey, white paint bright, yellow paint between: what gains and biases work on."""
+    picture = RoadRenderer(CALTECH, "solid", 1, periods=4).grey(0.0)
+    left, right = (CALTECH.line_in_picture(y, 0.0) for y in (1.85, -1.85))
+    row = 400
+    assert 85 <= np.median(picture[row, 200:440]) <= 110
+    assert (
+        200 <= np.median([picture[row, round(right[0] * row + right[1])] for row in range(300, 470)]) <= 230
+    )
+    assert 170 <= np.median([picture[row, round(left[0] * row + left[1])] for row in range(300, 470)]) <= 190
+    assert np.median(picture[:100]) > 170
+
+
+def test_unknown_marks_are_refused():
+    """Marks are solid or dashed."""
+    with pytest.raises(ValueError, match="dotted"):
+        RoadRenderer(CALTECH, "dotted", 0)
+
+
+def test_every_part_of_a_look_shows():
+    """Each thing that may vary between roads changes the picture."""
+    base = replace(BARE, far_left=FRESH, far_right=FRESH)
+    plain = RoadRenderer(UDACITY, base, 1, periods=1).grey(0.0)
+    changes = {
+        "lane_width": 3.3,
+        "left": replace(FRESH, double=True),
+        "right": replace(FRESH, fade=0.5),
+        "far_left": None,
+        "asphalt": 150.0,
+        "grain": 8.0,
+        "mottle": 8.0,
+        "tracks": 10.0,
+        "shoulder": 130.0,
+        "shoulder_width": 1.0,
+        "verge": 140.0,
+        "kerb": 190.0,
+        "patches": 300.0,
+        "cracks": 300.0,
+        "seams": 300.0,
+        "joints": 4.5,
+        "shadows": 0.3,
+        "sky": 160.0,
+        "trees": 120.0,
+        "exposure": 0.7,
+        "cars": (OtherCar(x=15.0, y=3.7),),
+    }
+    for name, value in changes.items():
+        changed = RoadRenderer(UDACITY, replace(base, **{name: value}), 1, periods=1).grey(0.0)
+        assert (changed != plain).mean() > 1e-4, name
+
+
+def test_colours_keep_the_grey_values(standard):
+    """The coloured picture is as bright as the grey one; left line yellow, sky blue, verge green."""
+    grey, colour = standard.grey(3.0, 0.2, 0.01), standard.colour(3.0, 0.2, 0.01)
+    assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(int) - grey).mean() < 2.0
+    blue, green, red = colour[20, 320].astype(int)
+    assert blue > red
+    blue, green, red = colour[200, 5].astype(int)
+    assert green > blue and green > red
+    a, b = CALTECH.line_in_picture(*standard.truth(0.2, 0.01)[0])
+    blue, green, red = np.median([colour[row, round(a * row + b)] for row in range(300, 450)], axis=0)
+    assert red > 2 * blue and green > 2 * blue
+
+
+@pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.5, 0.02)])
+def test_the_lead_stands_on_the_road_where_it_is(standard, offset, heading):
+    """The lead's wheels touch the road in the row of its distance, in the middle of the lane."""
+    lead = 20.0
+    with_lead = standard.colour(3.0, offset, heading, lead=lead)
+    changed = (with_lead != standard.colour(3.0, offset, heading)).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    assert rows.max() == pytest.approx(CALTECH.row(lead + CAMERA_TO_BUMPER), abs=2.0)
+    left, right = (CALTECH.line_in_picture(*line) for line in standard.truth(offset, heading))
+    middle = 0.5 * ((left[0] + right[0]) * rows.max() + left[1] + right[1])
+    assert 0.5 * (columns.min() + columns.max()) == pytest.approx(middle, abs=2.0)
+
+
+def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
+    """A lead that is hit, or out of sight, leaves the picture as it is."""
+    plain = standard.colour(3.0)
+    assert np.array_equal(plain, standard.colour(3.0, lead=-3.0))
+    assert np.array_equal(plain, standard.colour(3.0, lead=500.0))
+
+
+def test_a_turn_pans_what_is_far_away(standard):
+    """As the car turns left, the sky moves right as a whole, and does not change with the offset."""
+    ahead, turned = standard.grey(0.0), standard.grey(0.0, 0.5, 0.05)
+    shift = round(CALTECH.fx * np.tan(0.05) / np.cos(CALTECH.pitch))
+    assert np.array_equal(turned[:150, shift:], ahead[:150, :-shift])
