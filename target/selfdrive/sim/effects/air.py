@@ -31,7 +31,8 @@ def ways(camera: CameraModel) -> np.ndarray:
     down = ((np.arange(camera.rows) - camera.cy) / camera.fy)[:, None]
     fall = (sin(camera.pitch) + down * cos(camera.pitch)) / np.sqrt(1.0 + right**2 + down**2)
     with np.errstate(divide="ignore"):
-        return np.where(fall > 0.0, camera.height / fall, (LAYER - camera.height) / np.abs(fall)).astype(np.float32)
+        way = np.where(fall > 0.0, camera.height / fall, (LAYER - camera.height) / np.abs(fall))
+    return way.astype(np.float32)
 
 
 def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
@@ -42,13 +43,7 @@ def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
 def airlight(picture: np.ndarray, camera: CameraModel) -> float:
     """Grey level of the air: the mean above the horizon, or of the uppermost tenth where little is above."""
     rows = max(int(camera.horizon), camera.rows // 10)
-    return float(picture[:rows:4, ::4].mean())
-
-
-def through_air(picture: np.ndarray, kept: np.ndarray, level: float) -> np.ndarray:
-    """The picture of which a share `kept`, float32 (rows, width), arrives, the rest being of `level`."""
-    air = np.full_like(picture, round(level))
-    return cv2.blendLinear(picture, air, kept, cv2.subtract(1.0, kept))
+    return cv2.mean(picture[:rows])[0]
 
 
 class Fog(Effect):
@@ -58,6 +53,8 @@ class Fog(Effect):
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._kept = clearness(extinction(self.amount), self.camera)
+        self._lost = 1.0 - self._kept
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return through_air(picture, self._kept, airlight(picture, self.camera))
+        air = np.full_like(picture, round(airlight(picture, self.camera)))
+        return cv2.blendLinear(picture, air, self._kept, self._lost)

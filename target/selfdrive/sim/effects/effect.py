@@ -72,6 +72,7 @@ class Effect(ABC):
         """The amount's place between least and most, 0 to 1."""
         return (self.amount - self.LEAST) / (self.MOST - self.LEAST)
 
+    @abstractmethod
     def _prepare(self, random: np.random.Generator) -> None:
         """Make what is the same for all pictures."""
 

@@ -59,7 +59,7 @@ class LensMud(_OnLens):
         self._cover(self._covered(field), np.clip(texture, 0.0, 255.0))
 
     def _covered(self, field: np.ndarray) -> np.ndarray:
-        """Covered share of each pixel: mud lies where the field is highest, so far down as the amount asks."""
+        """Covered share of each pixel: mud lies where the field is highest."""
         threshold = np.quantile(field, 1.0 - self.amount)
         mud = (field > threshold).astype(np.float32)
         return cv2.GaussianBlur(mud, (0, 0), EDGE)

@@ -13,11 +13,12 @@ SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn between
 SUN_SIDE = radians(8.0)  # at most, to either side
 SUN_RADIUS = radians(0.27)
 ASPHALT_SLOPES = 0.25  # rms slope of its facets
-ASPHALT_MIRROR = 0.04  # reflectance at right angles, of a refractive index of 1.5
+MIRROR = 0.04  # reflectance at right angles, of a refractive index of 1.5
+POLISHED = 0.02  # share of a dry road's surface that mirrors; of the order of the CIE's road table R3
 
 ELECTRONS = 14.0  # that white light of one lux frees in a pixel in the longest exposure (10 ms)
 FULL_WELL = 10000.0
-LARGEST_GAIN = 16.0
+LARGEST_GAIN = 64.0  # 36 dB
 READ_NOISE = 5.0  # electrons
 QUANTILES = 256
 
@@ -71,10 +72,10 @@ def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     upright = np.maximum(-half[..., 1], 1e-3)
     slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
     facets = np.exp(-slope) / (pi * ASPHALT_SLOPES**2 * upright**4)
-    mirror = ASPHALT_MIRROR + (1.0 - ASPHALT_MIRROR) * (1.0 - np.clip(half @ sun, 0.0, 1.0)) ** 5
+    mirror = MIRROR + (1.0 - MIRROR) * (1.0 - np.clip(half @ sun, 0.0, 1.0)) ** 5
     # A rough surface shadows itself where it is seen or lit at a flat angle.
     shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.clip(half @ sun, 1e-3, 1.0))
-    return np.where(rays[..., 1] > 0.0, mirror * facets * shadow / (4.0 * down), 0.0)
+    return np.where(rays[..., 1] > 0.0, POLISHED * mirror * facets * shadow / (4.0 * down), 0.0)
 
 
 class LowLight(Effect):

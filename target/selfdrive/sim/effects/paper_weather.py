@@ -53,22 +53,19 @@ class PaperRain(_PaperWeather):
         rows, columns = self.camera.rows, self.camera.width
         most = PER_THICKNESS * int(self.MOST)
         # As many numbers for any thickness: more rain holds all streaks of less.
-        column, row, phase, wobble = random.uniform(size=(4, most))[:, : self._count(layer, len(STREAK_LENGTHS))]
+        count = self._count(layer, len(STREAK_LENGTHS))
+        column, row, phase, wobble = random.uniform(size=(4, most))[:, :count]
         start = np.stack([columns * column, rows * row])
         end = start + length * np.array([[-sin(STREAK_LEAN)], [cos(STREAK_LEAN)]])
         points = int(length) + 1
-        share, across, down = strokes(start, end, np.full(column.size, points))
+        share, across, down = strokes(start, end, np.full(count, points))
         phase, wobble = np.repeat(phase, points), np.repeat(wobble, points)
         light = 1.0 + 0.35 * np.sin(2 * np.pi * (phase + (1.0 + 2.0 * wobble) * share))
         light *= np.sqrt(np.sin(np.pi * share)) * WHITE
         side = np.arange(width)
-        return splat(
-            (across[:, None] + side).ravel(),
-            np.repeat(down, width),
-            np.repeat(light, width),
-            (rows, columns),
-            wrap=True,
-        )
+        levels = np.zeros((rows, columns), dtype=np.float32)
+        splat(levels, (across[:, None] + side).ravel(), np.repeat(down, width), np.repeat(light, width))
+        return levels
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         sigma, alpha = self._between(0.5, 1.5), self._between(0.75, 0.65)
@@ -84,7 +81,9 @@ class PaperFog(_PaperWeather):
     """Uniform noise, blurred to droplets, on a background that loses contrast."""
 
     def _prepare(self, random: np.random.Generator) -> None:
-        self._haze = haze(random, self.camera.rows, self.camera.width, self.amount / self.MOST, self.thickness)
+        self._haze = haze(
+            random, self.camera.rows, self.camera.width, self.amount / self.MOST, self.thickness
+        )
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         return hazed(picture, self._haze, self._between(0.9, 0.4), scene)
@@ -109,7 +108,9 @@ class PaperSnow(_PaperWeather):
         white = np.zeros(rows * columns, dtype=np.float32)
         white[places] = WHITE
         white = white.reshape(rows, columns)
-        return np.maximum.reduce([np.roll(white, (down, right), (0, 1)) for down in (0, 1) for right in (0, 1)])
+        return np.maximum.reduce(
+            [np.roll(white, (down, right), (0, 1)) for down in (0, 1) for right in (0, 1)]
+        )
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         snow = hazed(picture, self._haze, self._between(0.9, 0.4), scene)
@@ -121,7 +122,7 @@ class PaperSnow(_PaperWeather):
 
 
 def haze(random: np.random.Generator, rows: int, columns: int, density: float, thickness: float) -> Tile:
-    """Noise of 0 to 255 in a share `density` of all pixels, blurred by 5 to 7 pixels; it repeats seamlessly."""
+    """Noise of 0 to 255 in a share `density` of all pixels, blurred by 5 to 7 pixels; it repeats."""
     there, level = random.uniform(size=(2, rows, columns)).astype(np.float32)
     noise = np.where(there < density, WHITE * level, 0.0).astype(np.float32)
     return Tile(to_levels(blurred_round(noise, 5.0 + 2.0 * thickness)))
@@ -144,12 +145,14 @@ def smeared_round(levels: np.ndarray, kernel: np.ndarray) -> np.ndarray:
 
 
 def motion_kernel(length: int, degrees: float) -> np.ndarray:
-    """The smear of a point that moves `length` pixels at this angle, counted from the row, counter-clockwise."""
+    """The smear of a point that moves `length` pixels, at this angle counter-clockwise from the row."""
     way = np.linspace(-0.5, 0.5, 16 * length) * (length - 1)
     middle = length // 2 + 1
     columns, rows = middle + way * cos(radians(degrees)), middle - way * sin(radians(degrees))
     size = 2 * middle + 1
-    return splat(columns, rows, np.full(way.size, 1.0 / way.size), (size, size), wrap=False)
+    kernel = np.zeros((size, size), dtype=np.float32)
+    splat(kernel, columns, rows, np.full(way.size, 1.0 / way.size))
+    return kernel
 
 
 def to_levels(levels: np.ndarray) -> np.ndarray:

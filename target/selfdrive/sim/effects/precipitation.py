@@ -12,49 +12,50 @@ from math import exp
 import cv2
 import numpy as np
 
-from selfdrive.sim.effects.air import airlight, clearness, through_air
+from selfdrive.sim.effects.air import airlight, clearness
 from selfdrive.sim.effects.effect import Effect, Scene
-from selfdrive.sim.effects.particles import Particles, Streaks, cover
+from selfdrive.sim.effects.particles import Cover, Particles, Streaks
 
 EXPOSURE = 0.001  # s, under a grey sky
+MOST_IN_BOX = 3600  # a third of them in view
 
 
 class _Precipitation(Effect):
     """Particles whose numbers fall exponentially with their (melted) diameter.
 
-    `REACHES` says up to which distance (m) particles from a diameter (mm) on are drawn one by one: where a
-    particle would change a pixel by less than a grey level or two, it belongs to the veil.
+    `REACHES` says up to which distance (m) particles from a diameter (mm) on are drawn one by one; beyond,
+    one would take too little of a pixel's light to be seen. In dense air only the nearest are drawn.
     """
 
     UNIT = "mm/h"
     REACHES: tuple[tuple[float, float], ...]
 
     def _prepare(self, random: np.random.Generator) -> None:
-        self._boxes = []
+        self._cover = Cover(self.camera)
         limits = [least for least, _ in self.REACHES] + [self._largest()]
-        for (least, reach), most in zip(self.REACHES, limits[1:], strict=True):
-            melted = self._diameters(random, least, most, reach)
-            size, speed = self._flown(melted)
-            self._boxes.append(Particles(random, self.camera, reach, size, speed))
-        self._veil = clearness(self._extinction(), self.camera)
+        self._boxes = [
+            self._box(random, least, most, reach)
+            for (least, reach), most in zip(self.REACHES, limits[1:], strict=True)
+        ]
+        self._veil = np.rint(255.0 * clearness(self._extinction(), self.camera)).astype(np.uint8)
 
-    def _diameters(self, random: np.random.Generator, least: float, most: float, reach: float) -> np.ndarray:
-        """Diameters (mm) from `least` to `most` of all particles in a box of this reach (m)."""
+    def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Particles:
+        """A box of all particles with diameters (mm) from `least` to `most`."""
         number, slope = self._spectrum()
-        box = reach**3 * self.camera.width / self.camera.fx * self.camera.rows / self.camera.fy
         few, many = exp(-slope * most), exp(-slope * least)
-        count = round(box * number / slope * (many - few))
-        return -np.log(few + (many - few) * random.uniform(size=count)) / slope
+        density = number / slope * (many - few)  # per m^3
+        across = self.camera.width / self.camera.fx * self.camera.rows / self.camera.fy
+        reach = min(reach, (MOST_IN_BOX / (density * across)) ** (1.0 / 3.0))
+        count = round(density * across * reach**3)
+        melted = -np.log(few + (many - few) * random.uniform(size=count)) / slope
+        return Particles(random, self.camera, reach, *self._flown(melted))
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         parts = [box.streaks(scene, EXPOSURE) for box in self._boxes]
-        streaks = Streaks(
-            np.concatenate([part.start for part in parts], axis=1),
-            np.concatenate([part.end for part in parts], axis=1),
-            np.concatenate([part.width for part in parts]),
-        )
-        kept = cv2.multiply(self._veil, cv2.subtract(1.0, cover(streaks, self.camera)))
-        return through_air(picture, kept, airlight(picture, self.camera))
+        streaks = Streaks(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+        kept = cv2.multiply(self._veil, cv2.bitwise_not(self._cover.taken(streaks)), scale=1.0 / 255.0)
+        lost = np.rint(airlight(picture, self.camera) / 255.0 * np.arange(255.0, -1.0, -1.0))
+        return cv2.add(cv2.multiply(picture, kept, scale=1.0 / 255.0), cv2.LUT(kept, lost.astype(np.uint8)))
 
     @abstractmethod
     def _spectrum(self) -> tuple[float, float]:
@@ -101,7 +102,7 @@ class Snow(_Precipitation):
     """
 
     LEAST, MOST = 0.1, 10.0
-    REACHES = (1.0, 2.0), (2.0, 3.5), (3.0, 5.0)
+    REACHES = (1.0, 2.0), (2.0, 6.0), (3.0, 10.0)
 
     def _spectrum(self) -> tuple[float, float]:
         return 3800.0 * self.amount**-0.87, 2.55 * self.amount**-0.48

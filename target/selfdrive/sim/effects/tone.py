@@ -40,8 +40,11 @@ class AveragingBlur(Effect):
 
     UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
 
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._kernel = int(self.amount), int(self.amount)
+
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.blur(picture, (int(self.amount), int(self.amount)))
+        return cv2.blur(picture, self._kernel)
 
 
 class _OddKernel(Effect):
@@ -50,7 +53,9 @@ class _OddKernel(Effect):
     def _prepare(self, random: np.random.Generator) -> None:
         if self.amount % 2 != 1:
             name, expected = type(self).__name__, f"an odd number of {self.UNIT}"
-            raise ConfigError(f"{name}: amount {self.amount:g}", expected=expected, remedy="correct the amount")
+            raise ConfigError(
+                f"{name}: amount {self.amount:g}", expected=expected, remedy="correct the amount"
+            )
 
 
 class GaussianBlur(_OddKernel):
