@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from mutator.yamlio import Source, StrictModel, read
 
 SCHEMA = "target/1"
 OBSERVED = ("t", "d_rel", "v_ego", "v_lead")
+FILM = "film"  # folder in the output of a run that is filmed
 _READING = (ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.UAdd, ast.USub, ast.Load)
 
 
@@ -39,6 +40,16 @@ class Observation:
 
     location: FaultLocation
     expressions: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Film:
+    """How a target's runs are made watchable: what makes a run leave a film, and what shows two of them."""
+
+    run_args: tuple[str, ...]  # of the entry module, with {film}
+    module: str  # run as `python -m`
+    args: tuple[str, ...]  # with {golden}, {faulty} (films), {events}, {out}
+    still_args: tuple[str, ...]  # more of them for a still picture, with {t}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +79,7 @@ class TargetManifest:
     observation: Observation
     hazards: tuple[str, ...]
     alerts: tuple[str, ...]  # alerts that count in experiments
+    film: Film | None = None
 
     @cached_property
     def tree(self) -> SourceTree:
@@ -91,6 +103,7 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
         places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
+        places["{film}"] = str(out / FILM)
         extra: list[str] = []
         for change in changes:
             if change not in self.changes:
@@ -104,6 +117,17 @@ class TargetManifest:
         filled = [places.get(argument, argument) for argument in self.entry_args]
         return (*filled, *extra)
 
+    def filming(self) -> "TargetManifest":
+        """The same target, whose runs leave a film; MutatorError for a target that cannot be filmed."""
+        if self.film is None:
+            raise MutatorError(
+                f"target {self.name} cannot be filmed",
+                where=self.path,
+                expected="`film` in its manifest",
+                remedy="say there which commands take and show a film",
+            )
+        return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
+
 
 class _ChannelModel(StrictModel):
     unit: str
@@ -114,6 +138,13 @@ class _EntryModel(StrictModel):
     module: str
     args: list[str]
     changes: dict[str, list[str]] = Field(default_factory=dict)
+
+
+class _FilmModel(StrictModel):
+    run: list[str]
+    module: str
+    args: list[str]
+    still: list[str]
 
 
 class _ObservationModel(StrictModel):
@@ -142,6 +173,7 @@ class _ManifestModel(StrictModel):
     observation: _ObservationModel
     hazards: list[str]
     alerts: list[str]
+    film: _FilmModel | None = None
 
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
@@ -177,14 +209,16 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         observation=_observation(model.observation, source, folder),
         hazards=tuple(model.hazards),
         alerts=tuple(model.alerts),
+        film=_film(model.film),
     )
 
 
 def _check_names(model: _ManifestModel, source: Source) -> None:
     if not model.package.isidentifier():
         raise source.error(("package",), f"'{model.package}'", expected="a Python package's name")
-    if not all(part.isidentifier() for part in model.entry.module.split(".")):
-        raise source.error(("entry", "module"), f"'{model.entry.module}'", expected="a dotted module name")
+    for key, command in (("entry", model.entry), ("film", model.film)):
+        if command and not all(part.isidentifier() for part in command.module.split(".")):
+            raise source.error((key, "module"), f"'{command.module}'", expected="a dotted module name")
     for key in ("trace_file", "record_file"):
         name = getattr(model, key)
         if Path(name).name != name:
@@ -208,6 +242,17 @@ def _check_events(model: _ManifestModel, source: Source) -> None:
 
 def _channels(channels: Mapping[str, _ChannelModel]) -> tuple[Channel, ...]:
     return tuple(Channel(name=n, unit=c.unit, tolerance=c.tolerance) for n, c in channels.items())
+
+
+def _film(model: _FilmModel | None) -> Film | None:
+    if model is None:
+        return None
+    return Film(
+        run_args=tuple(model.run),
+        module=model.module,
+        args=tuple(model.args),
+        still_args=tuple(model.still),
+    )
 
 
 def _observation(model: _ObservationModel, source: Source, root: Path) -> Observation:

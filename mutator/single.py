@@ -63,9 +63,12 @@ def run_single(
     )
 
 
-def rerun(workspace: Workspace, run: Path, experiment_id: str) -> tuple[Single, bool]:
+def rerun(
+    workspace: Workspace, run: Path, experiment_id: str, *, film: Path | None = None
+) -> tuple[Single, bool]:
     """Run a planned experiment again with its trace kept in the run folder (traces/<id>/).
 
+    With a folder `film` golden and faulty run are driven and kept there, each with a film.
     The flag says whether the record equals the one of the campaign (true if there is none yet).
     """
     folder = RunFolder.open(run)
@@ -77,11 +80,11 @@ def rerun(workspace: Workspace, run: Path, experiment_id: str) -> tuple[Single, 
     golden = folder.golden(experiment.scenario, experiment.changes)
     single = run_single(
         workspace,
-        manifest,
+        manifest.filming() if film else manifest,
         experiment,
-        folder.path / "traces" / wanted,
+        film or folder.path / "traces" / wanted,
         limits=folder.limits,
-        golden=golden if golden.is_dir() else None,
+        golden=golden if golden.is_dir() and not film else None,
     )
     known = read_records(folder.path).get(wanted)
     return single, known is None or known == single.record

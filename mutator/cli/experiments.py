@@ -1,5 +1,6 @@
 """`show` and `rerun`: one experiment of a run."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,11 +8,15 @@ import typer
 
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
-from mutator.errors import EXIT_CHECK_FAILED
+from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
     from mutator.cli.experiment_view import Found
+    from mutator.film import Shot
     from mutator.workspace import Workspace
+
+
+DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 
 
 def register(app: typer.Typer) -> None:
@@ -24,6 +29,8 @@ SHOW_EXAMPLES = """\b
 Examples:
   mutator show 3f9a                          of the newest run in runs/
   mutator show 3f9a --run runs/first --no-plot
+  mutator show 3f9a --video 3f9a.mp4         drives both runs again, with a film
+  mutator show 3f9a --still 14.5=early.png --still 20=late.png
 """
 
 
@@ -34,11 +41,20 @@ def show(
     plot: Annotated[
         bool, typer.Option(help="Draw golden against faulty (drives it again if no trace was kept).")
     ] = True,
+    video: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Film golden beside faulty: a .mp4 or .gif.")
+    ] = None,
+    still: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="T=FILE", help="One picture of that film, of T seconds: a .png. May be repeated."
+        ),
+    ] = None,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Show diff, times, verdict, plot of golden against faulty."""
+    """Show diff, times, verdict, plot of golden against faulty; or watch them."""
     from mutator.cli import experiment_view as view
 
     terminal = Terminal(as_json)
@@ -46,10 +62,12 @@ def show(
     found = view.find_experiment(workspace, run, experiment)
     patch = view.experiment_patch(workspace, found)
     drawn = _plot(terminal, workspace, found) if plot and found.record else None
+    filmed = _film(terminal, workspace, found, video, still or [])
     if as_json:
         outcome = view.verdict(found.record) if found.record else {"status": None}
         facts = {**view.describe(found.experiment), **outcome, "patch": patch}
-        terminal.emit(facts | {"run": str(found.folder.path), "plot": str(drawn) if drawn else None})
+        facts |= {"run": str(found.folder.path), "plot": str(drawn) if drawn else None}
+        terminal.emit(facts | {"films": filmed})
         return
     view.print_experiment(terminal, found.experiment, patch)
     if found.record is None:
@@ -58,6 +76,8 @@ def show(
     view.print_verdict(terminal, found.record)
     if drawn:
         terminal.say(f"plot: {short_path(drawn)}")
+    for path in filmed:
+        terminal.say(f"film: {short_path(path)}")
 
 
 def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | None:
@@ -71,8 +91,46 @@ def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | 
     with terminal.wait("no trace was kept: driving it again"):
         single, same = run_again(workspace, found.folder.path, found.experiment.id)
     if not same:
-        terminal.note("the new run differs from the campaign's record: see `mutator rerun`")
+        terminal.note(DIFFERS)
     return view.draw(workspace.manifest(found.plan.campaign.target), single, plot)
+
+
+def _film(
+    terminal: Terminal,
+    workspace: "Workspace",
+    found: "Found",
+    video: Path | None,
+    stills: list[str],
+) -> list[Path]:
+    """Write the video and the stills that are wanted; returns their paths."""
+    from mutator.cli import experiment_view as view
+    from mutator.film import Shot, film_experiment
+
+    shots = [_still(text) for text in stills]
+    shots += [Shot(out=video)] if video else []
+    if not shots:
+        return []
+    facts = view.describe(found.experiment)
+    title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}"
+    manifest = workspace.manifest(found.plan.campaign.target)
+    with terminal.wait("driving it again with a film"):
+        same = film_experiment(workspace, manifest, found.folder.path, found.experiment.id, title, shots)
+    if not same:
+        terminal.note(DIFFERS)
+    return [shot.out for shot in shots]
+
+
+def _still(text: str) -> "Shot":
+    from mutator.film import Shot
+
+    t, _, name = text.partition("=")
+    try:
+        time = float(t)
+    except ValueError:
+        time = math.nan
+    if not name or not math.isfinite(time):
+        raise MutatorError(f"'{text}'", where="--still", expected="a time in s and a file: 14.5=early.png")
+    return Shot(out=Path(name), t=time)
 
 
 def plot_path(run: Path, experiment_id: str) -> Path:

@@ -87,11 +87,11 @@ class BirdsEye:
         ):
             if distance is None or not 0.0 < distance < self.ahead:
                 continue
-            ends = self._places([distance, distance], [0.0, side * 2.4])
+            ends = self._places([distance, distance], [0.0, side * LANE_WIDTH])
             pen.stroke(strip, ends, colour, 1)
             column, row = ends[1].astype(int).tolist()
             cv2.circle(strip, (column, row), 3, colour, cv2.FILLED, cv2.LINE_AA)
-            pen.write(strip, f"{name} {distance:.1f} m", (column + 7, row + 4), colour, pen.SMALL)
+            pen.write(strip, f"{name} {distance:.1f} m", (column + 7, row + 5), colour, pen.SMALL)
 
     def _places(self, x: object, y: object) -> np.ndarray:
         """Points `x` m ahead and `y` m left of the lane's middle, in the strip."""

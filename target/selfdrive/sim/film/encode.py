@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film import pen
 
 PICTURES_PER_S = 20
 GIF_EVERY = 4  # of the pictures are left out in a GIF, whose files grow large
@@ -83,7 +84,10 @@ def _write_vp9(pictures: Iterable[np.ndarray], path: Path) -> None:
 
 
 def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
-    """Smaller and with fewer pictures; colours from one palette, so that what stands still costs nothing."""
+    """Smaller and with fewer pictures; colours from one palette, so that what stands still costs nothing.
+
+    The palette has the sheet's own colours, and for the rest those of the picture in the middle.
+    """
     from PIL import Image
 
     small = []
@@ -92,7 +96,10 @@ def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
             rows = round(picture.shape[0] * GIF_WIDTH / picture.shape[1])
             scaled = cv2.resize(picture, (GIF_WIDTH, rows), interpolation=cv2.INTER_AREA)
             small.append(Image.fromarray(cv2.cvtColor(scaled, cv2.COLOR_BGR2RGB)))
-    palette = small[len(small) // 2].quantize(GIF_COLOURS, method=Image.Quantize.MEDIANCUT)
+    own = [part for colour in pen.COLOURS for part in reversed(colour)]
+    middle = small[len(small) // 2].quantize(GIF_COLOURS - len(pen.COLOURS))
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*own, *middle.getpalette()])
     indexed = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in small]
     duration = round(1000 * GIF_EVERY / PICTURES_PER_S)
     indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=duration, loop=0, optimize=False)

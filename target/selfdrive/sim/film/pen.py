@@ -19,6 +19,10 @@ TRIGGER = (200, 196, 192)
 MANIFESTED = (150, 190, 60)
 ALERT = (40, 178, 245)
 HAZARD = (62, 52, 225)
+COLOURS = (
+    *(PAPER, PANEL, RULE, DIM, INK, GOLDEN, FAULTY, SEEN, DOUBTED),
+    *(PATH, TRIGGER, MANIFESTED, ALERT, HAZARD),
+)
 
 SMALL, NORMAL, LARGE = 0.42, 0.5, 0.66  # of text
 SHIFT = 4  # fractional bits of the coordinates OpenCV draws at
