@@ -14,7 +14,7 @@ SUN_SIDE = radians(8.0)  # at most, to either side
 SUN_RADIUS = radians(0.27)
 ASPHALT_SLOPES = 0.25  # rms slope of its facets
 MIRROR = 0.04  # reflectance at right angles, of a refractive index of 1.5
-POLISHED = 0.02  # share of a dry road's surface that mirrors; of the order of the CIE's road table R3
+POLISHED = 0.004  # share of a dry road's surface that mirrors; of the order of the CIE's road table R3
 
 ELECTRONS = 14.0  # that white light of one lux frees in a pixel in the longest exposure (10 ms)
 FULL_WELL = 10000.0

@@ -1,0 +1,47 @@
+"""Fog after Koschmieder, with the camera's depth."""
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.effects import Fog
+from selfdrive.sim.effects.air import ways
+
+UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0, height=1.22)
+
+
+@pytest.mark.parametrize("model", [CameraModel(), UDACITY])
+def test_way_of_light_is_the_distance_to_the_road(model):
+    """Straight ahead it is the hypotenuse of the camera's height and the distance on the road."""
+    way = ways(model)
+    for x in (5.0, 20.0, 60.0):
+        row, column = model.row(x), model.column(x, 0.0)
+        above, share = int(row), row - int(row)
+        # Below the horizon 1 / way is linear in the row, nearly.
+        inverse = (1.0 - share) / way[above, round(column)] + share / way[above + 1, round(column)]
+        assert 1.0 / inverse == pytest.approx(np.hypot(x, model.height), rel=2e-3)
+
+
+@pytest.mark.parametrize("visibility", [20.0, 40.0])
+def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
+    """Of a mark's contrast 5 % is left at the visibility, and its root at half of it."""
+    dark = np.full((camera.rows, camera.width), 50, np.uint8)
+    dark[:170] = 200
+    bright = dark.copy()
+    bright[170:] = 250
+    fog = Fog(visibility, 0, camera)
+    left = fog.apply(bright, moment()).astype(float) - fog.apply(dark, moment())
+    way = ways(camera)
+    for share, expected in ((1.0, 0.05), (0.5, 0.05**0.5)):
+        there = np.abs(way / (share * visibility) - 1.0) < 0.01
+        there[:180] = False
+        assert there.sum() > 20
+        assert left[there].mean() / 200.0 == pytest.approx(expected, rel=0.05)
+
+
+def test_fog_follows_the_law_in_every_row(camera, moment, road):
+    """Every pixel is its light, thinned, and airlight; above the horizon, at last, there is only airlight."""
+    visibility = 60.0
+    seen = Fog(visibility, 0, camera).apply(road, moment()).astype(float)
+    kept = 0.05 ** (ways(camera) / visibility)
+    assert np.abs(seen - (kept * road + (1.0 - kept) * 205.0)).max() <= 1.0
+    assert np.abs(seen[camera.rows // 3] - 205.0).max() <= 1.0

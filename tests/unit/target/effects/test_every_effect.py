@@ -1,0 +1,171 @@
+"""What all effects have in common: pure, seeded, within grey levels, and clear about wrong input."""
+
+from dataclasses import replace
+from math import inf, nan
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim import effects
+from selfdrive.sim.effects.levels import LEVELS
+
+ALL = sorted(LEVELS, key=lambda effect: effect.__name__)
+MOVING = [
+    effects.PaperRain,
+    effects.PaperFog,
+    effects.PaperSnow,
+    effects.Rain,
+    effects.Snow,
+    effects.LowLight,
+]
+STILL = [effect for effect in ALL if effect not in MOVING]
+RANDOM = [*MOVING, effects.PaperOcclusion, effects.LensMud, effects.SunGlare]
+HD = CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5)
+
+every = pytest.mark.parametrize("effect", ALL)
+
+
+def strongest(effect, camera, seed=3):
+    """The effect at its highest level."""
+    return effect(LEVELS[effect][-1], seed, camera)
+
+
+def test_levels_name_every_exported_effect():
+    """Pages and benchmarks, which go by levels, leave no effect out."""
+    assert {effect.__name__ for effect in LEVELS} == set(effects.__all__)
+
+
+@every
+def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
+    """A picture depends on its moment, not on the pictures before it."""
+    one, other = strongest(effect, camera), strongest(effect, camera)
+    forwards = [one.apply(road, moment(number)) for number in range(4)]
+    backwards = [other.apply(road, moment(number)) for number in reversed(range(4))][::-1]
+    for first, second in zip(forwards, backwards, strict=True):
+        assert np.array_equal(first, second)
+
+
+@every
+def test_input_stays_and_output_is_new(effect, camera, moment, road):
+    """A read-only picture is left as it is; the result is a picture of its own, of the same type and size."""
+    before = road.copy()
+    after = strongest(effect, camera).apply(road, moment())
+    assert after.dtype == np.uint8 and after.shape == road.shape
+    assert not np.shares_memory(after, road)
+    assert np.array_equal(road, before) and not np.array_equal(after, road)
+
+
+@every
+def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
+    """A result once handed out is never drawn over."""
+    made = strongest(effect, camera)
+    first = made.apply(road, moment())
+    kept = first.copy()
+    made.apply(255 - road, moment(1))
+    assert np.array_equal(first, kept)
+
+
+@pytest.mark.parametrize("effect", RANDOM)
+def test_seed_decides_what_is_random(effect, camera, moment, road):
+    """Another seed gives another picture."""
+    one, other = (strongest(effect, camera, seed).apply(road, moment()) for seed in (1, 2))
+    assert not np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("effect", STILL)
+def test_still_effects_do_not_move(effect, camera, moment, road):
+    """What is fixed to the lens, or to nothing, is the same at any moment and speed."""
+    made = strongest(effect, camera)
+    assert np.array_equal(made.apply(road, moment()), made.apply(road, moment(17, speed=5.0)))
+
+
+@pytest.mark.parametrize("effect", MOVING)
+def test_moving_effects_move(effect, camera, moment, road):
+    """The next picture is another one."""
+    made = strongest(effect, camera)
+    assert not np.array_equal(made.apply(road, moment()), made.apply(road, moment(1)))
+
+
+@every
+@pytest.mark.parametrize("level", [0, 255])
+def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, level):
+    """Levels are limited, never carried over: where black turns bright, white does not turn dark."""
+    flat = np.full((camera.rows, camera.width), level, dtype=np.uint8)
+    after = strongest(effect, camera).apply(flat, moment()).astype(int)
+    grey = strongest(effect, camera).apply(np.full_like(flat, 128), moment()).astype(int)
+    noise = 60 if effect is effects.LowLight else 4
+    assert (after <= grey + noise).all() if level == 0 else (after >= grey - noise).all()
+
+
+@every
+def test_bigger_frames_work(effect, moment):
+    """An effect fits the camera it is made for."""
+    picture = np.full((HD.rows, HD.width), 95, dtype=np.uint8)
+    assert strongest(effect, HD).apply(picture, moment()).shape == picture.shape
+
+
+@pytest.mark.parametrize("effect", [effects.Rain, effects.Snow, effects.PaperRain, effects.Fog])
+def test_odd_sizes_work(effect, camera, moment):
+    """No size needs to be even."""
+    odd = replace(camera, width=321, rows=243, cx=160.0, cy=130.0)
+    picture = np.full((odd.rows, odd.width), 95, dtype=np.uint8)
+    assert strongest(effect, odd).apply(picture, moment()).shape == picture.shape
+
+
+@every
+def test_wrong_amounts_are_refused(effect, camera):
+    """Beyond the limits, or no number: an error that names effect, amount and limits."""
+    for amount in (effect.LEAST - 1.0, 2.0 * effect.MOST + 1.0, nan, inf):
+        with pytest.raises(ConfigError, match=f"{effect.__name__}: amount .*, expected .*{effect.MOST:g}"):
+            effect(amount, 0, camera)
+
+
+@pytest.mark.parametrize("effect", [effects.PaperOcclusion, effects.AveragingBlur])
+def test_counted_amounts_are_whole(effect, camera):
+    """There is no half blob and no half pixel."""
+    with pytest.raises(ConfigError, match=r"amount 2\.5, expected a whole number"):
+        effect(2.5, 0, camera)
+
+
+@pytest.mark.parametrize("effect", [effects.GaussianBlur, effects.MedianBlur])
+def test_kernels_with_a_middle_are_odd(effect, camera):
+    """An even kernel has no middle."""
+    with pytest.raises(ConfigError, match="amount 4, expected an odd number"):
+        effect(4, 0, camera)
+
+
+@every
+@pytest.mark.parametrize("seed", [-1, 1.5])
+def test_wrong_seeds_are_refused(effect, camera, seed):
+    """A seed is a whole number, 0 or above."""
+    with pytest.raises(ConfigError, match="seed"):
+        effect(LEVELS[effect][0], seed, camera)
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        np.zeros((480, 640), np.float32),
+        np.zeros((480, 640, 3), np.uint8),
+        np.zeros((240, 320), np.uint8),
+    ],
+)
+def test_pictures_of_another_camera_are_refused(camera, moment, picture):
+    """Type and size must be those of the camera's grey pictures; the error says both."""
+    with pytest.raises(
+        ConfigError, match=r"Brightness: a picture of .* expected uint8 and shape \(480, 640\)"
+    ):
+        effects.Brightness(10, 0, camera).apply(picture, moment())
+
+
+@every
+def test_severity_grows_with_the_level(effect, camera, moment, road):
+    """A picture of a stronger level is further from the clean one."""
+    amounts = LEVELS[effect]
+    chosen = sorted({0, len(amounts) // 2, len(amounts) - 1})
+    errors = []
+    for number in chosen:
+        after = effect(amounts[number], 5, camera).apply(road, moment()).astype(float)
+        errors.append(((after - road) ** 2).mean())
+    assert errors == sorted(errors) and errors[0] < errors[-1]

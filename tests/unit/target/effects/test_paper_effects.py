@@ -1,0 +1,117 @@
+"""The paper's effects: its numbers of streaks, blocks and blobs, its parameters, and motion."""
+
+import numpy as np
+import pytest
+from selfdrive.sim.effects import Brightness, Contrast, PaperFog, PaperOcclusion, PaperRain, PaperSnow
+from selfdrive.sim.effects.paper_weather import PER_THICKNESS, motion_kernel
+
+
+def black(camera):
+    return np.zeros((camera.rows, camera.width), dtype=np.uint8)
+
+
+@pytest.mark.parametrize("thickness", [1, 3, 10, 2.5])
+@pytest.mark.parametrize(("effect", "layers"), [(PaperRain, 5), (PaperSnow, 5)])
+def test_thickness_counts(effect, layers, thickness, camera):
+    """1,000 streaks or blocks for each thickness, whatever the layers: 10,000 at 10."""
+    made = effect(thickness, 0, camera)
+    assert sum(made._count(layer, layers) for layer in range(layers)) == PER_THICKNESS * thickness
+
+
+def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
+    """As many separate streaks are seen as were asked for, but for those that touch."""
+    cv2 = pytest.importorskip("cv2")
+    monkeypatch.setattr("selfdrive.sim.effects.paper_weather.PER_THICKNESS", 100)
+    picture = PaperRain(1, 0, camera).apply(black(camera), moment())
+    found, _ = cv2.connectedComponents((picture > 0).astype(np.uint8))
+    assert 80 <= found - 1 <= 110
+
+
+@pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
+def test_falling_keeps_what_falls(effect, camera, moment):
+    """Who leaves the screen enters it again: a layer's levels are always the same ones."""
+    made = effect(3, 0, camera)
+    for tile in made._tiles:
+        first, later = tile.moved(0.0, 0.0), tile.moved(-35.0, 412.0)
+        assert np.array_equal(np.sort(first, axis=None), np.sort(later, axis=None))
+
+
+@pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
+def test_drops_fall(effect, camera, moment):
+    """From picture to picture every layer moves down, near ones faster, by less than half the screen."""
+    made = effect(1, 0, camera)
+    ways = []
+    for tile in made._tiles:
+
+        def moved(right, down):
+            ways.append(down)
+            return black(camera)
+
+        tile.moved = moved
+    made.apply(black(camera), moment(0))
+    made.apply(black(camera), moment(1))
+    before, after = np.array(ways).reshape(2, -1)
+    steps = after - before
+    assert (np.diff(steps) > 0.0).all() and steps[0] > 5.0 and steps[-1] < camera.rows / 2
+
+
+def test_more_rain_holds_all_of_less(camera, moment):
+    """Levels of one seed differ by what is added, not by all."""
+    less, more = (PaperSnow(level, 0, camera)._blocks(np.random.default_rng(1), 0) for level in (2, 6))
+    assert (more >= less).all() and more.sum() > 2 * less.sum()
+
+
+def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
+    """Where no streak is, contrast is 0.75 of the picture's at thickness 1, and 0.65 at 10."""
+    for thickness, alpha in ((1, 0.75), (10, 0.65)):
+        made = PaperRain(thickness, 0, camera)
+        flat = np.full_like(road, 100)
+        assert made.apply(flat, moment()).min() == round(100 * alpha)
+
+
+def test_fog_reduces_contrast_evenly(camera, moment):
+    """Two levels 100 apart are 90 apart at thickness 1 and 40 at 10: the noise is the same for both."""
+    for thickness, alpha in ((1, 0.9), (10, 0.4)):
+        made = PaperFog(thickness, 0, camera)
+        dark, bright = (
+            made.apply(np.full((camera.rows, camera.width), level, np.uint8), moment()).astype(int)
+            for level in (20, 120)
+        )
+        assert np.median(bright - dark) == 100 * alpha
+
+
+def test_fog_noise_is_uniform_and_blurred(camera, moment):
+    """All pixels of fog 10 carry noise of 0 to 255, whose mean remains and whose grain is blurred away."""
+    fog = PaperFog(10, 0, camera).apply(black(camera), moment()).astype(float)
+    assert abs(fog.mean() - 127.5) < 1.0
+    # 73.6 / (2 * sqrt(pi) * sigma) for sigma = 7
+    assert fog.std() == pytest.approx(73.6 / (2 * np.pi**0.5 * 7.0), rel=0.15)
+
+
+@pytest.mark.parametrize("blobs", [1, 4, 10])
+def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
+    """No more dark blobs than asked for, of 5 to 50 pixels' radius, and all of fewer are among more."""
+    white = np.full((camera.rows, camera.width), 200, np.uint8)
+    share = 1.0 - PaperOcclusion(blobs, 4, camera).apply(white, moment()).astype(float) / 200.0
+    area = share.sum() / 0.9
+    assert blobs * np.pi * 5.0**2 * 0.2 < area < blobs * np.pi * 51.0**2
+    fewer = PaperOcclusion(1, 4, camera).apply(white, moment())
+    assert (200 - 200 * share <= fewer + 2).all()
+
+
+def test_motion_smear_has_the_papers_length_and_angle():
+    """The smear of snow is 5 pixels long at 75 degrees: mostly up, a little to the right."""
+    kernel = motion_kernel(5, 75.0)
+    rows, columns = np.nonzero(kernel > 0.01)
+    assert kernel.sum() == pytest.approx(1.0, abs=1e-6)
+    assert np.ptp(rows) in (4, 5) and np.ptp(columns) in (1, 2, 3)
+    up = np.average(np.arange(len(kernel)), weights=kernel[: len(kernel) // 2].sum(axis=0))
+    assert up > len(kernel) // 2
+
+
+def test_contrast_and_brightness_saturate(camera, moment, road):
+    """A gain of 3 makes asphalt white, so that marks vanish; a bias of 100 does not."""
+    strong = Contrast(3.0, 0, camera).apply(road, moment())[300:]
+    bright = Brightness(100, 0, camera).apply(road, moment())[300:]
+    assert strong.min() == 255
+    assert bright.max() == 255 and bright.min() == 195
