@@ -1,6 +1,6 @@
 """The road from above, ahead to the right: where car and lead are, and where the controller sees them."""
 
-from math import cos, isfinite, sin
+from math import cos, sin
 
 import cv2
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from selfdrive.sim.camera import LANE_WIDTH
 from selfdrive.sim.film import pen
 from selfdrive.sim.film.recorder import KNOTS
-from selfdrive.sim.film.reel import Frame, SeenLine
+from selfdrive.sim.film.reel import Frame
 from selfdrive.sim.hazards import CAR_WIDTH
 from selfdrive.sim.lead_picture import LENGTH
 
@@ -35,8 +35,7 @@ class BirdsEye:
         """The strip of a frame, BGR."""
         strip = np.full((self._size[1], self._size[0], 3), VERGE, np.uint8)
         self._draw_road(strip, frame.position)
-        if frame.lines:
-            self._draw_seen(strip, frame)
+        self._draw_seen(strip, frame)
         if frame.d_rel is not None:
             self._draw_car(strip, frame.d_rel + LENGTH, 0.0, 0.0, LEAD_BODY)
         self._draw_car(strip, 0.0, frame.offset, frame.heading, self._colour)
@@ -56,13 +55,14 @@ class BirdsEye:
                 pen.stroke(strip, self._places([start, start + DASH], [y, y]), PAINT, FAR_LINE_WIDTH)
 
     def _draw_seen(self, strip: np.ndarray, frame: Frame) -> None:
-        """Lines and path as seen, beside the true lane: the road is drawn straight, whatever its bends."""
-        for name, line in frame.lines.items():
-            if not isfinite(line.prob) or line.prob <= 0.0 or not np.isfinite(line.y).all():
-                continue
-            y = np.array(line.y) - frame.bend - frame.middle
-            colour = pen.PATH if name == "path" else _line_colour(line)
-            pen.stroke(strip, self._places(KNOTS, y), colour, 1 if name == "path" else 2)
+        """Lines as seen and path as planned, beside the true lane: bends of the road are taken out."""
+        seen = [line for line in (frame.lines or {}).values() if line.drawable]
+        lines = [(line.y, pen.line_colour(line.prob), LINE_WIDTH) for line in seen]
+        if np.isfinite(frame.plan).all():
+            lines.append((frame.plan, pen.PATH, 1))
+        for y, colour, thickness in lines:
+            places = self._places(KNOTS, np.array(y) - frame.bend - frame.middle)
+            pen.stroke(strip, places, colour, thickness)
 
     def _draw_car(
         self, strip: np.ndarray, front: float, offset: float, heading: float, colour: pen.Colour
@@ -98,7 +98,3 @@ class BirdsEye:
         columns = (np.asarray(x, float) + BEHIND) * self._scale
         rows = 0.5 * self._size[1] - np.asarray(y, float) * self._scale
         return np.stack([columns, rows], axis=1)
-
-
-def _line_colour(line: SeenLine) -> pen.Colour:
-    return pen.SEEN if line.prob >= 0.5 else pen.DOUBTED

@@ -1,5 +1,6 @@
 """What the camera showed, with the lines, path and lead that were seen drawn in."""
 
+from collections.abc import Sequence
 from math import cos, isfinite, sin
 
 import cv2
@@ -13,7 +14,7 @@ from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FURTHEST, NEAREST, draw
 from selfdrive.sim.road_renderer import RoadRenderer
 
 LINE_HALF, PATH_HALF = 0.06, 0.8  # m; half the width at which they are drawn
-DOUBTFUL = 0.5  # lines of a lower probability are drawn as doubted
+LINE_SHARE, PATH_SHARE = 0.8, 0.3  # by which they cover the picture
 CAR_HALF, CAR_HEIGHT = 1.0, 1.55  # m; of the frame around the lead
 FRAME_MARGIN = 4  # pixels
 WRONG_DISTANCE = 2.0  # m between a lead and where the camera's message has it, to be worth a frame
@@ -33,10 +34,10 @@ class CameraPane:
     def draw(self, frame: Frame) -> np.ndarray:
         """The pane of a frame, BGR."""
         pane = self._fitted(self._picture(frame))
-        if frame.lines:
-            self._draw_path(pane, frame.lines["path"])
-            for name in ("left", "right"):
-                self._draw_line(pane, frame.lines[name])
+        if np.isfinite(frame.plan).all():
+            pen.glaze(pane, self._strip(frame.plan, PATH_HALF), pen.PATH, PATH_SHARE)
+        for line in (frame.lines or {}).values():
+            self._draw_line(pane, line)
         self._draw_leads(pane, frame)
         return pane
 
@@ -84,14 +85,9 @@ class CameraPane:
             return np.ascontiguousarray(scaled[-self._top :])
         return np.concatenate([np.full((self._top, width, 3), pen.PANEL, np.uint8), scaled])
 
-    def _draw_path(self, pane: np.ndarray, path: SeenLine) -> None:
-        if _drawable(path):
-            pen.glaze(pane, self._strip(path, PATH_HALF), pen.PATH, 0.12 + 0.2 * path.prob)
-
     def _draw_line(self, pane: np.ndarray, line: SeenLine) -> None:
-        if _drawable(line) and line.prob > 0.0:
-            colour = pen.SEEN if line.prob >= DOUBTFUL else pen.DOUBTED
-            pen.glaze(pane, self._strip(line, LINE_HALF), colour, 0.8)
+        if line.drawable:
+            pen.glaze(pane, self._strip(line.y, LINE_HALF), pen.line_colour(line.prob), LINE_SHARE)
 
     def _draw_leads(self, pane: np.ndarray, frame: Frame) -> None:
         """A frame around the lead with its distance, and one where the camera's message has it instead."""
@@ -127,9 +123,9 @@ class CameraPane:
         beyond = max(0.0, distance - KNOTS[-1]) * (frame.bend[-1] - frame.bend[-2]) / (KNOTS[-1] - KNOTS[-2])
         return float(np.interp(distance, KNOTS, frame.bend)) + beyond
 
-    def _strip(self, line: SeenLine, half: float) -> np.ndarray:
-        """The outline of a strip of the road along a line."""
-        y = np.interp(self._x, KNOTS, line.y)
+    def _strip(self, knots: Sequence[float], half: float) -> np.ndarray:
+        """The outline of a strip of the road along a line that is given at KNOTS."""
+        y = np.interp(self._x, KNOTS, knots)
         sides = [self._seen_at(self._x, y + half), self._seen_at(self._x, y - half)[::-1]]
         return np.concatenate(sides)
 
@@ -143,8 +139,3 @@ class CameraPane:
     def _in_pane(self, column: float, row: float) -> tuple[float, float]:
         """Where a place of the picture is in the pane."""
         return (column + 0.5) * self._scale - 0.5, (row + 0.5) * self._scale - 0.5 + self._top
-
-
-def _drawable(line: SeenLine) -> bool:
-    """Faults may make anything of a line."""
-    return isfinite(line.prob) and bool(np.isfinite(line.y).all())

@@ -24,11 +24,17 @@ COLOURS = (
     *(PATH, TRIGGER, MANIFESTED, ALERT, HAZARD),
 )
 
+DOUBTFUL = 0.5  # lines of a lower probability are drawn as doubted
 SMALL, NORMAL, LARGE = 0.42, 0.5, 0.66  # of text
 SHIFT = 4  # fractional bits of the coordinates OpenCV draws at
 FAR = 1 << 14  # pixels; what is further out is drawn from there
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+def line_colour(prob: float) -> Colour:
+    """The colour of a lane line that was seen with this probability."""
+    return SEEN if prob >= DOUBTFUL else DOUBTED
 
 
 def write(

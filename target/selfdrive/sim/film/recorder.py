@@ -56,6 +56,7 @@ class Film:
             "bend": _at_knots(view.bend),
             "picture": self._keep(view),
             "seen": _seen(manager.visiond.latest, truth.t),
+            "plan": [_height(manager.controlsd.plan.d_poly, x) for x in KNOTS],
             "radar": lead.d_rel if lead and lead.status else None,
             "alerts": list(state.alerts),
             "text": state.alert_text1,
@@ -80,11 +81,19 @@ def _seen(model: ModelData | None, t: float) -> dict | None:
     """What visiond published at `t`; None if it published nothing then."""
     if model is None or model.t != t:
         return None
-    lines = {"left": model.left_lane, "right": model.right_lane, "path": model.path}
+    lines = {"left": model.left_lane, "right": model.right_lane}
     return {
         **{name: {"y": _at_knots(line.points), "prob": line.prob} for name, line in lines.items()},
         "lead": model.lead.d_rel,
     }
+
+
+def _height(polynomial: Sequence[float], x: float) -> float:
+    """The polynomial's value at `x`; the highest power comes first."""
+    total = 0.0
+    for factor in polynomial:
+        total = total * x + float(factor)
+    return total
 
 
 def _at_knots(values: Sequence[float]) -> list[float]:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import cv2
@@ -20,12 +21,18 @@ class SeenLine:
     y: Sequence[float]
     prob: float
 
+    @property
+    def drawable(self) -> bool:
+        """Whether it was seen, and somewhere: faults may make anything of a line."""
+        return self.prob > 0.0 and isfinite(self.prob) and all(isfinite(y) for y in self.y)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
     """The moment of one picture: the world, the controller's view of it, what it told the driver. SI units.
 
     `d_rel` is None on a free road, `lines` where visiond published nothing, `radar` where radard has no lead.
+    `plan` is the path that the controller means to drive, y at KNOTS.
     In the camera's view the lane's middle is at `middle` beside the car, and has moved by `bend` at KNOTS.
     """
 
@@ -38,7 +45,8 @@ class Frame:
     d_rel: float | None
     bend: Sequence[float]
     picture: Path | None
-    lines: dict[str, SeenLine] | None  # left, right, path
+    lines: dict[str, SeenLine] | None  # left, right
+    plan: Sequence[float]
     camera_lead: float | None
     radar: float | None
     alerts: tuple[str, ...]
@@ -90,6 +98,6 @@ def _frame(entry: dict, folder: Path) -> Frame:
     return Frame(
         **entry,
         picture=folder / picture if picture else None,
-        lines={name: SeenLine(**seen[name]) for name in ("left", "right", "path")} if seen else None,
+        lines={name: SeenLine(**seen[name]) for name in ("left", "right")} if seen else None,
         camera_lead=seen["lead"] if seen else None,
     )

@@ -1,22 +1,17 @@
 """One picture of a film of two runs: golden on the left, faulty on the right, their story beneath."""
 
-import json
-from dataclasses import dataclass
-from pathlib import Path
-
 import cv2
 import numpy as np
 
 from selfdrive.common.conversions import MPH_TO_MS
-from selfdrive.common.errors import ConfigError
 from selfdrive.sim.film import pen
 from selfdrive.sim.film.birds_eye import BirdsEye
 from selfdrive.sim.film.camera_pane import CameraPane
+from selfdrive.sim.film.events import Events
 from selfdrive.sim.film.reel import Frame, Reel
-from selfdrive.sim.film.timeline import Mark, Timeline
+from selfdrive.sim.film.timeline import Timeline
 from selfdrive.sim.recorder import COUNTED_ALERTS
 
-SCHEMA = "film-events/1"
 WIDTH, HEIGHT = 1280, 720
 MARGIN = 8
 HEADING = 42
@@ -25,39 +20,6 @@ CAPTION = 26
 STRIP = 104
 CAPTION_COLUMNS = (0, 104, 204, 330, 468)  # pixels; of the words under a pane
 OUTCOMES = {"hazard": pen.HAZARD, "sdc": pen.ALERT, "masked": pen.MANIFESTED}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Events:
-    """What the harness knows of the faulty run. Times in s; `active` spans its activations, if there were.
-
-    `names` are short words on hazards, by their id.
-    """
-
-    title: str
-    outcome: str
-    active: tuple[float, float] | None
-    marks: tuple[Mark, ...]
-    names: dict[str, str]
-
-
-def read_events(path: Path) -> Events:
-    """The events in a JSON file. Raises ConfigError for any other file."""
-    try:
-        data = json.loads(path.read_text())
-        if data["schema"] != SCHEMA:
-            raise ValueError(f"schema {data['schema']}")
-        return Events(
-            title=data["title"],
-            outcome=data["outcome"],
-            active=tuple(data["active"]) if data["active"] else None,
-            marks=tuple(Mark(**mark) for mark in data["marks"]),
-            names=data["names"],
-        )
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(
-            f"no events ({error})", where=str(path), expected=f"a {SCHEMA} file", remedy="correct --events"
-        ) from None
 
 
 class Sheet:
@@ -72,7 +34,7 @@ class Sheet:
         self.count = max(len(golden.frames), len(faulty.frames))
         self._reels = golden, faulty
         top = HEADING + PANE[1] + CAPTION + STRIP + MARGIN
-        self._timeline = Timeline(WIDTH, HEIGHT - top, golden, faulty, events.marks)
+        self._timeline = Timeline(WIDTH, HEIGHT - top, golden, faulty, events)
         self._canvas = np.full((HEIGHT, WIDTH, 3), pen.PAPER, np.uint8)
         self._draw_heading()
 

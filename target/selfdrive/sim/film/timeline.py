@@ -1,13 +1,13 @@
 """Offset and distance of both runs over time, with marks where things happened and a hand that moves."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import ceil
 
 import cv2
 import numpy as np
 
 from selfdrive.sim.film import pen
+from selfdrive.sim.film.events import Events, Mark
 from selfdrive.sim.film.reel import Frame, Reel
 from selfdrive.sim.hazards import LANE_OFFSET
 
@@ -25,19 +25,10 @@ MOST_TICKS = 16
 LEAST_OFFSET, LEAST_DISTANCE = 0.3, 10.0  # m that a plot shows at least
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
-    """Something that happened at `t` (s): `kind` is trigger, manifest, alert or hazard."""
-
-    kind: str
-    t: float
-    label: str
-
-
 class Timeline:
     """The plots are drawn once; `draw` adds the hand."""
 
-    def __init__(self, width: int, height: int, golden: Reel, faulty: Reel, marks: Sequence[Mark]) -> None:
+    def __init__(self, width: int, height: int, golden: Reel, faulty: Reel, events: Events) -> None:
         self._size = width, height
         self._end = max(reel.frames[-1].t for reel in (golden, faulty)) or 1.0
         self._canvas = np.full((height, width, 3), pen.PAPER, np.uint8)
@@ -46,7 +37,9 @@ class Timeline:
         reels = ((golden, pen.GOLDEN, 2), (faulty, pen.FAULTY, 1))
         self._plot("offset [m]", HEAD, rows, _offset, reels, LANE_OFFSET)
         self._plot("lead [m]", HEAD + rows + GAP, rows, _distance, reels, None)
-        self._draw_marks(marks)
+        if events.active:
+            self._shade(*events.active)
+        self._draw_marks(events.marks)
 
     def draw(self, t: float) -> np.ndarray:
         """The timeline with its hand at `t` (s)."""
@@ -100,6 +93,11 @@ class Timeline:
         for level, row in ((high, top + 9), (low, top + rows)):
             label = f"{level:.3g}"
             pen.write(self._canvas, label, (GUTTER - 6 - pen.width(label, 0.34), row), pen.DIM, 0.34)
+
+    def _shade(self, first: float, last: float) -> None:
+        """Show how long the fault was active."""
+        part = self._canvas[HEAD : self._size[1] - FOOT, round(self._x(first)) : round(self._x(last)) + 1]
+        cv2.addWeighted(part, 0.85, np.full_like(part, pen.FAULTY), 0.15, 0.0, dst=part)
 
     def _draw_marks(self, marks: Sequence[Mark]) -> None:
         """A line for each mark, and its name above where there is room."""

@@ -1,0 +1,51 @@
+"""What the harness tells of the faulty run: title, outcome, and what happened when. Read from JSON."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from selfdrive.common.errors import ConfigError
+
+SCHEMA = "film-events/1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """Something that happened at `t` (s): `kind` is trigger, manifest, alert or hazard."""
+
+    kind: str
+    t: float
+    label: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Events:
+    """What the harness knows of the faulty run. Times in s; `active` spans its activations, if there were.
+
+    `names` are short words on hazards, by their id.
+    """
+
+    title: str
+    outcome: str
+    active: tuple[float, float] | None
+    marks: tuple[Mark, ...]
+    names: dict[str, str]
+
+
+def read_events(path: Path) -> Events:
+    """The events in a JSON file. Raises ConfigError for any other file."""
+    try:
+        data = json.loads(path.read_text())
+        if data["schema"] != SCHEMA:
+            raise ValueError(f"schema {data['schema']}")
+        return Events(
+            title=data["title"],
+            outcome=data["outcome"],
+            active=tuple(data["active"]) if data["active"] else None,
+            marks=tuple(Mark(**mark) for mark in data["marks"]),
+            names=data["names"],
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(
+            f"no events ({error})", where=str(path), expected=f"a {SCHEMA} file", remedy="correct --events"
+        ) from None
