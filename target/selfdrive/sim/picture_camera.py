@@ -87,10 +87,13 @@ class ShiftedView:
 
 
 def moved(frame: np.ndarray, columns: int, out: np.ndarray) -> None:
-    """Write `frame` to `out`, moved that far to the right."""
+    """Write `frame` to `out`, moved that far to the right; where it ends, its last column is repeated."""
     width = frame.shape[1]
-    source = np.clip(np.arange(width) - columns, 0, width - 1)
-    frame.take(source, axis=1, out=out)
+    left = min(max(columns, 0), width)
+    right = min(max(width + columns, 0), width)
+    out[:, left:right] = frame[:, left - columns : right - columns]
+    out[:, :left] = frame[:, :1]
+    out[:, right:] = frame[:, -1:]
 
 
 def rounded(value: float, step: float) -> float:

@@ -1,0 +1,176 @@
+"""A user's own frames: calibration, order, and errors that name the file."""
+
+from dataclasses import astuple
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.image_folder import ImageFolder
+from selfdrive.sim.image_library import open_library
+from selfdrive.sim.vision import Pictures
+
+VIEW = """\
+schema: camera/1
+name: test drive
+files: "*.png"
+width: 64
+rows: 48
+horizon_row: 20
+focal_px: 60
+height_m: 1.4
+fps: 20
+"""
+CALTECH = """\
+schema: camera/1
+name: caltech
+files: "*.png"
+width: 640
+rows: 480
+fx_px: 309.4
+fy_px: 344.2
+cx_px: 317.9
+cy_px: 256.5
+height_m: 2.18
+pitch_deg: 14
+spacing_m: 1.34
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with twelve frames, each of one grey level, and their calibration."""
+    (tmp_path / "camera.yaml").write_text(VIEW)
+    for number in range(1, 13):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((48, 64, 3), 10 * number, np.uint8))
+    return tmp_path
+
+
+def test_frames_are_read_in_the_order_of_their_numbers(folder):
+    """Frame 2 comes before frame 10, grey, at the size of the calibration's camera."""
+    frames = list(ImageFolder(folder).read())
+    assert [frame[0, 0] for frame in frames] == list(range(10, 121, 10))
+    assert {frame.shape for frame in frames} == {(48, 64)}
+
+
+def test_a_folder_becomes_a_library(folder, tmp_path):
+    """The frames of a folder follow the run's time at their rate, under the folder's name and camera."""
+    library = open_library(Pictures(frames=folder, cache=tmp_path / "cache"), 0)
+    assert library.name == "test drive"
+    assert (library.fps, library.spacing) == (20.0, None)
+    assert library.frame(0.55, 0.0)[0, 0] == 120 and library.frame(0.6, 0.0)[0, 0] == 10
+    assert library.model.horizon == pytest.approx(20.0)
+
+
+def test_the_digest_follows_every_byte(folder, tmp_path):
+    """Another pixel in a frame, or another number in the calibration, is another library."""
+    digests = {ImageFolder(folder).digest}
+    cv2.imwrite(str(folder / "7.png"), np.full((48, 64), 71, np.uint8))
+    digests.add(ImageFolder(folder).digest)
+    (folder / "camera.yaml").write_text(VIEW.replace("height_m: 1.4", "height_m: 1.5"))
+    digests.add(ImageFolder(folder).digest)
+    assert len(digests) == 3
+
+
+def test_a_full_calibration_gives_that_camera(folder):
+    """Focal lengths, principal point, height and pitch reach the camera model, in its units."""
+    (folder / "camera.yaml").write_text(CALTECH)
+    read = ImageFolder(folder)
+    assert astuple(read.model) == pytest.approx(astuple(CameraModel()))
+    assert (read.fps, read.spacing) == (None, 1.34)
+
+
+def test_frames_are_made_smaller_with_their_camera(folder):
+    """A resized frame shows each point of the road where the resized camera has it."""
+    full = ImageFolder(folder).model
+    (folder / "camera.yaml").write_text(VIEW + "resize_width: 32\n")
+    half = ImageFolder(folder)
+    assert {frame.shape for frame in half.read()} == {(24, 32)}
+    column, row = full.project(9.0, 1.2, 0.0)
+    assert half.model.project(9.0, 1.2, 0.0) == pytest.approx((0.5 * column - 0.25, 0.5 * row - 0.25))
+
+
+def error(folder):
+    """What is said of a folder that cannot be used."""
+    with pytest.raises(ConfigError) as caught:
+        list(ImageFolder(folder).read())
+    return str(caught.value)
+
+
+def test_a_frame_of_another_size_is_named(folder):
+    """The message gives the file, its size and the size expected."""
+    cv2.imwrite(str(folder / "7.png"), np.zeros((60, 80), np.uint8))
+    assert error(folder).startswith(f"{folder}/7.png: 80x60, expected 64x48; ")
+
+
+@pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n truncated"])
+def test_an_unreadable_frame_is_named(folder, content):
+    """A file that is no picture gives its name and what to do."""
+    (folder / "7.png").write_bytes(content)
+    assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected ")
+
+
+def test_a_missing_frame_is_named(folder):
+    """A gap in the numbers is a frame that is missing, not a jump ahead."""
+    (folder / "7.png").unlink()
+    assert error(folder).startswith(f"{folder}/7.png: missing, expected ")
+
+
+def test_numbers_may_go_in_larger_steps(folder):
+    """Frames numbered 0, 30, 60 are no sequence with gaps, unless one of them is missing."""
+    for path in folder.glob("*.png"):
+        path.rename(folder / f"run{30 * int(path.stem):05}.png")
+    assert len(ImageFolder(folder).files) == 12
+    (folder / "run00120.png").unlink()
+    assert f"{folder}/run00120.png: missing" in error(folder)
+
+
+def test_several_sequences_follow_each_other(folder):
+    """Clips in folders of their own are taken in order; numbers start again in each, or are no numbers."""
+    for clip in ("b", "a"):
+        (folder / clip).mkdir()
+        for number in (1, 2, 3):
+            cv2.imwrite(str(folder / clip / f"{number}.jpg"), np.zeros((48, 64), np.uint8))
+    (folder / "camera.yaml").write_text(VIEW.replace("*.png", "*/*.jpg"))
+    names = [str(path.relative_to(folder)) for path in ImageFolder(folder).files]
+    assert names == ["a/1.jpg", "a/2.jpg", "a/3.jpg", "b/1.jpg", "b/2.jpg", "b/3.jpg"]
+    for path in folder.glob("*/2.jpg"):
+        path.rename(path.with_name("two.jpg"))
+    assert len(ImageFolder(folder).files) == 6
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("camera/1", "camera/2", "camera.yaml:1: schema: 'camera/2', expected one of camera/1"),
+        ("fps: 20", "fsp: 20", "camera.yaml:9: unknown key 'fsp'"),
+        ("fps: 20\n", "", "both or none of fps, spacing_m, expected exactly one of them"),
+        ("fps: 20", "fps: 20\nspacing_m: 2", "both or none of fps, spacing_m, expected exactly one of them"),
+        (
+            "focal_px: 60",
+            "focal_px: 60\npitch_deg: 3",
+            "pitch_deg, expected horizon_row, focal_px and height_m",
+        ),
+        ("horizon_row: 20", "horizon_row: 47", "camera.yaml:6: horizon_row: '47'"),
+        ("*.png", "*.tif", "expected the name of a file in"),
+        ("*.png", "../*.png", "expected files below the folder"),
+        ("rows: 48", "rows: many", "camera.yaml:5: rows: 'many'"),
+        ("rows: 48", "rows: 48\nresize_width: 128", "resize_width: '128', expected a number from 16 to 64"),
+    ],
+)
+def test_a_wrong_calibration_is_explained(folder, old, new, message):
+    """The message says what was got and expected, with file and line."""
+    (folder / "camera.yaml").write_text(VIEW.replace(old, new))
+    assert message in error(folder)
+
+
+def test_a_camera_that_sees_no_road_is_refused(folder):
+    """A calibration whose horizon lies below the frame cannot be right."""
+    (folder / "camera.yaml").write_text(CALTECH.replace("cy_px: 256.5", "cy_px: 600"))
+    assert "pitch_deg: '14', expected road in the picture" in error(folder)
+
+
+def test_a_folder_without_calibration_is_explained(tmp_path):
+    """A missing camera.yaml gives its path and where to read how to write one."""
+    assert error(tmp_path).startswith(f"{tmp_path}/camera.yaml: No such file")

@@ -1,0 +1,156 @@
+"""The image library: frames made once, safely, and found by time or distance."""
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import selfdrive
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.image_library import FRAMES, SPACING, ImageLibrary, cached, open_library
+from selfdrive.sim.road_look import DASH_PERIOD
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.sim.vision import DASHED, Pictures
+
+SHAPE = (5, 7, 9)  # an odd number of bytes a frame
+DIGEST = "ab" * 32
+
+
+def noise(seed=1):
+    """Frames of that shape, one after the other."""
+    return iter(np.random.default_rng(seed).integers(0, 256, SHAPE, dtype=np.uint8))
+
+
+def refuse():
+    """Stands where nothing may be made again."""
+    raise AssertionError("made again")
+
+
+def library(**given):
+    """A library of five frames, each filled with its number."""
+    frames = np.zeros(SHAPE, np.uint8) + np.arange(5, dtype=np.uint8)[:, None, None]
+    fields = {
+        "name": "n",
+        "digest": "d",
+        "model": CameraModel(),
+        "frames": frames,
+        "spacing": None,
+        "fps": None,
+    }
+    return ImageLibrary(**fields | given)
+
+
+def test_frames_are_found_by_distance_and_start_again():
+    """Every `spacing` metres comes the next frame, after the last the first, whatever the time."""
+    frames = library(spacing=2.0)
+    assert [frames.frame(9.9, x)[0, 0] for x in (0.0, 1.9, 2.0, 9.0, 10.0, 13.0)] == [0, 0, 1, 4, 0, 1]
+
+
+def test_frames_are_found_by_time_and_start_again():
+    """Frames taken at 10 a second follow the run's time, not the distance; a rounded time loses none."""
+    frames = library(fps=10.0)
+    times = [k * 0.05 for k in range(12)]
+    assert [frames.frame(t, 99.0)[0, 0] for t in times] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0]
+
+
+def test_the_rendered_loop_closes_on_a_dash():
+    """600 frames span whole dash periods, and pass at 20 a second at 60 mph."""
+    periods = FRAMES * SPACING / DASH_PERIOD
+    assert FRAMES >= 600
+    assert periods == pytest.approx(round(periods))
+    assert pytest.approx(60 * 0.44704 / 20, rel=0.001) == SPACING
+
+
+def test_frames_are_made_once(tmp_path):
+    """What is in the cache is not made again; it cannot be written to, and other digests do not meet it."""
+    first = cached(tmp_path, DIGEST, SHAPE, noise)
+    again = cached(tmp_path, DIGEST, SHAPE, refuse)
+    other = cached(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
+    assert np.array_equal(first, np.stack(list(noise()))) and np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    with pytest.raises(ValueError, match="read-only"):
+        again[0, 0, 0] = 1
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda data: data[:-9],
+        lambda data: data[:40],
+        lambda data: b"",
+        lambda data: data + b"0",
+        lambda data: data[:200] + bytes([data[200] ^ 1]) + data[201:],
+        lambda data: b"no array of numbers",
+        lambda data: data[:128] + bytes(len(data) - 128),
+    ],
+    ids=["short", "header only", "empty", "long", "one bit", "other content", "zeros"],
+)
+def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
+    """A cache file that is not whole is replaced, and then sound again."""
+    cached(tmp_path, DIGEST, SHAPE, noise)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(harm(path.read_bytes()))
+    assert np.array_equal(cached(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
+    cached(tmp_path, DIGEST, SHAPE, refuse)
+
+
+def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
+    """Half a set of frames never appears in the cache."""
+
+    def break_off():
+        yield from list(noise())[:2]
+        raise ConfigError("unreadable", where="0002.png", expected="a picture", remedy="replace it")
+
+    with pytest.raises(ConfigError, match=r"0002\.png"):
+        cached(tmp_path, DIGEST, SHAPE, break_off)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cache_that_cannot_be_written_is_an_error_that_names_it(tmp_path):
+    """A cache folder that cannot be made ends with a message, not a traceback."""
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(ConfigError, match=r"file/cache.*choose another --cache"):
+        cached(tmp_path / "file" / "cache", DIGEST, SHAPE, noise)
+
+
+def test_processes_may_make_the_same_frames_at_once(tmp_path):
+    """Several processes that find the cache cold all end with the same frames, and leave one whole file."""
+    code = (
+        "import numpy as np, hashlib, pathlib, sys\n"
+        "from selfdrive.sim.image_library import cached\n"
+        "make = lambda: iter(np.random.default_rng(1).integers(0, 256, (40, 97, 101), dtype=np.uint8))\n"
+        f"frames = cached(pathlib.Path(sys.argv[1]), {DIGEST!r}, (40, 97, 101), make)\n"
+        "print(hashlib.sha256(frames.tobytes()).hexdigest())\n"
+    )
+    root = str(Path(selfdrive.__path__[0]).parent)
+
+    def run(_):
+        command = [sys.executable, "-c", code, str(tmp_path)]
+        return subprocess.run(
+            command, env={"PYTHONPATH": root}, capture_output=True, text=True, check=True
+        ).stdout
+
+    with ThreadPoolExecutor(3) as pool:
+        digests = set(pool.map(run, range(3)))
+    assert len(digests) == 1
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.slow
+def test_the_rendered_library_is_the_road_in_steps(tmp_path):
+    """The 600 frames are those the renderer draws, equal for equal seeds, other for other seeds and marks."""
+    pictures = Pictures(marks=DASHED, cache=tmp_path / "one")
+    frames = open_library(pictures, 5)
+    assert frames.frames.shape == (600, 480, 640)
+    assert (frames.name, frames.model) == ("rendered, dashed", CameraModel())
+    drawn = RoadRenderer(CameraModel(), DASHED, 5, periods=66).grey(100 * SPACING)
+    assert np.array_equal(frames.frame(0.0, 100.5 * SPACING), drawn)
+    elsewhere = open_library(Pictures(marks=DASHED, cache=tmp_path / "two"), 5)
+    assert elsewhere.digest == frames.digest
+    assert np.array_equal(elsewhere.frames, frames.frames)
+    digests = {open_library(Pictures(cache=tmp_path / "one"), seed).digest for seed in (5, 6)}
+    assert len(digests | {frames.digest}) == 3

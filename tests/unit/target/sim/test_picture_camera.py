@@ -1,0 +1,133 @@
+"""The camera with pictures: a frame as it looks from where the car is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.camera import Camera
+from selfdrive.sim.image_library import SPACING, ImageLibrary
+from selfdrive.sim.picture_camera import HEADING_STEP, OFFSET_STEP, SHIFT_DISTANCE, PictureCamera
+from selfdrive.sim.road import Road
+from selfdrive.sim.road_renderer import RoadRenderer, first_road_row
+from selfdrive.sim.vision import GROUND, SHIFT, Pictures, build_vision
+
+CALTECH = CameraModel()
+UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0, height=1.22)
+CAMERAS = pytest.mark.parametrize("model", [CALTECH, UDACITY])
+
+
+def camera(model, translation=GROUND, frames=12):
+    """A camera over a few frames of a rendered road, and who rendered them."""
+    renderer = RoadRenderer(model, "dashed", 3, periods=2)
+    pictures = np.stack([renderer.grey(k * SPACING) for k in range(frames)])
+    pictures.flags.writeable = False
+    library = ImageLibrary(name="few", digest="d", model=model, frames=pictures, spacing=SPACING, fps=None)
+    return PictureCamera(Camera(Road(None, None)), library, translation), renderer
+
+
+@CAMERAS
+@pytest.mark.parametrize(("offset", "heading"), [(0.4, 0.0), (0.0, 0.02), (-0.5, -0.02), (0.9, 0.03)])
+def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, truth):
+    """Below the horizon a moved frame is the road drawn from the displaced pose, but for interpolation."""
+    looking, renderer = camera(model)
+    seen = looking.look(truth(lateral_offset=offset, heading=heading, position=3 * SPACING)).picture
+    drawn = renderer.grey(3 * SPACING, offset, heading)
+    still = renderer.grey(3 * SPACING)
+    ground = slice(first_road_row(model) + 4, model.rows), slice(160, 480)
+    error = np.abs(seen[ground].astype(int) - drawn[ground]).mean()
+    assert error < 1.5
+    assert np.abs(still[ground].astype(int) - drawn[ground]).mean() > 4.0 * error
+
+
+@CAMERAS
+def test_lines_in_the_view_are_where_the_truth_says(model, truth):
+    """The lane's lines lie in the moved frame where the displaced car has them, to a fraction of a pixel."""
+    looking, renderer = camera(model)
+    offset, heading = 0.32, -0.015
+    picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture.astype(float)
+    a, b = model.line_in_picture(*renderer.truth(offset, heading)[0])
+    errors = []
+    for row in range(int(model.horizon) + 30, int(model.horizon) + 150):
+        half = 0.25 / model.metres_per_pixel(row) + 3.0
+        columns = np.arange(int(a * row + b - half), int(a * row + b + half) + 2)
+        if columns[0] < 0:
+            break
+        light = np.clip(picture[row, columns] - 130.0, 0.0, None)
+        errors.append(light @ columns / light.sum() - (a * row + b))
+    assert len(errors) > 50
+    assert abs(np.mean(errors)) < 0.1 and np.median(np.abs(errors)) < 0.15
+
+
+def test_in_the_middle_of_the_lane_the_frame_is_the_view(truth):
+    """A car that is where the frame was taken sees the frame itself, which may not be written to."""
+    looking, renderer = camera(CALTECH)
+    picture = looking.look(truth(position=2.5 * SPACING)).picture
+    assert np.array_equal(picture, renderer.grey(2 * SPACING))
+    with pytest.raises(ValueError, match="read-only"):
+        picture[0, 0] = 1
+
+
+def test_poses_that_round_to_the_same_give_the_same_bytes(truth):
+    """Offset and heading are rounded to their steps before the frame is moved."""
+    looking, _ = camera(CALTECH)
+    exact = truth(lateral_offset=10 * OFFSET_STEP, heading=8 * HEADING_STEP)
+    near = truth(lateral_offset=10.4 * OFFSET_STEP, heading=7.6 * HEADING_STEP)
+    other = truth(lateral_offset=11 * OFFSET_STEP, heading=8 * HEADING_STEP)
+    assert np.array_equal(looking.look(exact).picture, looking.look(near).picture)
+    assert not np.array_equal(looking.look(exact).picture, looking.look(other).picture)
+
+
+def test_the_rounding_is_finer_than_a_pixel(truth):
+    """Half a step of the pose moves a line by less than half a pixel, even right before the car."""
+    row = CALTECH.rows - 1
+    assert 0.5 * OFFSET_STEP / CALTECH.metres_per_pixel(row) < 0.5
+    assert 0.5 * HEADING_STEP * CALTECH.fx < 0.5
+
+
+def test_above_the_horizon_the_view_pans_and_no_more(truth):
+    """The sky does not follow the offset; a left turn moves it right."""
+    looking, renderer = camera(CALTECH)
+    frame = renderer.grey(0.0)
+    aside = looking.look(truth(lateral_offset=0.8)).picture
+    turned = looking.look(truth(heading=0.04)).picture
+    far = first_road_row(CALTECH)
+    shift = round(CALTECH.fx * np.tan(0.04) / np.cos(CALTECH.pitch))
+    assert np.array_equal(aside[:far], frame[:far])
+    assert np.array_equal(turned[:far, shift:], frame[:far, :-shift])
+    assert (turned[:far, :shift] == frame[:far, :1]).all()
+
+
+@pytest.mark.parametrize(("offset", "heading"), [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.01), (40.0, 0.0)])
+def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
+    """In the paper's mode all rows move alike, as far as the lane has moved 10 m ahead."""
+    looking, renderer = camera(CALTECH, SHIFT)
+    picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture
+    away = offset + SHIFT_DISTANCE * np.tan(heading)
+    shift = round(away / CALTECH.metres_per_pixel(CALTECH.row(SHIFT_DISTANCE)))
+    columns = np.clip(np.arange(CALTECH.width) - shift, 0, CALTECH.width - 1)
+    assert np.array_equal(picture, renderer.grey(0.0)[:, columns])
+
+
+def test_the_message_stays_geometric(truth):
+    """Lane, path and lead in the message are the ideal camera's; only the picture is added."""
+    looking, _ = camera(CALTECH)
+    there = truth(lateral_offset=0.3, heading=0.01, d_rel=42.0)
+    assert looking.look(there)._replace(picture=None) == Camera(Road(None, None)).look(there)
+
+
+def test_any_size_of_frame_is_moved(truth):
+    """Frames need not be 640 x 480, and the horizon may lie above them."""
+    small = CameraModel.from_view(width=320, rows=117, horizon=-5.0, focal=260.0, height=1.5)
+    looking, renderer = camera(replace(small), frames=1)
+    picture = looking.look(truth(lateral_offset=0.4, heading=0.01)).picture
+    drawn = renderer.grey(0.0, 0.4, 0.01)
+    assert picture.shape == (117, 320)
+    assert np.abs(picture[:, 80:240].astype(int) - drawn[:, 80:240]).mean() < 1.5
+
+
+def test_pictures_show_no_curves():
+    """A road with curvature and pictures, which are of a straight one, are refused together."""
+    with pytest.raises(ConfigError, match="a road with curvature, expected a straight road"):
+        build_vision(Pictures(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
