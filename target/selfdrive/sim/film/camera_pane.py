@@ -1,6 +1,7 @@
 """What the camera showed, with the lines, path and lead that were seen drawn in."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from math import cos, isfinite, sin
 
 import cv2
@@ -27,9 +28,12 @@ class CameraPane:
         self._model, self._width = model, width
         self._scale = width / model.width
         self._top = height - round(model.rows * self._scale)  # row at which the picture begins; it may be < 0
-        self._road = RoadRenderer(model, "solid", 0)
         near = max(0.0, model.distance(model.rows - 1.0))
         self._x = np.concatenate([[near], np.arange(np.ceil(near + 0.1), KNOTS[-1] + 1.0)])
+
+    @cached_property
+    def _road(self) -> RoadRenderer:
+        return RoadRenderer(self._model, "solid", 0)
 
     def draw(self, frame: Frame) -> np.ndarray:
         """The pane of a frame, BGR."""

@@ -27,8 +27,9 @@ class Sheet:
 
     def __init__(self, golden: Reel, faulty: Reel, events: Events) -> None:
         self._events = events
+        panes = {reel.camera: CameraPane(reel.camera, *PANE) for reel in (golden, faulty)}
         self._sides = tuple(
-            _Side(reel, name, colour, events)
+            _Side(reel, name, colour, events, panes[reel.camera])
             for reel, name, colour in ((golden, "golden", pen.GOLDEN), (faulty, "faulty", pen.FAULTY))
         )
         self.count = max(len(golden.frames), len(faulty.frames))
@@ -68,9 +69,9 @@ class Sheet:
 class _Side:
     """One run's half of the sheet: picture, caption, bird's-eye strip."""
 
-    def __init__(self, reel: Reel, name: str, colour: pen.Colour, events: Events) -> None:
+    def __init__(self, reel: Reel, name: str, colour: pen.Colour, events: Events, pane: CameraPane) -> None:
         self._reel, self._name, self._colour, self._events = reel, name, colour, events
-        self._pane = CameraPane(reel.camera, *PANE)
+        self._pane = pane
         self._strip = BirdsEye(PANE[0], STRIP, colour)
 
     def draw(self, index: int) -> np.ndarray:

@@ -1,0 +1,101 @@
+"""Videos, stills, and the command that makes them."""
+
+import json
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film import pen
+from selfdrive.sim.film.__main__ import main
+from selfdrive.sim.film.encode import write_still, write_video
+
+EVENTS = {
+    "schema": "film-events/1",
+    "title": "a fault",
+    "outcome": "masked",
+    "active": None,
+    "marks": [],
+    "names": {},
+}
+
+
+def pictures(count=8):
+    """Grey panes that grow lighter, with a bar in a colour of the sheet."""
+    for number in range(count):
+        picture = np.full((180, 320, 3), 60 + 10 * number, np.uint8)
+        picture[:40] = pen.FAULTY
+        yield picture
+
+
+def frames_of(path):
+    video, found = cv2.VideoCapture(str(path)), []
+    while True:
+        there, picture = video.read()
+        if not there:
+            return found
+        found.append(picture)
+
+
+@pytest.mark.parametrize("with_av", [True, False])
+def test_an_mp4_shows_the_pictures(tmp_path, monkeypatch, with_av):
+    """As many frames as pictures, of their size, each as bright as its own; with PyAV and without."""
+    if with_av:
+        pytest.importorskip("av")
+    else:
+        monkeypatch.setitem(sys.modules, "av", None)
+    write_video(pictures(), tmp_path / "a.mp4")
+    found = frames_of(tmp_path / "a.mp4")
+    assert [picture.shape for picture in found] == [(180, 320, 3)] * 8
+    assert [float(picture[100:].mean()) for picture in found] == pytest.approx(
+        [60 + 10 * number for number in range(8)], abs=4
+    )
+    assert cv2.VideoCapture(str(tmp_path / "a.mp4")).get(cv2.CAP_PROP_FPS) == 20
+
+
+def test_a_gif_moves_at_the_same_speed(tmp_path):
+    """A quarter of the pictures for four times as long, in the sheet's own colours."""
+    from PIL import Image
+
+    write_video(pictures(), tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as gif:
+        assert (gif.n_frames, gif.info["duration"], gif.size) == (2, 200, (800, 450))
+        assert gif.convert("RGB").getpixel((400, 20)) == pen.FAULTY[::-1]
+
+
+def test_other_formats_are_refused(tmp_path):
+    """The names that are possible are told, and nothing is written."""
+    with pytest.raises(ConfigError, match=r"\.mp4 or \.gif"):
+        write_video(pictures(), tmp_path / "a.avi")
+    with pytest.raises(ConfigError, match=r"\.png"):
+        write_still(next(pictures()), tmp_path / "a.tiff")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path):
+    """The error names the file."""
+    (tmp_path / "file").touch()
+    with pytest.raises(ConfigError, match=r"a\.png"):
+        write_still(next(pictures()), tmp_path / "file" / "a.png")
+
+
+@pytest.mark.parametrize(("name", "words"), [("a.gif", ()), ("a.png", ("--at", "0.3"))])
+def test_the_command_shows_two_films(drive, tmp_path, name, words):
+    """From the films of two runs to a file, alike each time."""
+    (tmp_path / "events.json").write_text(json.dumps(EVENTS))
+    film = str(drive() / "film")
+    for folder in ("x", "y"):
+        sides = ["--golden", film, "--faulty", film, "--events", str(tmp_path / "events.json")]
+        assert main([*sides, "--out", str(tmp_path / folder / name), *words]) == 0
+    assert (tmp_path / "x" / name).read_bytes() == (tmp_path / "y" / name).read_bytes()
+
+
+def test_the_command_tells_what_is_wrong(tmp_path, capsys):
+    """Wrong input is exit code 2 and one line."""
+    folder = str(tmp_path)
+    words = ["--golden", folder, "--faulty", folder, "--events", folder, "--out", f"{folder}/a.mp4"]
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert "film.jsonl: no film" in error
+    assert error.count("\n") == 1

@@ -1,0 +1,80 @@
+"""What a film keeps of a run, and that the run does not notice."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film.reel import read_reel
+from selfdrive.sim.run import main
+
+
+def outputs(folder):
+    return [(folder / name).read_bytes() for name in ("trace.npz", "record.json")]
+
+
+def test_a_run_is_the_same_with_a_film(drive):
+    """With ideal vision, trace and record have the same bytes whether a film is taken or not."""
+    assert outputs(drive()) == outputs(drive(film=False))
+
+
+def test_a_run_with_pictures_is_the_same_with_a_film(drive, seeing):
+    """With pictures, trace and record have the same bytes whether a film is taken or not."""
+    assert outputs(drive(*seeing)) == outputs(drive(*seeing, film=False))
+
+
+def test_one_frame_for_each_look_of_the_camera(drive):
+    """Twenty frames a second, at the times of the trace, with its speeds and distances."""
+    folder = drive()
+    reel, trace = read_reel(folder / "film"), np.load(folder / "trace.npz")
+    assert [frame.t for frame in reel.frames] == list(trace["t"][::5])
+    assert [frame.v_ego for frame in reel.frames] == list(trace["v_ego"][::5])
+    assert [frame.d_rel for frame in reel.frames] == list(trace["d_rel"][::5])
+    assert all(frame.picture is None for frame in reel.frames)
+
+
+def test_what_was_seen_is_kept(drive):
+    """Ideal vision sees both lines and the lead where they are."""
+    frame = read_reel(drive() / "film").frames[-1]
+    assert (frame.lines["left"].y[0], frame.lines["right"].y[0]) == (1.85, -1.85)
+    assert frame.lines["left"].prob == 1.0
+    assert frame.camera_lead == frame.d_rel
+
+
+def test_pictures_are_kept_as_the_detector_had_them(drive, seeing):
+    """The kept picture is the camera's own, but for what JPEG loses."""
+    frame = read_reel(drive(*seeing) / "film").frames[0]
+    own = cv2.imread(f"{seeing[2]}/0.png", cv2.IMREAD_GRAYSCALE)
+    assert np.abs(frame.image().astype(int) - own).mean() < 1.0
+
+
+def test_a_free_road_has_no_lead(drive):
+    """Without a lead a frame has no distance."""
+    assert read_reel(drive("--no-lead") / "film").frames[-1].d_rel is None
+
+
+def test_a_run_that_breaks_off_leaves_what_went_before(drive):
+    """Each line of the index is whole as soon as it is written: the last one missing harms no other."""
+    film = drive() / "film"
+    lines = (film / "film.jsonl").read_text().splitlines()
+    (film / "film.jsonl").write_text("\n".join(lines[:4]) + "\n")
+    assert len(read_reel(film).frames) == 3
+    assert json.loads(lines[0])["schema"] == "film/1"
+
+
+def test_a_film_that_cannot_be_written(tmp_path, capsys):
+    """A folder that cannot be made is told, with its name, and nothing is run."""
+    (tmp_path / "file").touch()
+    words = ["--scenario", "fault_library/scenarios/S1.yaml", "--out", str(tmp_path / "out")]
+    assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2
+    assert "file/film" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
+def test_what_is_no_film_is_told(tmp_path, text):
+    """An index that is missing parts is refused by its name."""
+    (tmp_path / "film.jsonl").write_text(text)
+    with pytest.raises(ConfigError, match=r"film\.jsonl: no film"):
+        read_reel(tmp_path)

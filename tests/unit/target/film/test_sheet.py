@@ -1,0 +1,157 @@
+"""The sheet: two runs side by side, whatever a fault has made of what they saw."""
+
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.sim.film import pen
+from selfdrive.sim.film.camera_pane import CameraPane
+from selfdrive.sim.film.events import Events, Mark, read_events
+from selfdrive.sim.film.reel import SeenLine
+from selfdrive.sim.film.sheet import HEADING, HEIGHT, MARGIN, PANE, WIDTH, Sheet
+
+EVENTS = Events(title="a fault", outcome="hazard", active=None, marks=(), names={"H3": "out of lane"})
+
+
+def is_drawn(picture, colour):
+    """Whether some pixel of the picture has nearly this colour."""
+    return bool((np.abs(picture.astype(int) - colour).max(axis=-1) <= 40).any())
+
+
+def pane_of(sheet, side):
+    left = MARGIN if side == "golden" else WIDTH - MARGIN - PANE[0]
+    return sheet[HEADING : HEADING + PANE[1], left : left + PANE[0]]
+
+
+def test_lines_lie_on_the_paint(frame):
+    """Lines that are seen where they are cover the painted ones: a picture with them has no yellow left."""
+    pane = CameraPane(CameraModel(), *PANE)
+    without, with_lines = pane.draw(frame(lines=None, d_rel=None)), pane.draw(frame(d_rel=None))
+    yellow = (without[..., 2].astype(int) - without[..., 0] > 90).sum()
+    left = (with_lines[..., 2].astype(int) - with_lines[..., 0] > 90).sum()
+    assert yellow > 500
+    assert left < 0.35 * yellow
+
+
+def test_a_bend_moves_road_and_lines_alike(frame):
+    """In a left-hand bend the seen line still covers the painted one."""
+    bend = tuple(0.001 * x * x for x in range(0, 50, 7))
+    lines = {"left": SeenLine(y=tuple(1.85 + y for y in bend), prob=1.0)}
+    pane = CameraPane(CameraModel(), *PANE)
+    without = pane.draw(frame(lines=None, d_rel=None, bend=bend, plan=bend))
+    covered = pane.draw(frame(lines=lines, d_rel=None, bend=bend, plan=bend))
+    yellow = (without[..., 2].astype(int) - without[..., 0] > 90).sum()
+    assert yellow > 500
+    assert (covered[..., 2].astype(int) - covered[..., 0] > 90).sum() < 0.4 * yellow
+
+
+def wrong_lines(y, prob):
+    return {"lines": dict.fromkeys(("left", "right"), SeenLine(y=(y,) * 8, prob=prob))}
+
+
+def test_whatever_a_fault_does_can_be_drawn(reel):
+    """Values that are missing, huge or no numbers are left out or drawn at the edge."""
+    nan, infinite = float("nan"), float("inf")
+    wrong = [
+        {"lines": None, "camera_lead": None},
+        wrong_lines(nan, 1.0),
+        wrong_lines(1e300, 1.0),
+        wrong_lines(1.0, infinite),
+        {"plan": (-infinite,) * 8, "camera_lead": nan},
+        {"camera_lead": -5.0, "d_rel": -1.0, "radar": 1e9},
+        {"d_rel": None, "radar": None},
+        {"offset": 300.0, "middle": -300.0, "heading": 1.2},
+    ]
+    sheet = Sheet(reel({}), reel(*wrong), EVENTS)
+    assert [sheet.draw(index).shape for index in range(len(wrong))] == [(HEIGHT, WIDTH, 3)] * len(wrong)
+
+
+def test_hazards_and_alerts_show_on_the_side_where_they_are(reel):
+    """A red frame from the hazard on, an amber bar while the driver is warned; golden has neither."""
+    faulty = reel({}, {"hazards": ("H3",)}, {"alerts": ("steer_saturated",), "text": "Take control"})
+    sheet = Sheet(reel({}, {}, {}), faulty, EVENTS)
+    for index, colour in ((1, pen.HAZARD), (2, pen.ALERT)):
+        foot = {side: pane_of(sheet.draw(index), side)[-24:-6] for side in ("golden", "faulty")}
+        assert is_drawn(foot["faulty"], colour)
+        assert not is_drawn(foot["golden"], colour)
+
+
+def test_alerts_that_do_not_count_are_not_shown(reel):
+    """The reminder at the start warns of nothing."""
+    plain, reminded = reel({}), reel({"alerts": ("startup",), "text": "Hands on the wheel"})
+    sheet = Sheet(plain, reminded, EVENTS).draw(0)
+    assert (pane_of(sheet, "faulty")[-60:] == pane_of(sheet, "golden")[-60:]).all()
+
+
+def test_the_fault_is_said_to_be_active_while_it_is(reel):
+    """The words appear on the faulty side between its first and its last activation."""
+    events = Events(title="", outcome="sdc", active=(0.05, 0.05), marks=(), names={})
+    sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), events)
+    corners = [pane_of(sheet.draw(i), "faulty")[9:11, -100:-10] for i in range(3)]
+    assert [bool((corner == pen.TRIGGER).all()) for corner in corners] == [False, True, False]
+
+
+def test_a_run_that_broke_off_stands_still(reel):
+    """The shorter film keeps its last frame, darker, while the other goes on."""
+    sheet = Sheet(reel({}, {}, {}), reel({}), EVENTS)
+    assert sheet.count == 3
+    assert pane_of(sheet.draw(2), "faulty").mean() < 0.7 * pane_of(sheet.draw(0), "faulty").mean()
+    assert sheet.time(2) == pytest.approx(0.1)
+
+
+def test_a_moment_is_found(reel):
+    """The frame nearest to a time, also of one beyond the end."""
+    sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), EVENTS)
+    assert [sheet.nearest(t) for t in (-1.0, 0.06, 99.0)] == [0, 1, 2]
+
+
+def test_marks_stand_at_their_times(reel):
+    """The timeline has a line in the mark's colour where it belongs, and none without the mark."""
+    frames = [{}] * 41
+    marked = Events(
+        title="", outcome="hazard", active=None, marks=(Mark(kind="hazard", t=1.0, label="H1"),), names={}
+    )
+    with_mark, without = (
+        Sheet(reel(*frames), reel(*frames), events).draw(0)[600:] for events in (marked, EVENTS)
+    )
+    columns = np.flatnonzero((with_mark != without).any(axis=(0, 2)))
+    middle = 86 + (WIDTH - 96) / 2
+    assert columns.size
+    assert abs(columns.min() - middle) <= 2
+
+
+def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
+    """A wide camera's picture fills the pane's width and leaves room above."""
+    cv2.imwrite(str(tmp_path / "a.jpg"), np.full((720, 1280), 128, np.uint8))
+    model = CameraModel.from_view(width=1280, rows=720, horizon=300.0, focal=1000.0, height=1.4)
+    wide = replace(reel({"picture": tmp_path / "a.jpg", "d_rel": None}), camera=model)
+    pane = pane_of(Sheet(wide, wide, EVENTS).draw(0), "golden")
+    assert (pane[40] == pen.PANEL).all()
+    assert abs(int(pane[70, 5, 0]) - 128) < 3
+
+
+def test_events_are_read(tmp_path):
+    """What the harness writes comes back; anything else is told by the file's name."""
+    path = tmp_path / "events.json"
+    mark = {"kind": "alert", "t": 3.0, "label": "fcw"}
+    path.write_text(
+        json.dumps(
+            {
+                "schema": "film-events/1",
+                "title": "x",
+                "outcome": "sdc",
+                "active": [1.0, 2.0],
+                "marks": [mark],
+                "names": {},
+            }
+        )
+    )
+    events = read_events(path)
+    assert (events.active, events.marks) == ((1.0, 2.0), (Mark(**mark),))
+    path.write_text("{}")
+    with pytest.raises(ConfigError, match=r"events\.json: no events"):
+        read_events(path)
