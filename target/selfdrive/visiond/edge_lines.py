@@ -1,6 +1,6 @@
 """Straight lines through clusters of edges, and which of them bound the lane."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,24 +8,29 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.detector import RoadLine
 from selfdrive.visiond.road_region import RoadRegion
 
-MIN_PIXELS = 24  # of a cluster that may be a line
-MIN_ROWS = 3.0  # standard deviation of such a cluster's rows
+MIN_PIXELS = 24  # of a cluster, or a line, that is looked at
+MIN_SPREAD = 3.0  # standard deviation of the rows it covers
 MAX_SLOPE = 0.15  # a line that leads further from the car's heading is none of its lane's
 BESIDE = 8.0  # m ahead: where it is decided which line is nearest
-SAME = 0.4  # m further away there, a larger cluster is the better one to begin with
-ONE_LINE = 0.2  # m: clusters whose pixels are no further from a line, on average, are pieces of it
+TRIES = 8  # clusters on each side that are looked at, from the nearest
+REACHES = 0.3, 0.2, 0.2  # m: how far from a line edges belong to it, each time it is fitted
+LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and as many out of it
+MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
 SURE_PIXELS = 80.0  # edge pixels of a line about which there is no doubt
-SURE_SPREAD = 0.15  # m: root mean square of their distances from the line that halves its probability
+SURE_SPREAD = 0.15  # m: root mean square distance of a line's edges from it that halves its probability
 
 
-@dataclass(frozen=True, slots=True)
-class _Points:
-    """Edge pixels in clusters: row and column in the picture, cluster, and m to the pixel."""
+class Points(NamedTuple):
+    """Edge pixels: row and column in the picture, whether the picture gets brighter there, m to the pixel."""
 
     row: np.ndarray
     column: np.ndarray
-    label: np.ndarray
+    rising: np.ndarray
     scale: np.ndarray
+
+    def some(self, chosen: np.ndarray) -> "Points":
+        """Those that are chosen."""
+        return Points(*(part[chosen] for part in self))
 
 
 class EdgeLines:
@@ -37,53 +42,67 @@ class EdgeLines:
         rows = np.arange(region.shape[0]) + region.first_row
         self._scale = np.array([model.metres_per_pixel(row) for row in rows])
 
-    def nearest(self, mask: np.ndarray, labels: np.ndarray) -> tuple[RoadLine | None, RoadLine | None]:
-        """The lines next to the car, left and right, of the clusters `labels` of the pixels in `mask`."""
-        row, column = np.divmod(np.flatnonzero(mask)[labels >= 0], mask.shape[1])
-        first_row, first_column = self._first
-        points = _Points(row + first_row, column + first_column, labels[labels >= 0], self._scale[row])
-        if not row.size:
+    def nearest(
+        self, mask: np.ndarray, rising: np.ndarray, labels: np.ndarray
+    ) -> tuple[RoadLine | None, RoadLine | None]:
+        """The lines next to the car, left and right, of the edges in `mask`.
+
+        For each of its pixels, in row-major order, `rising` tells whether the picture gets brighter there,
+        `labels` the cluster.
+        """
+        row, column = np.divmod(np.flatnonzero(mask), mask.shape[1])
+        points = Points(row + self._first[0], column + self._first[1], rising, self._scale.take(row))
+        clustered = labels >= 0
+        points, labels = points.some(clustered), labels[clustered]
+        if not labels.size:
             return None, None
-        size, spread, a, b = _fit(points)
+        size, spread, a, b = _fit(points.row, points.column, labels)
         y, slope = self._model.line_on_road(a, b)
-        beside = y + BESIDE * slope
-        fit = (size >= MIN_PIXELS) & (spread >= MIN_ROWS) & (np.abs(slope) <= MAX_SLOPE)
-        return tuple(
-            self._line(np.where(fit & (side * beside > 0.0), side * beside, np.inf), size, a, b, points)
-            for side in (1.0, -1.0)
-        )
+        usable = (size >= MIN_PIXELS) & (spread >= MIN_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
+        sides = []
+        for side in (1.0, -1.0):
+            away = np.where(usable, side * (y + BESIDE * slope), -1.0)
+            order = [k for k in np.argsort(away) if away[k] >= 0.0][:TRIES]
+            lines = (self._line(float(a[k]), float(b[k]), points) for k in order)
+            sides.append(next((line for line in lines if line is not None), None))
+        return sides[0], sides[1]
 
-    def _line(
-        self, away: np.ndarray, size: np.ndarray, a: np.ndarray, b: np.ndarray, points: _Points
-    ) -> RoadLine | None:
-        """The line that begins with the cluster which is least `away` (m), None where none is a line."""
-        least = away.min()
-        if not np.isfinite(least):
+    def _line(self, a: float, b: float, points: Points) -> RoadLine | None:
+        """The line through all edges about column = a * row + b; None if they are not those of a mark."""
+        for reach in REACHES:
+            own = points.some(np.abs(points.column - a * points.row - b) * points.scale <= reach)
+            if own.row.size < MIN_PIXELS:
+                return None
+            _, spread, slopes, starts = _fit(own.row, own.column, np.zeros(own.row.size, np.intp))
+            a, b = float(slopes[0]), float(starts[0])
+        y, slope = self._model.line_on_road(a, b)
+        away = (own.column - a * own.row - b) * own.scale
+        if spread[0] < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
             return None
-        begin = np.argmax(np.where(away <= least + SAME, size, 0))
-        distance = np.abs(points.column - a[begin] * points.row - b[begin]) * points.scale
-        pieces = np.bincount(points.label, distance) <= ONE_LINE * size
-        pieces[begin] = True
-        return self._through(points, pieces.take(points.label))
-
-    def _through(self, points: _Points, own: np.ndarray) -> RoadLine:
-        """The line through its own points, and how sure it is."""
-        row, column, scale = points.row[own], points.column[own], points.scale[own]
-        line = _Points(row, column, np.zeros(row.size, np.intp), scale)
-        a, b = (float(value[0]) for value in _fit(line)[2:])
-        away = (column - a * row - b) * scale
         doubt = float(np.mean(away**2)) / SURE_SPREAD**2
-        y, slope = self._model.line_on_road(a, b)
-        return RoadLine(y=y, slope=slope, prob=min(1.0, row.size / SURE_PIXELS) / (1.0 + doubt))
+        return RoadLine(y=y, slope=slope, prob=min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt))
 
 
-def _fit(points: _Points) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
+    """Whether the picture gets brighter left of the middle of the line, and darker right of it.
+
+    `away` (m, right positive) is how far each edge is from the middle. A shadow's edge does only one of the
+    two, a dark seam does them the other way round.
+    """
+    share = float(np.mean(rising))
+    if not LEAST_SHARE <= share <= 1.0 - LEAST_SHARE:
+        return False
+    width = float(np.mean(away[~rising]) - np.mean(away[rising]))
+    return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
+
+
+def _fit(
+    row: np.ndarray, column: np.ndarray, label: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """For each cluster: pixels, standard deviation of their rows, a and b of column = a * row + b."""
-    row, column = points.row.astype(float), points.column.astype(float)
-    size = np.bincount(points.label)
-    mean_row, mean_column = (np.bincount(points.label, value) / size for value in (row, column))
-    row -= mean_row.take(points.label)
-    column -= mean_column.take(points.label)
-    power = np.bincount(points.label, row * row)
-    a = np.bincount(points.label, row * column) / np.maximum(power, 1.0)
+    size = np.bincount(label)
+    mean_row, mean_column = (np.bincount(label, value) / size for value in (row, column))
+    down, across = row - mean_row.take(label), column - mean_column.take(label)
+    power = np.bincount(label, down * down)
+    a = np.bincount(label, down * across) / np.maximum(power, 1.0)
     return size, np.sqrt(power / size), a, mean_column - a * mean_row

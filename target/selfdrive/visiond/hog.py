@@ -52,7 +52,7 @@ class Hog:
         self._tables = _tables()
 
     def blocks(self, picture: np.ndarray) -> np.ndarray:
-        """Normalised blocks (rows, columns, 36), float32, of a uint8 picture; no gradient leads across its border."""
+        """Normalised blocks (rows, columns, 36), float32, of a uint8 picture."""
         code = _gradient_codes(picture).ravel()
         bins = self._tables.orientation.take(code)
         bins += self._first_bin

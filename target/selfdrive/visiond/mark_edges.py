@@ -5,7 +5,7 @@ import numpy as np
 
 from selfdrive.visiond.hog import STRIDE, WINDOW
 
-RATIO = 2.0  # how much steeper than its surroundings' root mean square an edge is
+RATIO = 1.6  # how much steeper than its surroundings' root mean square an edge is
 FLOOR = 40.0  # of the Sobel sum, whose weights come to 4: less is grain, however even the surroundings
 
 
@@ -22,10 +22,11 @@ def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
     return (cover >= need).view(np.uint8)
 
 
-def edges(part: np.ndarray, tiles: np.ndarray) -> np.ndarray:
-    """Mask (uint8, 0 or 1) of steep edges in `part` (uint8) within `tiles`.
+def edges(part: np.ndarray, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mask (uint8, 0 or 1) of steep edges in `part` (uint8) within `tiles`, and which of them get brighter.
 
-    Steep is relative to the surroundings, of a window's size, so light and haze do not matter.
+    Steep is relative to the surroundings, of a window's size, so light and haze do not matter. The second
+    has one bool for each set pixel of the mask, in row-major order: to its right the picture is brighter.
     """
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)
     power = cv2.multiply(gradient, gradient)
@@ -34,4 +35,5 @@ def edges(part: np.ndarray, tiles: np.ndarray) -> np.ndarray:
     inside = cv2.resize(
         tiles, (tiles.shape[1] * STRIDE, tiles.shape[0] * STRIDE), interpolation=cv2.INTER_NEAREST
     )
-    return cv2.bitwise_and(steep.view(np.uint8), inside)
+    mask = cv2.bitwise_and(steep.view(np.uint8), inside)
+    return mask, gradient.take(np.flatnonzero(mask)) > 0.0

@@ -32,8 +32,8 @@ class PaperDetector:
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in `view.picture`. One that is not seen has prob 0, and is where a lane's would be."""
         part = np.ascontiguousarray(view.picture[self._region.part])
-        mask = edges(part, tiles_with_mark(self._marked(part), NEED))
-        left, right = self._lines.nearest(mask, dbscan(mask, EPS, MIN_SAMPLES))
+        mask, rising = edges(part, tiles_with_mark(self._marked(part), NEED))
+        left, right = self._lines.nearest(mask, rising, dbscan(mask, EPS, MIN_SAMPLES))
         left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
         right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
         return LaneLines(left=left, right=right, path=path_between(left, right))

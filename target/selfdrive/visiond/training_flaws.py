@@ -27,7 +27,7 @@ class Ground:
         self._verges = [half + rng.gamma(2.0, 1.6) + 0.2 if rng.random() < 0.6 else 50.0 for _ in range(2)]
         self._tone = rng.uniform(35.0, 200.0)
         self._growth = self._texture(rng)
-        self._bands = [_band(rng) for _ in range(int(rng.integers(0, 4)))]
+        self._bands = [_band(rng) for _ in range(int(rng.integers(0, 5)))]
 
     def changed(
         self, picture: np.ndarray, paint: np.ndarray, offset: float, heading: float

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.lead_picture import draw_car
 from selfdrive.sim.road_look import Look, Paint
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.training_flaws import Ground, bent, taken
 from selfdrive.visiond.training_looks import random_camera, random_look
 
 PERIODS = 4  # of 12.2 m: the length of a scene's road
-VIEWS = 4  # pictures of each scene
+VIEWS = 6  # pictures of each scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,16 +34,22 @@ def views(scenes: int, rng: np.random.Generator) -> Iterator[View]:
         look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
         road = RoadRenderer(model, look, seed, periods=PERIODS)
         marks = RoadRenderer(model, _only_paint(look), seed, periods=PERIODS)
-        marks_behind_cars = RoadRenderer(
-            model, replace(_only_paint(look), cars=look.cars), seed, periods=PERIODS
-        )
+        hidden = _hidden(look, model)
         ground = Ground(model, look.lane_width, rng)
         for _ in range(VIEWS):
             pose = rng.uniform(0.0, 50.0), rng.normal(0.0, 0.45), rng.normal(0.0, 0.02)
-            paint = np.minimum(marks.grey(*pose), marks_behind_cars.grey(*pose))
+            paint = np.where(hidden, np.uint8(0), marks.grey(*pose))
             picture, paint = ground.changed(road.grey(*pose), paint, offset=pose[1], heading=pose[2])
             picture, paint = bent(model, (picture, paint), rng)
             yield View(model=model, picture=taken(picture, rng), paint=paint)
+
+
+def _hidden(look: Look, model: CameraModel) -> np.ndarray:
+    """Which pixels show a car."""
+    picture = np.zeros((model.rows, model.width), np.uint8)
+    for car in look.cars:
+        draw_car(picture, model, car)
+    return picture > 0
 
 
 def _only_paint(look: Look) -> Look:

@@ -22,26 +22,42 @@ def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray,
     for view in views(scenes, rng):
         region = RoadRegion(view.model)
         found = windows(Hog(*region.shape).blocks(view.picture[region.part]))
-        for label, fit in zip((True, False), _with_and_without(view, region), strict=True):
-            chosen = rng.permutation(np.flatnonzero(fit & region.windows))[:EACH]
-            row, column = np.unravel_index(chosen, fit.shape)
-            features[used : used + len(chosen)] = found[row, column].reshape(-1, FEATURES)
+        for label, weight in zip((True, False), _weights(view, region), strict=True):
+            chosen = _drawn(weight * region.windows, rng)
+            features[used : used + len(chosen)] = found[chosen[:, 0], chosen[:, 1]].reshape(-1, FEATURES)
             labels[used : used + len(chosen)] = label
             used += len(chosen)
     return features[:used], labels[:used]
 
 
-def _with_and_without(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
-    """Which windows (rows x columns, bool) hold a mark that can be seen, and which hold none."""
+def _drawn(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(row, column) of windows drawn with these weights, none twice."""
+    possible = np.argwhere(weight > 0.0)
+    chance = weight[weight > 0.0]
+    number = min(EACH, len(possible))
+    return (
+        possible[rng.choice(len(possible), number, replace=False, p=chance / chance.sum())]
+        if number
+        else possible
+    )
+
+
+def _weights(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
+    """How much each window (rows x columns) is wanted as one with a mark, and as one without.
+
+    Those with a mark that can be seen are wanted equally; those without the more edges they have, for only
+    there could the detector go wrong.
+    """
     picture = view.picture[region.part].astype(np.float32)
     paint = (view.paint[region.part] > 127).view(np.uint8)
     ring = (cv2.dilate(paint, RING) - paint).astype(np.float32)
     paint = paint.astype(np.float32)
     amount, around = _sums(paint), _sums(ring)
-    contrast = _sums(picture * paint) / np.maximum(amount, 1.0) - _sums(picture * ring) / np.maximum(
-        around, 1.0
-    )
-    return (amount >= LEAST_PAINT) & (contrast >= LEAST_CONTRAST), amount <= NO_PAINT
+    inside, outside = _sums(picture * paint), _sums(picture * ring)
+    contrast = inside / np.maximum(amount, 1.0) - outside / np.maximum(around, 1.0)
+    steepness = _sums(np.abs(cv2.Sobel(picture, cv2.CV_32F, 1, 0)))
+    with_mark = (amount >= LEAST_PAINT) & (contrast >= LEAST_CONTRAST)
+    return with_mark.astype(np.float32), np.where(amount <= NO_PAINT, steepness + 1.0, 0.0)
 
 
 def _sums(image: np.ndarray) -> np.ndarray:
