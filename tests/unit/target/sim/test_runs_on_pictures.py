@@ -1,0 +1,139 @@
+"""Runs in which the controller sees the road in pictures."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import selfdrive
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.sim import vision
+from selfdrive.sim.image_library import SPACING
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.sim.run import simulate
+from selfdrive.sim.scenario import load_scenario
+from selfdrive.sim.vision import GROUND, ROBUST, SHIFT, Pictures
+from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
+
+CALIBRATION = f"""\
+schema: camera/1
+name: nine frames
+files: "*.png"
+width: 640
+rows: 480
+fx_px: 309.4
+fy_px: 344.2
+cx_px: 317.9
+cy_px: 256.5
+height_m: 2.18
+pitch_deg: 14
+spacing_m: {SPACING}
+"""
+
+
+class LineReader:
+    """Reads the lane's lines out of the picture, near where it last saw them, and nothing else."""
+
+    def __init__(self, model: CameraModel) -> None:
+        self._model = model
+        self._last = [(1.85, 0.0), (-1.85, 0.0)]
+
+    def detect(self, view: CameraView) -> LaneLines:
+        assert view.picture is not None
+        picture = view.picture.astype(float)
+        self._last = [self._line(picture, *line) for line in self._last]
+        left, right = (RoadLine(y=y, slope=slope) for y, slope in self._last)
+        return LaneLines(left=left, right=right, path=path_between(left, right))
+
+    def _line(self, picture: np.ndarray, y: float, slope: float) -> tuple[float, float]:
+        a, b = self._model.line_in_picture(y, slope)
+        seen = []
+        for row in range(230, 400, 4):
+            half = max(5.0, 0.35 / self._model.metres_per_pixel(row))
+            columns = np.arange(int(a * row + b - half), int(a * row + b + half) + 1)
+            if columns[0] >= 0 and columns[-1] < self._model.width:
+                light = np.clip(picture[row, columns] - picture[row, columns].mean() - 25.0, 0.0, None)
+                if light.sum() > 0.0:
+                    seen.append((row, light @ columns / light.sum()))
+        return (
+            self._model.line_on_road(*np.polyfit(*zip(*seen, strict=True), 1))
+            if len(seen) > 6
+            else (y, slope)
+        )
+
+
+@pytest.fixture
+def frames(tmp_path):
+    """A folder of nine frames, one dash period of a rendered road, with their calibration."""
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    (folder / "camera.yaml").write_text(CALIBRATION)
+    renderer = RoadRenderer(CameraModel(), "solid", 0, periods=1)
+    for number in range(9):
+        cv2.imwrite(str(folder / f"{number:04}.png"), renderer.grey(number * SPACING))
+    return folder
+
+
+def brought_aside(scenarios, steps):
+    """S1, begun 0.3 m left of the lane's middle."""
+    return replace(load_scenario(scenarios / "S1.yaml"), lateral_offset=0.3, steps=steps)
+
+
+@pytest.mark.parametrize(("translation", "left_over"), [(GROUND, 0.06), (SHIFT, 0.15)])
+def test_the_loop_closes_through_the_picture(
+    monkeypatch, scenarios, frames, tmp_path, translation, left_over
+):
+    """A controller that knows the lane from pictures alone steers a car from aside into the middle."""
+    monkeypatch.setattr(vision, "_detector", lambda name, library: LineReader(library.model))
+    pictures = Pictures(frames=frames, translation=translation, cache=tmp_path / "cache")
+    result = simulate(brought_aside(scenarios, 1000), 0, pictures)
+    offset = np.abs(result.trace["lateral_offset"])
+    assert offset[0] > 0.25 and offset.max() < 0.4 and offset[-300:].max() < left_over
+    assert result.record["pictures"]["translation"] == translation
+
+
+def test_a_cold_and_a_warm_cache_give_the_same_run(scenarios, frames, tmp_path):
+    """Runs, and what is recorded of their pictures, do not depend on what is in the cache."""
+    runs = [
+        simulate(
+            brought_aside(scenarios, 300), 0, Pictures(detector=ROBUST, frames=frames, cache=tmp_path / cache)
+        )
+        for cache in ("one", "one", "two")
+    ]
+    for run in runs[1:]:
+        assert run.record == runs[0].record
+        assert all(np.array_equal(run.trace[name], runs[0].trace[name]) for name in run.trace)
+    assert runs[0].record["pictures"]["frames"] == "nine frames"
+
+
+def test_runs_without_pictures_load_nothing_for_them():
+    """The libraries that take long to load are not touched in runs that see ideally."""
+    code = (
+        "import sys; from pathlib import Path; from dataclasses import replace\n"
+        "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
+        "simulate(replace(load_scenario(Path(sys.argv[1])), steps=20), 0)\n"
+        "print([name for name in ('cv2', 'selfdrive.sim.road_renderer') if name in sys.modules])"
+    )
+    root = Path(selfdrive.__path__[0]).parent
+    command = [sys.executable, "-c", code, str(root.parent / "fault_library" / "scenarios" / "S1.yaml")]
+    printed = subprocess.run(
+        command, env={"PYTHONPATH": str(root)}, capture_output=True, text=True, check=True
+    )
+    assert printed.stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("translation", [GROUND, SHIFT])
+def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, tmp_path_factory, translation):
+    """With lines read from the pictures no scenario leaves the lane's middle, or alerts the driver."""
+    monkeypatch.setattr(vision, "_detector", lambda name, library: LineReader(library.model))
+    pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
+    for name in ("S1", "S2", "S3", "S4", "S5"):
+        result = simulate(load_scenario(scenarios / f"{name}.yaml"), 0, pictures)
+        assert set(result.record["hazards"].values()) == {None}
+        assert "steer_saturated" not in {alert["name"] for alert in result.record["alerts"]}
+        assert np.abs(result.trace["lateral_offset"]).max() < 0.1
