@@ -1,6 +1,8 @@
 """A user's own frames: calibration, order, and errors that name the file."""
 
+import re
 from dataclasses import astuple
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,6 +13,7 @@ from selfdrive.sim.image_folder import ImageFolder
 from selfdrive.sim.image_library import open_library
 from selfdrive.sim.vision import Pictures
 
+PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-your-own-frames.md"
 VIEW = """\
 schema: camera/1
 name: test drive
@@ -174,3 +177,27 @@ def test_a_camera_that_sees_no_road_is_refused(folder):
 def test_a_folder_without_calibration_is_explained(tmp_path):
     """A missing camera.yaml gives its path and where to read how to write one."""
     assert error(tmp_path).startswith(f"{tmp_path}/camera.yaml: No such file")
+
+
+EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize("text", EXAMPLES)
+def test_the_calibrations_in_the_docs_are_good(tmp_path, text):
+    """Every camera.yaml the documentation shows is read, and gives a camera that sees road."""
+    (tmp_path / "camera.yaml").write_text(text)
+    pattern = re.search(r'files: "([^"]*)"', text)
+    frame = tmp_path / pattern[1].replace("*", "1")
+    frame.parent.mkdir(exist_ok=True)
+    frame.write_bytes(b"")
+    model = ImageFolder(tmp_path).model
+    assert model.width == 640
+    assert 0.2 * model.rows < model.horizon < 0.7 * model.rows
+    assert 1.4 < model.spread() < 3.2
+
+
+def test_the_docs_show_a_calibration_for_each_known_set():
+    """Caltech, TuSimple, CULane and Udacity frames, and one's own, each have a calibration in the docs."""
+    names = " ".join(re.findall(r"name: (.*)", PAGE.read_text()))
+    assert len(EXAMPLES) == 5
+    assert all(name in names for name in ("caltech", "tusimple", "culane", "udacity", "my road"))
