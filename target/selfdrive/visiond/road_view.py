@@ -39,7 +39,7 @@ class RoadView:
         self.share = np.array(shares, np.float32)
 
     def map(self, picture: np.ndarray) -> np.ndarray:
-        """The map (float32, rows x columns) of an 8 bit grey picture."""
+        """The map (uint8, rows x columns) of a grey picture (uint8)."""
         parts = []
         for level, (columns, rows) in enumerate(self._levels):
             if level:
@@ -67,9 +67,7 @@ def _rows_of(model: CameraModel, level: int) -> list[float]:
     ]
 
 
-def _maps(
-    model: CameraModel, rows: list[float], y: np.ndarray, level: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _maps(model: CameraModel, rows: list[float], y: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
     """Columns and rows of the level's picture to take each point of the map from."""
     scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows])
     columns = model.cx - scale[:, None] * y
