@@ -44,7 +44,7 @@ class PaperOcclusion(_OnLens):
 class LensMud(_OnLens):
     """Clods and spatters of mud over a share of the picture; more mud holds all of less."""
 
-    UNIT, LEAST, MOST = "share of the picture", 0.0, 0.95
+    UNIT, LEAST, MOST = "of the picture", 0.0, 0.95
 
     def _prepare(self, random: np.random.Generator) -> None:
         rows, columns = self.camera.rows, self.camera.width

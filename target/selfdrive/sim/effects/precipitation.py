@@ -15,9 +15,11 @@ import numpy as np
 from selfdrive.sim.effects.air import airlight, clearness
 from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.effects.particles import Cover, Particles, Streaks
+from selfdrive.sim.effects.windscreen import Windscreen
 
 EXPOSURE = 0.001  # s, under a grey sky
-MOST_IN_BOX = 3600  # a third of them in view
+MOST_IN_BOX = 2800  # a third of them in view
+ON_GLASS = 1000  # diameters to choose from
 
 
 class _Precipitation(Effect):
@@ -41,14 +43,22 @@ class _Precipitation(Effect):
 
     def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Particles:
         """A box of all particles with diameters (mm) from `least` to `most`."""
-        number, slope = self._spectrum()
-        few, many = exp(-slope * most), exp(-slope * least)
-        density = number / slope * (many - few)  # per m^3
+        density = self._density(least, most)
         across = self.camera.width / self.camera.fx * self.camera.rows / self.camera.fy
         reach = min(reach, (MOST_IN_BOX / (density * across)) ** (1.0 / 3.0))
-        count = round(density * across * reach**3)
-        melted = -np.log(few + (many - few) * random.uniform(size=count)) / slope
+        melted = self._diameters(random, least, most, round(density * across * reach**3))
         return Particles(random, self.camera, reach, *self._flown(melted))
+
+    def _density(self, least: float, most: float) -> float:
+        """Particles per m^3 with diameters (mm) from `least` to `most`."""
+        number, slope = self._spectrum()
+        return number / slope * (exp(-slope * least) - exp(-slope * most))
+
+    def _diameters(self, random: np.random.Generator, least: float, most: float, count: int) -> np.ndarray:
+        """Diameters (mm) of so many of these particles."""
+        _, slope = self._spectrum()
+        few, many = exp(-slope * most), exp(-slope * least)
+        return -np.log(few + (many - few) * random.uniform(size=count)) / slope
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         parts = [box.streaks(scene, EXPOSURE) for box in self._boxes]
@@ -75,10 +85,22 @@ class _Precipitation(Effect):
 
 
 class Rain(_Precipitation):
-    """Rain: drops after Marshall and Palmer (1948), their speeds after Atlas and others (1973)."""
+    """Rain in the air, and drops on the windscreen from wipe to wipe, once a second.
+
+    Drops after Marshall and Palmer (1948), their speeds of fall after Atlas and others (1973).
+    """
 
     LEAST, MOST = 0.5, 200.0
     REACHES = (1.0, 1.2), (2.0, 2.0), (3.0, 3.0)
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        super()._prepare(random)
+        limits = self.REACHES[0][0], self._largest()
+        diameters = 0.001 * self._diameters(random, *limits, ON_GLASS)
+        self._glass = Windscreen(random, self.camera, self._density(*limits), diameters)
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        return self._glass.seen(super()._affect(picture, scene), scene)
 
     def _spectrum(self) -> tuple[float, float]:
         return 8000.0, 4.1 * self.amount**-0.21

@@ -1,0 +1,73 @@
+"""How long image effects take for a picture: medians over a drive, mild and strong, for the default camera.
+
+`python benchmarks/effects.py [EFFECT ...] [--repeat N]`, on one core. Times are of this process, so other
+work on the machine matters little, but for the caches it shares. Exit code 1 where a median is above 3 ms.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from time import process_time
+from typing import NamedTuple
+
+import cv2
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "target"))
+
+from selfdrive.common.camera_model import CameraModel  # noqa: E402
+from selfdrive.sim.effects.levels import LEVELS  # noqa: E402
+from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
+
+GOAL = 3.0  # ms a picture
+
+
+class Moment(NamedTuple):
+    """What effects know of the world."""
+
+    t: float
+    position: float
+    v_ego: float
+
+
+def milliseconds(work: Callable[[], object]) -> float:
+    """CPU time of one call."""
+    start = process_time()
+    work()
+    return 1000.0 * (process_time() - start)
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("effects", nargs="*", help="names of effects; all of them if none is given")
+    parser.add_argument("--repeat", type=int, default=100, help="pictures for each median")
+    given = parser.parse_args()
+    cv2.setNumThreads(1)
+    camera = CameraModel()
+    picture = RoadRenderer(camera, "solid", 0).grey(10.0)
+    slow = []
+    print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}")
+    for kind, amounts in LEVELS.items():
+        if given.effects and kind.__name__ not in given.effects:
+            continue
+        for amount in (amounts[0], amounts[-1]):
+            start = process_time()
+            effect = kind(amount, 1, camera)
+            made = 1000.0 * (process_time() - start)
+            moments = [Moment(2.0 + 0.05 * k, 50.0 + 1.341 * k, 26.82) for k in range(given.repeat)]
+            times = [milliseconds(lambda m=m, e=effect: e.apply(picture, m)) for m in moments]
+            print(
+                f"{kind.__name__:<16}{amount:>8g}{made:>9.1f} ms{median(times):>9.2f} ms{min(times):>9.2f} ms"
+            )
+            if median(times) > GOAL:
+                slow.append(kind.__name__)
+    if slow:
+        print(f"above {GOAL:g} ms: {', '.join(slow)}")
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,202 @@
+"""Writes the reference page of image effects: pictures with detected lanes, and measured severity.
+
+`python -m selfdrive.sim.effects.page [--out docs/reference]` writes image-effects.md and the folder
+image-effects with a picture for each effect.
+"""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.sim.effects.effect import Effect
+from selfdrive.sim.effects.levels import PAPER, PHYSICAL
+from selfdrive.sim.effects.severity import RoadGauge, Severity
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond.detector import LaneDetector, LaneLines
+from selfdrive.visiond.paper_detector import PaperDetector
+from selfdrive.visiond.robust_detector import RobustDetector
+
+SEEDS = 1, 2, 3, 4, 5
+PICTURES = 6  # for each seed
+STEP, SPEED = 0.05, 26.82  # s, m/s
+DETECTORS: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)
+    "paper": (PaperDetector, (60, 60, 255), 7),
+    "robust": (RobustDetector, (255, 200, 0), 2),
+}
+AHEAD, ERROR = 10.0, 0.3  # m: a line counts as found where it is no further off than this
+SMALL = 320, 240
+TEXT = """\
+# Image effects
+
+Weather, dirt and light that a fault can put between the road and the camera's picture; how to ask for them is
+in [fault specs](fault-spec.md). This page is written by `python -m selfdrive.sim.effects.page`.
+
+An effect is made of an amount, a seed and the camera's model. What it does to a picture follows from these
+and from the moment (time, distance driven, speed) alone, so pictures may be asked for in any order. Drops and
+flakes fall and come nearer from picture to picture, dirt stays on the lens. The same seed gives the same
+bytes. Grey levels are taken as proportional to light, so that laws of optics hold for them as they stand.
+
+The pictures show levels 1, 5 and 10, or the mildest, a middle and the strongest where there are fewer; lines
+show what detectors find: **broad red** the `paper` detector, **narrow blue** the `robust` one. The tables
+give means over {seeds} seeds and {pictures} pictures each, 20 a second, at 60 mph in the middle of a rendered
+lane with solid lines, by the default camera:
+
+* PSNR against the clean picture: the higher, the more alike.
+* Mark contrast: grey levels between the lane's lines and the road beside them, 5 to 30 m ahead. Clean
+  pictures have {clean.contrast:.0f}.
+* False edges: share of the lane's inside, away from its lines, where the horizontal gradient (Sobel) is that
+  of a step of 8 grey levels at least, and half as strong as a mark's edge at the contrast that is left. Clean
+  pictures have {clean.false_edges:.1%}.
+* Found: share of pictures in which a detector sees both lines, each within 0.3 m of the truth 10 m ahead.
+"""
+PRESETS = (
+    (
+        "The paper's effects",
+        PAPER,
+        "With the paper's parameters; an amount is a level, a gain, a bias or a kernel.",
+    ),
+    ("Physical effects", PHYSICAL, "In real units, after published laws, which the modules name."),
+)
+
+
+class Row(NamedTuple):
+    """One level's measures."""
+
+    amount: float
+    severity: Severity
+    found: tuple[float, ...]  # share of pictures, for each detector
+    picture: np.ndarray  # the last one, in colour, with lines
+
+
+class Moment(NamedTuple):
+    """What effects know of the world."""
+
+    t: float
+    position: float
+    v_ego: float
+
+
+class Studio:
+    """A piece of road, driven along again and again under different effects."""
+
+    def __init__(self) -> None:
+        self.model = CameraModel()
+        renderer = RoadRenderer(self.model, "solid", SEEDS[0])
+        self._moments = [Moment(2.0 + STEP * k, 50.0 + STEP * SPEED * k, SPEED) for k in range(PICTURES)]
+        self._clean = [renderer.grey(moment.position) for moment in self._moments]
+        self._gauge = RoadGauge(self.model, renderer.truth())
+        self._truth = renderer.truth()
+
+    def clean(self) -> Severity:
+        """The measures of clean pictures."""
+        return _mean([self._gauge.measure(clean, clean) for clean in self._clean])
+
+    def take(self, kind: type[Effect], amount: float) -> Row:
+        """Drives once for each seed under this effect."""
+        measures: list[Severity] = []
+        found: list[list[bool]] = []
+        shown = np.empty(0)
+        for seed in reversed(SEEDS):  # what is shown is of the first one
+            effect = kind(amount, seed, self.model)
+            seen = [effect.apply(*pair) for pair in zip(self._clean, self._moments, strict=True)]
+            measures += [self._gauge.measure(*pair) for pair in zip(self._clean, seen, strict=True)]
+            shown = cv2.cvtColor(seen[-1], cv2.COLOR_GRAY2BGR)
+            lines = [list(_detected(detector(self.model), seen)) for detector, _, _ in DETECTORS.values()]
+            found += [[self._is_found(each) for each in pair] for pair in zip(*lines, strict=True)]
+            for each, (_, colour, width) in zip(lines, DETECTORS.values(), strict=True):
+                draw_lines(shown, self.model, each[-1], colour, width)
+        return Row(amount, _mean(measures), tuple(np.mean(found, axis=0)), shown)
+
+    def _is_found(self, lines: LaneLines) -> bool:
+        return all(
+            line.prob > 0.0 and abs(line.y + line.slope * AHEAD - y - slope * AHEAD) <= ERROR
+            for line, (y, slope) in zip((lines.left, lines.right), self._truth, strict=True)
+        )
+
+
+def _detected(detector: LaneDetector, pictures: list[np.ndarray]) -> Iterator[LaneLines]:
+    for picture in pictures:
+        yield detector.detect(CameraView(0.0, 0.0, 0.0, (), 0.0, picture))
+
+
+def _mean(measures: list[Severity]) -> Severity:
+    return Severity(*np.mean(measures, axis=0))
+
+
+def draw_lines(
+    shown: np.ndarray, model: CameraModel, lines: LaneLines, colour: tuple[int, int, int], width: int
+) -> None:
+    """Draws the lines that were seen, from 4 to 40 m ahead, into a BGR picture."""
+    for line in (lines.left, lines.right):
+        if line.prob > 0.0:
+            ends = [(x, line.y + line.slope * x) for x in (4.0, 40.0)]
+            start, end = ((round(model.column(x, y)), round(model.row(x))) for x, y in ends)
+            cv2.line(shown, start, end, colour, width, cv2.LINE_AA)
+
+
+def strip(rows: list[Row], unit: str) -> np.ndarray:
+    """First, middle and last level side by side, with their amounts."""
+    panels = []
+    for number in sorted({0, (len(rows) - 1) // 2, len(rows) - 1}):
+        row = rows[number]
+        panel = cv2.resize(row.picture, SMALL, interpolation=cv2.INTER_AREA)
+        title = np.zeros((20, SMALL[0], 3), dtype=np.uint8)
+        text = f"level {number + 1}: {row.amount:g} {unit}"
+        cv2.putText(title, text, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
+        panels.append(np.vstack([title, panel]))
+    return np.hstack(panels)
+
+
+def table(rows: list[Row], unit: str) -> str:
+    """The levels' measures as Markdown."""
+    names = " | ".join(f"found by `{name}`" for name in DETECTORS)
+    lines = [
+        f"| level | amount ({unit}) | PSNR (dB) | mark contrast | false edges | {names} |",
+        "|---|---|---|---|---|" + "---|" * len(DETECTORS),
+    ]
+    for level, row in enumerate(rows, 1):
+        psnr, contrast, false_edges = row.severity
+        cells = [f"{level}", f"{row.amount:g}", f"{psnr:.1f}", f"{contrast:.0f}", f"{false_edges:.1%}"]
+        cells += [f"{share:.0%}" for share in row.found]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def write(out: Path) -> None:
+    """Writes page and pictures into the folder `out`."""
+    studio = Studio()
+    clean = studio.clean()
+    parts = [TEXT.format(clean=clean, seeds=len(SEEDS), pictures=PICTURES)]
+    folder = out / "image-effects"
+    folder.mkdir(parents=True, exist_ok=True)
+    for title, levels, about in PRESETS:
+        parts.append(f"## {title}\n\n{about}\n")
+        for kind, amounts in levels.items():
+            rows = [studio.take(kind, amount) for amount in amounts]
+            file = folder / f"{kind.__name__}.jpg"
+            cv2.imwrite(str(file), strip(rows, kind.UNIT), [cv2.IMWRITE_JPEG_QUALITY, 80])
+            about = " ".join((kind.__doc__ or "").split())
+            limits = f"{kind.LEAST:g} to {kind.MOST:g}"
+            parts.append(
+                f"### {kind.__name__}\n\n{about} Amount: {limits} ({kind.UNIT}).\n\n"
+                f"![{kind.__name__} at three levels](image-effects/{file.name})\n\n{table(rows, kind.UNIT)}\n"
+            )
+    (out / "image-effects.md").write_text("\n".join(parts), encoding="utf-8")
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("docs/reference"), help="folder of reference pages")
+    cv2.setNumThreads(1)
+    write(parser.parse_args().out)
+
+
+if __name__ == "__main__":
+    main()

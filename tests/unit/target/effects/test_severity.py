@@ -1,0 +1,69 @@
+"""Measures of severity, on pictures whose values are known, and the page made of them."""
+
+import re
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+from selfdrive.sim.effects import page
+from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.severity import RoadGauge
+
+REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
+
+
+@pytest.fixture
+def gauge(camera):
+    """Measures the plain road."""
+    return RoadGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
+
+
+def test_clean_pictures_lack_nothing(gauge, road):
+    """No error, the contrast that was painted, no edges between the lines."""
+    assert gauge.measure(road, road) == pytest.approx((inf, 120.0, 0.0))
+
+
+def test_contrast_and_psnr_follow_the_levels(gauge, road):
+    """Half the levels: half the contrast, and PSNR of that error."""
+    psnr, contrast, _ = gauge.measure(road, road // 2)
+    error = (road.astype(float) - road // 2) ** 2
+    assert contrast == pytest.approx(60.0, abs=1.0)
+    assert psnr == pytest.approx(10.0 * np.log10(255.0**2 / error.mean()))
+
+
+def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
+    """Bright columns in the lane's inside are false edges; outside the lane they are not counted."""
+    inside, outside = road.copy(), road.copy()
+    inside[:, 310:330:8] = 215
+    outside[:, :40:8] = 215
+    assert gauge.measure(road, inside).false_edges > 0.02
+    assert gauge.measure(road, outside).false_edges == 0.0
+
+
+def test_weak_edges_count_where_marks_are_weak(gauge, road):
+    """Between lines of a third of the contrast, edges of a third count; beside strong lines they do not."""
+    weak = (road // 3).copy()
+    strong = road.copy()
+    weak[:, 310:330:8] = 60
+    strong[:, 310:330:8] = 120
+    assert gauge.measure(road, weak).false_edges > 0.02
+    assert gauge.measure(road, strong).false_edges == 0.0
+
+
+def test_page_has_every_effect_and_level():
+    """The committed page has a picture and a table with all levels for every effect."""
+    text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")
+    for effect, amounts in LEVELS.items():
+        part = re.search(rf"^### {effect.__name__}$(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)
+        assert part and (REFERENCE / "image-effects" / f"{effect.__name__}.jpg").is_file()
+        found = re.findall(r"^\| \d+ \| (\S+) \|", part[1], re.MULTILINE)
+        assert [float(amount) for amount in found] == list(map(float, amounts))
+
+
+@pytest.mark.slow
+def test_page_is_what_the_command_writes(tmp_path):
+    """After a change of effects or detectors `python -m selfdrive.sim.effects.page` makes it anew."""
+    page.write(tmp_path)
+    made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))
+    assert made.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8")

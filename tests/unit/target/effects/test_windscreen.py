@@ -1,0 +1,44 @@
+"""Drops on the windscreen: where they land they stay, until they are wiped away."""
+
+import numpy as np
+import pytest
+from selfdrive.sim.effects.windscreen import WIPE, Windscreen
+
+
+@pytest.fixture
+def glass(camera):
+    """A windscreen in rain of 1,000 drops of 2 mm in a cubic metre."""
+    return Windscreen(np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002))
+
+
+def wet(glass, picture, moment, share, wipe=3):
+    """Which pixels show drops at this share of the time between two wipes."""
+    start = wipe * WIPE - glass._start
+    return glass.seen(picture, moment._replace(t=start + share * WIPE)) != picture
+
+
+def test_drops_gather_until_the_wipe(glass, road, moment):
+    """Drops stay and others join them; the wiper takes them all; the next ones land elsewhere."""
+    early, late = (wet(glass, road, moment(), share) for share in (0.3, 0.9))
+    assert 0 < early.sum() < 0.6 * late.sum()
+    assert (late | ~early).mean() > 0.999
+    assert wet(glass, road, moment(), 0.001, wipe=4).sum() < 0.1 * early.sum()
+    other = wet(glass, road, moment(), 0.3, wipe=4)
+    assert (early & other).sum() < 0.3 * early.sum()
+
+
+def test_a_faster_car_meets_more_drops(glass, road, moment):
+    """Drops are met by the speed at which air comes at the glass, that of the rain's fall included."""
+    slow, fast = (wet(glass, road, moment(speed=speed), 0.9).sum() for speed in (0.0, 26.8))
+    assert 2.0 < fast / slow < 5.0
+    assert wet(glass, road, moment(speed=90.0), 0.99).any()
+
+
+def test_drops_show_the_scene_upside_down(glass, camera, moment):
+    """Drops before the dark road are bright below, and those before the bright sky dark above."""
+    picture = np.full((camera.rows, camera.width), 60, np.uint8)
+    picture[:200] = 200
+    start = 3 * WIPE - glass._start
+    change = glass.seen(picture, moment()._replace(t=start + 0.9)).astype(int) - picture
+    assert change[:190].max() <= 0 and change[:190].min() < -60
+    assert change[210:].min() >= 0 and change[210:].max() > 60
