@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mutator.errors import MutatorError
+from mutator.jsonio import make_folder
 from mutator.manifest import FILM, TargetManifest
 from mutator.model import Record
 from mutator.plots import marks_of
@@ -83,6 +84,7 @@ def _show(manifest: TargetManifest, places: Mapping[str, str], shot: Shot) -> No
     film = manifest.film
     assert film is not None  # it has been taken
     here = {**places, "{out}": str(shot.out.absolute()), "{t}": str(shot.t)}
+    make_folder(shot.out.absolute().parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
     done = subprocess.run(
         [sys.executable, "-P", "-s", "-m", film.module, *(here.get(a, a) for a in arguments)],

@@ -111,7 +111,8 @@ def _film(
     if not shots:
         return []
     facts = view.describe(found.experiment)
-    title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}"
+    trigger = facts["trigger"].removesuffix(": True")
+    title = f"{facts['fault']}   {facts['scenario']}   {trigger}"
     manifest = workspace.manifest(found.plan.campaign.target)
     with terminal.wait("driving it again with a film"):
         same = film_experiment(workspace, manifest, found.folder.path, found.experiment.id, title, shots)

@@ -13,7 +13,7 @@ PICTURES_PER_S = 20
 GIF_EVERY = 4  # of the pictures are left out in a GIF, whose files grow large
 GIF_WIDTH = 800
 GIF_COLOURS = 128
-H264 = {"crf": "22", "preset": "veryfast"}
+H264 = {"crf": "25", "preset": "veryfast"}
 VP9 = cv2.VideoWriter.fourcc(*"vp09")  # what browsers play of all that OpenCV's own library can write
 
 

@@ -45,8 +45,11 @@ def write(
     size: float = NORMAL,
     *,
     bold: bool = False,
+    halo: bool = False,
 ) -> None:
-    """Text whose base line begins at `at`."""
+    """Text whose base line begins at `at`; with a `halo` it can be read on any picture."""
+    if halo:
+        cv2.putText(canvas, text, at, _FONT, size, PAPER, 4, cv2.LINE_AA)
     cv2.putText(canvas, text, at, _FONT, size, colour, 2 if bold else 1, cv2.LINE_AA)
 
 

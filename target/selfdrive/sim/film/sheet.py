@@ -107,20 +107,23 @@ class _Side:
     def _draw_caption(self, caption: np.ndarray, frame: Frame) -> None:
         lead = "free road" if frame.d_rel is None else f"lead {frame.d_rel:6.1f} m"
         words = (
-            f"t = {frame.t:.2f} s",
-            f"{frame.v_ego / MPH_TO_MS:5.1f} mph",
-            lead,
-            f"offset {frame.offset:+.2f} m",
-            _probabilities(frame),
+            (f"t = {frame.t:.2f} s", self._colour),
+            (f"{frame.v_ego / MPH_TO_MS:5.1f} mph", pen.INK),
+            (lead, pen.INK),
+            (f"offset {frame.offset:+.2f} m", pen.INK),
+            _lines_seen(frame),
         )
-        for column, text in zip(CAPTION_COLUMNS, words, strict=True):
-            pen.write(caption, text, (4 + column, 18), self._colour if column == 0 else pen.INK, pen.NORMAL)
+        for column, (text, colour) in zip(CAPTION_COLUMNS, words, strict=True):
+            pen.write(caption, text, (4 + column, 18), colour)
 
 
-def _probabilities(frame: Frame) -> str:
+def _lines_seen(frame: Frame) -> tuple[str, pen.Colour]:
+    """The probabilities of both lines, or their absence, in a colour that warns."""
     if frame.lines is None:
-        return "no camera message"
-    return f"lines {frame.lines['left'].prob:.2f} | {frame.lines['right'].prob:.2f}"
+        return "no camera message", pen.ALERT
+    left, right = (frame.lines[name].prob for name in ("left", "right"))
+    doubted = not min(left, right) >= pen.DOUBTFUL  # also where one is no number
+    return f"lines {left:.2f} | {right:.2f}", pen.ALERT if doubted else pen.INK
 
 
 def _bar(pane: np.ndarray, foot: int, text: str, colour: pen.Colour, ink: pen.Colour) -> int:

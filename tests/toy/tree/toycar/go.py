@@ -1,4 +1,4 @@
-"""Runs one case: `python -m toycar.go CASE --to DIR --number N [--alone]`."""
+"""Runs one case: `python -m toycar.go CASE --to DIR --number N [--alone] [--film FOLDER]`."""
 
 import json
 import sys
@@ -48,6 +48,10 @@ def main(arguments):
         "alert_events": [{"name": name, "t": t} for name, t in drive.driver.warned],
     }
     (to / "said.json").write_text(json.dumps(said))
+    if "--film" in arguments:
+        film = Path(arguments[arguments.index("--film") + 1])
+        film.mkdir()
+        (film / "gap.txt").write_text(str(drive.world.gap))
     return 0
 
 

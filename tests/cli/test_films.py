@@ -1,0 +1,89 @@
+"""`mutator show --video` and `--still`, by the commands that the toy's manifest names."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.cli.main import main
+from mutator.workspace import Workspace
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+    """A toy's root with runs/a, a finished run of some experiments."""
+    root = copy_toycar(tmp_path_factory.mktemp("finished")).library.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(root)
+        patch.setenv("MUTATOR_ROOT", str(root))
+        assert main(["run", "toy", "--out", "runs/a", "--only", 'fault_type == "lane"', "--limit", "4"]) == 0
+    return root
+
+
+@pytest.fixture
+def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The id of an experiment with a hazard, in the newest run."""
+    monkeypatch.chdir(finished)
+    monkeypatch.setenv("MUTATOR_ROOT", str(finished))
+    lines = Path("runs/a/results.csv").read_text().splitlines()
+    return next(line.split(",")[0] for line in lines if ",hazard," in line)
+
+
+def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
+    """The target's command gets the films of both runs, what happened when, and for a still its time."""
+    answer = cli("show", name, "--no-plot", "--video", "out/a.json", "--still", "1.5=b.json", "--json").json
+    assert answer["films"] == ["b.json", "out/a.json"]
+    video, still = (json.loads(Path(path).read_text()) for path in ("out/a.json", "b.json"))
+    assert video["golden"] != video["faulty"]
+    assert (video["time"], still["time"]) == ([], ["1.5"])
+    events = video["events"]
+    assert events["outcome"] == "hazard"
+    assert next(mark["label"] for mark in events["marks"]) == "activated"
+    assert [mark["t"] for mark in events["marks"] if mark["kind"] == "hazard"] == [
+        *answer["hazards_s"].values()
+    ]
+    assert events["active"] == [answer["activated_s"], answer["active_until_s"]]
+    assert set(answer["hazards_s"]) <= set(events["names"])
+
+
+def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
+    """The run folder holds the same files as before, and the record is the campaign's to the byte."""
+    before = sorted(Path("runs/a").rglob("*"))
+    answer = cli("show", name, "--no-plot", "--video", "a.json")
+    assert sorted(Path("runs/a").rglob("*")) == before
+    assert answer.code == 0
+    assert "film: a.json" in answer.out
+    assert "differs" not in answer.err
+
+
+def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
+    """A format that the target does not write is wrong input, in the target's own words."""
+    answer = cli("show", name, "--no-plot", "--video", "a.avi")
+    assert answer.code == 2
+    assert "a.avi: not a .json file" in answer.err
+    assert not list(Path("runs/a").glob("film-*"))
+
+
+def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
+    """The manifest's `film` may be missing; then the error says what to write there."""
+    manifest = root / "fault_library/targets/toycar.yaml"
+    before, rest = manifest.read_text().split("film:\n")
+    manifest.write_text(before + "trace_file" + rest.split("trace_file")[1])
+    cli("plan", "toy", "--out", "runs/p", "--limit", "1")
+    planned = Path("runs/p/plan.csv").read_text().splitlines()[1].split(",")[0]
+    answer = cli("show", planned, "--video", "a.json")
+    assert answer.code == 2
+    assert "cannot be filmed" in answer.err
+    assert "`film`" in answer.err
+
+
+@pytest.mark.parametrize("still", ["1.5", "early=a.json", "=a.json", "nan=a.json", "1.5="])
+def test_a_still_needs_a_time_and_a_file(cli: Cli, name: str, still: str) -> None:
+    """Anything else is wrong input, and shows how it is written."""
+    answer = cli("show", name, "--no-plot", "--still", still)
+    assert answer.code == 2
+    assert "14.5=early.png" in answer.err
