@@ -48,31 +48,32 @@ def tinted(
     grey: np.ndarray, model: CameraModel, look: Look, offset: float = 0.0, heading: float = 0.0
 ) -> np.ndarray:
     """The BGR picture of a grey one: everywhere as grey, in the colours of sky, verge and paint."""
-    tint = np.empty((*grey.shape, 3), np.float32)
-    tint[:] = SKY_TINT
-    tint[max(0, floor(model.horizon) + 1) :] = VERGE_TINT
+    tints = [SKY_TINT, VERGE_TINT, ROAD_TINT, YELLOW_TINT]
+    levels = np.arange(256, dtype=np.float32)
+    colours = np.clip(levels[:, None] * np.array(tints, np.float32)[:, None], 0.0, 255.0).astype(np.uint8)
+    worn = levels <= look.exposure * (0.6 * look.asphalt + 0.4 * 182.0)  # where the road shows through
+    colours[3, worn] = colours[2, worn]
+    parts = np.zeros(grey.shape, np.uint8)  # which of the tints each pixel has
+    parts[max(0, floor(model.horizon) + 1) :] = 1
     half = 0.5 * look.lane_width
     edge = 3.0 * half + look.shoulder_width
-    _tint_strip(tint, model, (-edge - offset, edge - offset), heading, ROAD_TINT)
-    painted = (grey > look.exposure * (0.6 * look.asphalt + 0.4 * 182.0))[..., None]
+    _mark_strip(parts, model, (-edge - offset, edge - offset), heading, 2)
     for y, paint in ((half, look.left), (-half, look.right)):
         if paint.yellow:
-            yellow = np.zeros_like(tint)
-            _tint_strip(yellow, model, (y - offset - 0.4, y - offset + 0.4), heading, YELLOW_TINT)
-            tint = np.where(painted & (yellow[..., :1] > 0.0), yellow, tint)
-    return np.clip(grey[..., None] * tint, 0.0, 255.0).astype(np.uint8)
+            _mark_strip(parts, model, (y - offset - 0.4, y - offset + 0.4), heading, 3)
+    return colours.reshape(-1, 3).take(parts.astype(np.uint16) << 8 | grey, axis=0)
 
 
-def _tint_strip(
-    tint: np.ndarray, model: CameraModel, sides: tuple[float, float], heading: float, colour: Tone
+def _mark_strip(
+    parts: np.ndarray, model: CameraModel, sides: tuple[float, float], heading: float, part: int
 ) -> None:
-    """Give the colour to the road between two lines that pass the car at `sides` (m)."""
+    """Give the road between two lines that pass the car at `sides` (m) to that part of the picture."""
     rows = (max(0, floor(model.horizon) + 1), model.rows - 1)
     ends = []
     for y in sides:
         a, b = model.line_in_picture(y / cos(heading), -tan(heading))
         ends.append([(a * row + b, row) for row in rows])
-    _fill(tint, [*ends[0], *ends[1][::-1]], colour)
+    cv2.fillConvexPoly(parts, _fixed([*ends[0], *ends[1][::-1]]), part, cv2.LINE_8, SHIFT)
 
 
 def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[Tone, ...]) -> None:
@@ -106,7 +107,8 @@ def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[T
 
 def _fill(picture: np.ndarray, points: list[tuple[float, float]], tone: Tone) -> None:
     """Fill a convex polygon, its edges smoothed."""
-    corners = np.round(np.array(points) * 2**SHIFT).clip(-(2**20), 2**20).astype(np.int32)
-    cv2.fillConvexPoly(
-        picture, corners, tone, cv2.LINE_AA if picture.dtype == np.uint8 else cv2.LINE_8, SHIFT
-    )
+    cv2.fillConvexPoly(picture, _fixed(points), tone, cv2.LINE_AA, SHIFT)
+
+
+def _fixed(points: list[tuple[float, float]]) -> np.ndarray:
+    return np.round(np.array(points) * 2**SHIFT).clip(-(2**20), 2**20).astype(np.int32)
