@@ -51,7 +51,7 @@ def main(arguments):
     if "--film" in arguments:
         film = Path(arguments[arguments.index("--film") + 1])
         film.mkdir()
-        (film / "gap.txt").write_text(str(drive.world.gap))
+        (film / "offset.txt").write_text(str(drive.world.offset))
     return 0
 
 

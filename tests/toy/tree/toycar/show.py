@@ -11,8 +11,8 @@ def main(arguments):
         print(f"error: {out}: not a .json file", file=sys.stderr)
         return 2
     shown = {
-        "golden": float(Path(golden, "gap.txt").read_text()),
-        "faulty": float(Path(faulty, "gap.txt").read_text()),
+        "golden": float(Path(golden, "offset.txt").read_text()),
+        "faulty": float(Path(faulty, "offset.txt").read_text()),
         "events": json.loads(Path(events).read_text()),
         "time": time,
     }
