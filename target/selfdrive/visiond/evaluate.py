@@ -1,9 +1,10 @@
 """How well a detector finds real lanes: `python -m selfdrive.visiond.evaluate FRAMES TRUTH`.
 
-TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, where only the
-lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. All of it is in the canonical frame: 640 x 480, the
-frame made 640 wide and moved up or down until its vanishing row is 200. A key's first word (`p1` in
-`p1_solidWhiteCurve`) names the camera. Every frame is looked at by a new detector, which thus has no history.
+TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, where only
+the lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. All of it is in the canonical frame:
+640 x 480, the frame made 640 wide and moved up or down until its vanishing row is 200. The first word of a
+key (`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml as for runs. Every frame
+is looked at by a new detector, which thus has no history.
 """
 
 import argparse
@@ -11,6 +12,7 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import tan
 from pathlib import Path
 
 import cv2
@@ -19,6 +21,7 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
+from selfdrive.sim.image_folder import CALIBRATION, ImageFolder
 from selfdrive.visiond.detector import LaneDetector, LaneLines
 
 EXIT_INPUT = 2
@@ -98,15 +101,16 @@ def canonical(colour: np.ndarray, source: Source) -> np.ndarray:
 def read_frames(folder: Path, truth: Path) -> list[Frame]:
     """The frames that the truth file names. Raises ConfigError for what is missing or cannot be read."""
     images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGES]
+    own = _source_of(ImageFolder(folder).model) if (folder / CALIBRATION).exists() else None
     frames = []
     for key, entry in _read_truth(truth).items():
-        prefix = key.partition("_")[0]
-        if prefix not in SOURCES:
+        source = own or SOURCES.get(key.partition("_")[0])
+        if source is None:
             raise ConfigError(
-                f"camera {prefix!r} of {key!r}",
+                f"no camera for {key!r}",
                 where=str(truth),
                 expected=f"a key that starts with one of {', '.join(SOURCES)}",
-                remedy="rename the key",
+                remedy=f"rename it, or add a {CALIBRATION} to the frames",
             )
         left, right = _centres(key, entry, truth)
         path = _image(key, images, folder)
@@ -115,7 +119,6 @@ def read_frames(folder: Path, truth: Path) -> list[Frame]:
             raise ConfigError(
                 "unreadable image", where=str(path), expected="a JPEG or PNG file", remedy="replace it"
             )
-        source = SOURCES[prefix]
         frames.append(
             Frame(key=key, colour=canonical(colour, source), model=source.model, left=left, right=right)
         )
@@ -171,6 +174,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_INPUT
     return 0
+
+
+def _source_of(model: CameraModel) -> Source:
+    """The source of frames that a camera of this model took."""
+    scale = WIDTH / model.width
+    fy = model.fy * scale
+    seen = CameraModel(
+        width=WIDTH,
+        rows=ROWS,
+        fx=model.fx * scale,
+        fy=fy,
+        cx=(model.cx + 0.5) * scale - 0.5,
+        cy=HORIZON + fy * tan(model.pitch),
+        height=model.height,
+        pitch=model.pitch,
+    )
+    return Source(vanishing_row=model.horizon, rows=model.rows, model=seen)
 
 
 def _look(detector: LaneDetector, frame: Frame) -> Finding:

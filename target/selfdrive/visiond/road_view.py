@@ -1,7 +1,7 @@
 """The picture seen as a map of the road: rows by distance ahead, columns by metres to the left or right.
 
-In the map every lane mark is equally wide, and a line along the car's heading stands upright. Near rows are taken
-from a reduced picture, whose pixels are the mean of many, so nothing in between is lost.
+In the map every lane mark is equally wide, and a line along the car's heading stands upright. Near rows are
+taken from a reduced picture, whose pixels are the mean of many, so nothing in between is lost.
 """
 
 import cv2

@@ -11,13 +11,12 @@ from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_bet
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.voting import Belief, Pose, Voters, elect, fit
 
-SURE = 0.15  # share of rows from which on a line is surely there: in dash gaps it is a quarter
-FAINT = 0.03  # share below which it may as well be chance
+SEEN = 0.5  # probability from which on a line is believed to be where it was found
 FADING = 0.92  # by how much a line not seen is less probable with each picture
 FORGET = 20  # pictures without any line after which it may be anywhere
 GONE = 0.01  # a line less probable than this is given up
 MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m a picture; rad: how the car may have moved
-WIDTH_SIGMA, DIP_SIGMA = 0.10, 1.5  # m, px: how lane and pitch may have changed
+WIDTH_SIGMA, DIP_SIGMA = 0.02, 1.5  # m, px: how lane and pitch may have changed
 BEYOND = 0.3  # m over a line from which on the car is in the next lane
 
 
@@ -54,15 +53,12 @@ class RobustDetector:
 
     def _remember(self, pose: Pose) -> None:
         """Take over what was seen, if anything was."""
-        seen = (pose.seen_left, pose.seen_right)
-        if max(seen) > FAINT or self._pose is None:
+        seen = (pose.prob_left, pose.prob_right)
+        if max(seen) > SEEN or self._pose is None:
             self._pose, self._missed = pose, 0
         else:
             self._missed += 1
-        probs = [
-            max(min(max(now / SURE, 0.0), 1.0), FADING * before)
-            for now, before in zip(seen, self._probs, strict=True)
-        ]
+        probs = [max(now, FADING * before) for now, before in zip(seen, self._probs, strict=True)]
         self._probs = tuple(prob if prob > GONE else 0.0 for prob in probs)
         if self._missed > FORGET or self._probs == (0.0, 0.0):
             self._pose = None

@@ -1,8 +1,8 @@
 """Which two parallel lines explain the points where marks may be: first votes, then a fit.
 
-Lines along the road meet in one point of the picture: the car's heading moves it sideways, and a camera pitched
-otherwise than it was calibrated moves it up or down. A line `y` m beside the camera is seen, `drop` px
-below the known horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
+Lines along the road meet in one point of the picture: the car's heading moves it sideways, and a camera
+pitched otherwise than it was calibrated moves it up or down. A line `y` m beside the camera is seen, `drop`
+px below the known horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
 """
 
 from typing import NamedTuple
@@ -19,20 +19,21 @@ LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
 SCATTER = 0.005  # share of a line's rows in which points lie by chance, on the cleanest road
 ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m, how far from a line points count in each round of the fit
 ALIKE = 10.0  # points that err alike, as neighbours do: so many tell no more than one
+FAINT = 0.02  # share of rows that makes a line probable where nothing else gives points; a dash is 0.05
 BLUR = 0.5, 0.05  # px and m: by how much a point may be beside its mark
 
 
 class Pose(NamedTuple):
-    """Two lines: the point where they meet (px), y (m) of each at the camera, and in which share of the
-    picture's rows each was seen, above what chance gives.
+    """Two lines: the point where they meet (px), y (m) of each at the camera, and how probably each is there:
+    0 where no more points lie than by chance.
     """
 
     left: float
     dip: float
     y_left: float
     y_right: float
-    seen_left: float = 0.0
-    seen_right: float = 0.0
+    prob_left: float = 0.0
+    prob_right: float = 0.0
 
     @property
     def middle(self) -> float:
@@ -147,5 +148,6 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
         pull = error.ravel() @ weighted + expected.T @ (believed - expected @ state)
         state = state + np.linalg.solve(information, pull)
     chance = 4.0 / 3.0 * near * voters.density
-    seen = count @ voters.weight / voters.rows - chance
-    return Pose(*state.tolist(), *seen.tolist())
+    seen = np.maximum(count @ voters.weight / voters.rows - chance, 0.0)
+    prob = 1.0 - np.exp(-seen / (FAINT + chance))
+    return Pose(*state.tolist(), *prob.tolist())

@@ -1,0 +1,81 @@
+"""Two parallel lines out of points."""
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.visiond.band_filter import Points
+from selfdrive.visiond.road_view import CELL, RoadView
+from selfdrive.visiond.voting import Belief, Pose, Voters, elect, fit
+
+VIEW = RoadView(CameraModel())
+
+
+def points_on(pose: Pose, lines: str = "LR", chance: int = 0, seed: int = 0) -> Points:
+    """Points on both lines (or one) in every row, and as many more by chance."""
+    rng = np.random.default_rng(seed)
+    rows, columns = [], []
+    for side, y in (("L", pose.y_left), ("R", pose.y_right)):
+        px = pose.left + y * VIEW.scale / VIEW.drop * (VIEW.drop + pose.dip)
+        column = np.round((VIEW.y[0] - px / VIEW.scale) / CELL)
+        shown = (column >= 0) & (column < len(VIEW.y)) & (side in lines)
+        rows.append(np.flatnonzero(shown))
+        columns.append(column[shown].astype(int))
+    rows.append(rng.integers(0, len(VIEW.drop), chance))
+    columns.append(rng.integers(0, len(VIEW.y), chance))
+    row = np.concatenate(rows)
+    return Points(row, np.concatenate(columns), np.ones(len(row), np.float32))
+
+
+def solve(points: Points, belief: Belief) -> Pose:
+    """What the two steps make of the points."""
+    voters = Voters(VIEW, points, float(VIEW.share.sum()))
+    return fit(elect(voters, belief), voters, belief)
+
+
+@pytest.mark.parametrize("middle", [-0.8, 0.1, 0.7])
+@pytest.mark.parametrize("left", [-22.0, 3.0, 30.0])
+@pytest.mark.parametrize("dip", [-7.0, 0.0, 9.0])
+@pytest.mark.parametrize("width", [3.2, 3.7, 4.2])
+def test_lines_are_found_wherever_they_are(middle, left, dip, width):
+    """Offset, heading, pitch error and lane width are recovered from points, a third of them by chance."""
+    true = Pose(left, dip, middle + 0.5 * width, middle - 0.5 * width)
+    found = solve(points_on(true, chance=120), Belief())
+    assert found.y_left == pytest.approx(true.y_left, abs=0.04)
+    assert found.y_right == pytest.approx(true.y_right, abs=0.04)
+    assert found.left == pytest.approx(left, abs=2.0)
+    assert min(found.prob_left, found.prob_right) > 0.5
+
+
+@pytest.mark.parametrize(("lines", "missing"), [("L", "y_right"), ("R", "y_left")])
+def test_the_line_that_is_not_seen_is_a_lane_s_width_away(lines, missing):
+    """With points of one line only the other is where the believed width puts it, and counts as not seen."""
+    true = Pose(5.0, 0.0, 1.6, -1.8)
+    found = solve(points_on(true, lines), Belief(width=(3.4, 0.1)))
+    assert getattr(found, missing) == pytest.approx(getattr(true, missing), abs=0.1)
+    assert getattr(found, missing.replace("y_", "prob_")) < 0.1
+
+
+def test_without_points_the_belief_stands():
+    """No point at all gives the lane that was expected, and nothing seen."""
+    found = solve(
+        points_on(Pose(0.0, 0.0, 1.85, -1.85), lines=""), Belief(middle=(0.3, 0.1), width=(3.6, 0.1))
+    )
+    assert found.middle == pytest.approx(0.3, abs=1e-3) and found.width == pytest.approx(3.6, abs=1e-3)
+    assert found.prob_left == found.prob_right == 0.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_belief_keeps_the_lines_among_many_chance_points(seed):
+    """Ten times as many points by chance as of the lines do not move a lane whose place is known."""
+    true = Pose(4.0, 0.0, 1.95, -1.75)
+    points = points_on(true, chance=1500, seed=seed)
+    belief = Belief(middle=(0.15, 0.1), width=(3.7, 0.1), left=(0.0, 4.0), dip=(0.0, 1.5))
+    found = solve(points, belief)
+    assert found.y_left == pytest.approx(true.y_left, abs=0.05)
+    assert found.y_right == pytest.approx(true.y_right, abs=0.05)
+
+
+def test_chance_alone_counts_as_nothing_seen():
+    """Points spread evenly give lines that are hardly seen, though the best pair was picked."""
+    found = solve(points_on(Pose(0.0, 0.0, 1.85, -1.85), lines="", chance=1500), Belief())
+    assert max(found.prob_left, found.prob_right) < 0.6
