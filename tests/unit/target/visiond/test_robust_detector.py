@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -90,7 +91,7 @@ def test_lines_are_held_for_a_while_ever_less_probable():
     black = np.zeros((road.model.rows, road.model.width), np.uint8)
     held = [see(detector, black) for _ in range(FORGET + 1)]
     probs = [before.left.prob] + [lines.left.prob for lines in held]
-    assert all(later < earlier for earlier, later in zip(probs, probs[1:], strict=False))
+    assert all(later < earlier for earlier, later in pairwise(probs))
     for lines in held[:-1]:
         assert (lines.left.y, lines.right.y) == (before.left.y, before.right.y)
     assert held[-1].left.prob == 0.0 == held[-1].right.prob

@@ -1,0 +1,92 @@
+"""How long the geometric detector takes for a picture: medians over a drive, clean and in bad weather.
+
+`python benchmarks/detect_robust.py [--repeat N]`, on one core. Times are of this process, so other work on
+the machine matters little, but for the caches it shares. Exit code 1 where a median is above its goal.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from statistics import median
+from time import process_time
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "target"))
+
+from selfdrive.common.camera_model import CameraModel  # noqa: E402
+from selfdrive.messages import CameraView  # noqa: E402
+from selfdrive.sim import effects  # noqa: E402
+from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
+from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
+
+# weather, amount, goal for the median (ms)
+CASES = ((None, 0.0, 2.5), ("PaperRain", 10.0, 4.0), ("PaperSnow", 10.0, 4.0), ("Rain", 100.0, 4.0))
+STEP = 1.342  # m between pictures
+DIFFERENT = 40  # pictures of a drive
+
+
+class Moment(NamedTuple):
+    """What effects know of the world."""
+
+    t: float
+    position: float
+    v_ego: float
+
+
+def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
+    """The pictures of two seconds."""
+    camera = CameraModel()
+    road = RoadRenderer(camera, marks, 0)
+    pictures = [road.grey(STEP * k) for k in range(DIFFERENT)]
+    if weather is None:
+        return pictures
+    effect = getattr(effects, weather)(amount, 1, camera)
+    return [
+        effect.apply(picture, Moment(2.0 + 0.05 * k, STEP * k, 26.82)).copy()
+        for k, picture in enumerate(pictures)
+    ]
+
+
+def times(pictures: list[np.ndarray], repeat: int) -> list[float]:
+    """CPU time (ms) of each detection, the first of all being the only one without a past."""
+    detector = RobustDetector(CameraModel())
+    found = []
+    for k in range(repeat):
+        view = CameraView(
+            left_lane_y=0.0,
+            right_lane_y=0.0,
+            path_y=0.0,
+            bend=(),
+            lead_d_rel=0.0,
+            picture=pictures[k % DIFFERENT],
+        )
+        start = process_time()
+        detector.detect(view)
+        found.append(1000.0 * (process_time() - start))
+    return found
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--repeat", type=int, default=300, help="pictures for each median")
+    repeat = parser.parse_args().repeat
+    cv2.setNumThreads(1)
+    slow = False
+    print(f"{'marks':<8}{'weather':<18}{'first':>10}{'median':>10}{'slowest':>10}{'goal':>10}")
+    for marks in ("solid", "dashed"):
+        for weather, amount, goal in CASES:
+            found = times(drive(marks, weather, amount), repeat)
+            slow |= median(found) > goal
+            name = f"{weather} {amount:g}" if weather else "clean"
+            figures = "".join(f"{value:7.2f} ms" for value in (found[0], median(found), max(found[1:]), goal))
+            print(f"{marks:<8}{name:<18}{figures}")
+    return int(slow)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
