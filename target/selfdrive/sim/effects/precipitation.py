@@ -18,7 +18,7 @@ from selfdrive.sim.effects.particles import Cover, Particles, Streaks
 from selfdrive.sim.effects.windscreen import Windscreen
 
 EXPOSURE = 0.001  # s, under a grey sky
-MOST_IN_BOX = 2800  # a third of them in view
+MOST_IN_BOX = 2400  # a third of them in view
 ON_GLASS = 1000  # diameters to choose from
 
 
@@ -94,10 +94,10 @@ class Rain(_Precipitation):
     REACHES = (1.0, 1.2), (2.0, 2.0), (3.0, 3.0)
 
     def _prepare(self, random: np.random.Generator) -> None:
-        super()._prepare(random)
         limits = self.REACHES[0][0], self._largest()
         diameters = 0.001 * self._diameters(random, *limits, ON_GLASS)
         self._glass = Windscreen(random, self.camera, self._density(*limits), diameters)
+        super()._prepare(random)
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         return self._glass.seen(super()._affect(picture, scene), scene)
