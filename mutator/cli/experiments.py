@@ -47,7 +47,7 @@ def show(
     still: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="T=FILE", help="One picture of that film, of T seconds: a .png. May be repeated."
+            metavar="T=FILE", help="One picture of that film, at T seconds: a .png or .jpg. May be repeated."
         ),
     ] = None,
     as_json: Json = False,

@@ -1,6 +1,6 @@
 """Shows the films of two runs side by side: `python -m selfdrive.sim.film --golden DIR --faulty DIR ...`.
 
-A video for `--out` .mp4 or .gif, a still picture of the moment `--at` for .png. Exit code 2 for wrong input.
+A video for `--out` .mp4 or .gif, a still picture of the moment `--at` for .png or .jpg. Exit code 2: wrong input.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--faulty", type=Path, required=True, metavar="DIR", help="film of the other run")
     parser.add_argument("--events", type=Path, required=True, metavar="FILE", help="title and marks, JSON")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help=".mp4, .gif, or .png with --at"
+        "--out", type=Path, required=True, metavar="FILE", help=".mp4 or .gif; .png or .jpg with --at"
     )
     parser.add_argument("--at", type=float, metavar="T", help="one still picture, of this time in s")
     return parser.parse_args(arguments)

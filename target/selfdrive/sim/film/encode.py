@@ -14,6 +14,7 @@ GIF_EVERY = 4  # of the pictures are left out in a GIF, whose files grow large
 GIF_WIDTH = 800
 GIF_COLOURS = 128
 H264 = {"crf": "25", "preset": "veryfast"}
+STILLS = ".png", ".jpg"
 VP9 = cv2.VideoWriter.fourcc(*"vp09")  # what browsers play of all that OpenCV's own library can write
 
 
@@ -34,10 +35,12 @@ def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
 
 
 def write_still(picture: np.ndarray, path: Path) -> None:
-    """Write one BGR picture to `path`, a .png. Raises ConfigError."""
-    if path.suffix != ".png":
+    """Write one BGR picture to `path`, a .png or .jpg. Raises ConfigError."""
+    if path.suffix not in STILLS:
         raise ConfigError(
-            f"a still {path.name}", expected="a name that ends in .png", remedy="choose another --out"
+            f"a still {path.name}",
+            expected=f"a name that ends in {' or '.join(STILLS)}",
+            remedy="choose another --out",
         )
     _check_writable(path)
     cv2.imwrite(str(path), picture)
