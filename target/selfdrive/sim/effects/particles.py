@@ -2,10 +2,10 @@
 
 A box of air that just holds what the camera sees up to its far end repeats in all three directions, in the
 camera's axes (x right, y down, z ahead along the optical axis). The car drives into it, the particles fall
-through it; who leaves at one side enters at the other. Places are kept as shares of the box.
+through it; who leaves at one side enters at the other. Places are kept as shares of the box. There may be
+several such boxes in one another, shallow ones for particles that are too small to be seen far away.
 """
 
-from itertools import pairwise
 from math import cos, inf, sin
 from typing import NamedTuple
 
@@ -18,9 +18,17 @@ from selfdrive.sim.effects.effect import Scene
 
 NEAREST = 0.25  # m: what is nearer to the lens is out of focus
 FAINTEST = 0.03  # share of a pixel's light: a streak that takes less is not seen
-SOFT_WIDTHS = 0.0, 1.5, 3.0, inf  # px: drawn on the full grid, on half of it, on a quarter
+SOFT = 1.5, 3.0  # px: particles wider than these are drawn on half the grid, on a quarter of it
 SPACING = 1.3  # px between the points that make a streak
 MARGIN = 2  # px around a grid
+
+
+class Box(NamedTuple):
+    """n particles in a box of air."""
+
+    reach: float  # m: its depth
+    size: np.ndarray  # (n,) m: diameters
+    speed: np.ndarray  # (n,) m/s: speeds of fall
 
 
 class Streaks(NamedTuple):
@@ -32,34 +40,30 @@ class Streaks(NamedTuple):
 
 
 class Particles:
-    """Particles of diameters `size` (m, (n,)) and speeds of fall `speed` (m/s) in a box `reach` m deep."""
+    """The particles of several boxes."""
 
-    def __init__(
-        self,
-        random: np.random.Generator,
-        camera: CameraModel,
-        reach: float,
-        size: np.ndarray,
-        speed: np.ndarray,
-    ) -> None:
-        self._camera, self._reach = camera, reach
-        self._size, self._speed = size.astype(np.float32), speed.astype(np.float32)
-        across, self._down, self._ahead = random.uniform(size=(size.size, 3)).astype(np.float32).T.copy()
+    def __init__(self, random: np.random.Generator, camera: CameraModel, boxes: list[Box]) -> None:
+        self._camera = camera
+        self._reaches = np.array([box.reach for box in boxes])
+        self._counts = [box.size.size for box in boxes]
+        self._reach = np.repeat(self._reaches, self._counts).astype(np.float32)
+        self._size = np.concatenate([box.size for box in boxes]).astype(np.float32)
+        self._speed = np.concatenate([box.speed for box in boxes]).astype(np.float32)
+        first = random.uniform(size=(self._size.size, 3)).astype(np.float32)
+        across, self._down, self._ahead = first.T.copy()
         self._across = across * camera.width - camera.cx  # px at the far end
 
     def streaks(self, scene: Scene, exposure: float) -> Streaks:
         """The streaks of all particles in view in `exposure` seconds from the scene's moment."""
         camera, lean, upright = self._camera, sin(self._camera.pitch), cos(self._camera.pitch)
         # A car that drives on sees all come nearer and, as it looks down, sink.
-        ahead = _moved(self._ahead, self._speed, scene, -upright / self._reach, lean / self._reach)
+        ahead = self._moved(self._ahead, scene, 1.0, -upright, lean) * self._reach
         ahead = np.maximum(ahead, 1e-3)
-        left = camera.cx + self._across / ahead
-        seen = np.flatnonzero((ahead > NEAREST / self._reach) & (left > -40.0) & (left < camera.width + 40.0))
+        left = camera.cx + self._across * self._reach / ahead
+        seen = np.flatnonzero((ahead > NEAREST) & (left > -40.0) & (left < camera.width + 40.0))
         ahead, left, speed = ahead[seen], left[seen], self._speed[seen]
-        tall = camera.rows / camera.fy * self._reach
-        down = _moved(self._down[seen], speed, scene, lean / tall, upright / tall)
-        down = (down * camera.rows - camera.cy) * (self._reach / camera.fy)
-        ahead *= self._reach
+        down = self._moved(self._down, scene, camera.rows / camera.fy, lean, upright)[seen]
+        down = (down * camera.rows - camera.cy) * (self._reach[seen] / camera.fy)
         v_ego = float(scene.v_ego)
         later_ahead = np.maximum(ahead + exposure * (lean * speed - upright * v_ego), 0.5 * NEAREST)
         later_down = down + exposure * (upright * speed + lean * v_ego)
@@ -73,50 +77,62 @@ class Particles:
         chosen = np.flatnonzero(inside & visible)
         return Streaks(start[:, chosen], end[:, chosen], width[chosen])
 
+    def _moved(self, first: np.ndarray, scene: Scene, tall: float, along: float, fall: float) -> np.ndarray:
+        """Shares of boxes, `tall` times as long as their reach, after particles moved.
 
-def _moved(first: np.ndarray, speed: np.ndarray, scene: Scene, by_way: float, by_fall: float) -> np.ndarray:
-    """Shares of the box after particles moved by so many boxes for a metre driven and a metre fallen."""
-    moved = first + (speed * float(by_fall * scene.t) + float(by_way * scene.position % 1.0))
-    return moved - np.floor(moved)
+        They move by `along` for a metre driven and by `fall` for a metre fallen.
+        """
+        driven = (along / tall * scene.position / self._reaches) % 1.0  # in full precision, however far
+        moved = self._speed * float(fall / tall * scene.t) / self._reach
+        moved += first
+        moved += np.repeat(driven.astype(np.float32), self._counts)
+        return moved - np.floor(moved)
 
 
 class Cover:
     """The share of each pixel's light that streaks take; its memory is used again for each picture.
 
-    Wide streaks are drawn on a coarser grid and enlarged, which makes them wide and soft.
+    Wide particles are drawn on coarser grids and enlarged, which makes them wide and soft. All grids lie on
+    one sheet, the coarse ones beside each other below the full one.
     """
 
     def __init__(self, camera: CameraModel) -> None:
-        rows, width = camera.rows, camera.width
-        self._inside = slice(MARGIN, MARGIN + rows), slice(MARGIN, MARGIN + width)
+        self._inside = slice(MARGIN, MARGIN + camera.rows), slice(MARGIN, MARGIN + camera.width)
+        sizes = [(-(-camera.rows // s) + 2 * MARGIN, -(-camera.width // s) + 2 * MARGIN) for s in (1, 2, 4)]
+        corners = [(0, 0), (sizes[0][0], 0), (sizes[0][0], sizes[1][1])]
+        self._sheet = np.zeros((sizes[0][0] + sizes[1][0], sizes[0][1]), dtype=np.float32)
         self._grids = [
-            np.zeros((-(-rows // scale) + 2 * MARGIN, -(-width // scale) + 2 * MARGIN), dtype=np.float32)
-            for scale in (1, 2, 4)
+            self._sheet[row : row + rows, column : column + columns]
+            for (row, column), (rows, columns) in zip(corners, sizes, strict=True)
         ]
+        self._corners = np.array(corners, dtype=np.float32).T[::-1]  # columns, then rows
+        self._ends = self._corners + np.array(sizes, dtype=np.float32).T[::-1] - 1.0
 
     def taken(self, streaks: Streaks) -> np.ndarray:
         """Shares in parts of 255, uint8 (rows, width)."""
+        self._sheet.fill(0.0)
+        self._draw(streaks)
         full, half, quarter = self._grids
-        for number, (grid, (least, most)) in enumerate(zip(self._grids, pairwise(SOFT_WIDTHS), strict=True)):
-            grid.fill(0.0)
-            chosen = np.flatnonzero((streaks.width > least) & (streaks.width <= most))
-            if chosen.size:
-                _draw(Streaks(*(each[..., chosen] for each in streaks)), grid, 2**number)
         half += _enlarged(quarter, half.shape)
         coarse = _enlarged(cv2.convertScaleAbs(half, alpha=255.0), full.shape)
         return cv2.add(cv2.convertScaleAbs(full, alpha=255.0)[self._inside], coarse[self._inside])
 
-
-def _draw(streaks: Streaks, grid: np.ndarray, scale: int) -> None:
-    # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
-    shift = (scale - 1) / 2.0
-    start, end = (streaks.start - shift) / scale, (streaks.end - shift) / scale
-    counts = (np.hypot(*(end - start)) / SPACING).astype(np.intp) + 1
-    _, columns, rows = strokes(start + MARGIN, end + MARGIN, counts)
-    shares = np.repeat((0.25 * np.pi / scale**2) * streaks.width**2 / counts.astype(np.float32), counts)
-    height, width = grid.shape
-    inside = np.flatnonzero((columns >= 0.0) & (columns < width - 1) & (rows >= 0.0) & (rows < height - 1))
-    splat(grid, columns[inside], rows[inside], shares[inside])
+    def _draw(self, streaks: Streaks) -> None:
+        """Each streak as points on its grid."""
+        grid = np.searchsorted((*SOFT, inf), streaks.width)
+        scale = np.float32([1.0, 2.0, 4.0])[grid]
+        # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
+        corner = self._corners[:, grid] + MARGIN - 0.5
+        start, end = ((place + 0.5) / scale + corner for place in (streaks.start, streaks.end))
+        counts = (np.hypot(*(end - start)) / SPACING).astype(np.intp) + 1
+        share = (0.25 * np.pi) * (streaks.width / scale) ** 2 / counts.astype(np.float32)
+        _, columns, rows = strokes(start, end, counts)
+        grid = np.repeat(grid, counts)
+        first, last = self._corners[:, grid], self._ends[:, grid]
+        inside = np.flatnonzero(
+            (columns >= first[0]) & (columns < last[0]) & (rows >= first[1]) & (rows < last[1])
+        )
+        splat(self._sheet, columns[inside], rows[inside], np.repeat(share, counts)[inside])
 
 
 def _enlarged(coarse: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

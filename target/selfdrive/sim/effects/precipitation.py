@@ -14,11 +14,10 @@ import numpy as np
 
 from selfdrive.sim.effects.air import airlight, clearness
 from selfdrive.sim.effects.effect import Effect, Scene
-from selfdrive.sim.effects.particles import Cover, Particles, Streaks
+from selfdrive.sim.effects.particles import Box, Cover, Particles
 from selfdrive.sim.effects.windscreen import Windscreen
 
 EXPOSURE = 0.001  # s, under a grey sky
-MOST_IN_BOX = 2400  # a third of them in view
 ON_GLASS = 1000  # diameters to choose from
 
 
@@ -26,28 +25,31 @@ class _Precipitation(Effect):
     """Particles whose numbers fall exponentially with their (melted) diameter.
 
     `REACHES` says up to which distance (m) particles from a diameter (mm) on are drawn one by one; beyond,
-    one would take too little of a pixel's light to be seen. In dense air only the nearest are drawn.
+    one would take too little of a pixel's light to be seen. In dense air only the nearest `IN_BOX` are drawn,
+    of which a third is in view.
     """
 
     UNIT = "mm/h"
     REACHES: tuple[tuple[float, float], ...]
+    IN_BOX: int
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._cover = Cover(self.camera)
         limits = [least for least, _ in self.REACHES] + [self._largest()]
-        self._boxes = [
+        boxes = [
             self._box(random, least, most, reach)
             for (least, reach), most in zip(self.REACHES, limits[1:], strict=True)
         ]
+        self._particles = Particles(random, self.camera, boxes)
         self._veil = np.rint(255.0 * clearness(self._extinction(), self.camera)).astype(np.uint8)
 
-    def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Particles:
+    def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Box:
         """A box of all particles with diameters (mm) from `least` to `most`."""
         density = self._density(least, most)
         across = self.camera.width / self.camera.fx * self.camera.rows / self.camera.fy
-        reach = min(reach, (MOST_IN_BOX / (density * across)) ** (1.0 / 3.0))
+        reach = min(reach, (self.IN_BOX / (density * across)) ** (1.0 / 3.0))
         melted = self._diameters(random, least, most, round(density * across * reach**3))
-        return Particles(random, self.camera, reach, *self._flown(melted))
+        return Box(reach, *self._flown(melted))
 
     def _density(self, least: float, most: float) -> float:
         """Particles per m^3 with diameters (mm) from `least` to `most`."""
@@ -61,11 +63,11 @@ class _Precipitation(Effect):
         return -np.log(few + (many - few) * random.uniform(size=count)) / slope
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        parts = [box.streaks(scene, EXPOSURE) for box in self._boxes]
-        streaks = Streaks(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
-        kept = cv2.multiply(self._veil, cv2.bitwise_not(self._cover.taken(streaks)), scale=1.0 / 255.0)
-        lost = np.rint(airlight(picture, self.camera) / 255.0 * np.arange(255.0, -1.0, -1.0))
-        return cv2.add(cv2.multiply(picture, kept, scale=1.0 / 255.0), cv2.LUT(kept, lost.astype(np.uint8)))
+        taken = self._cover.taken(self._particles.streaks(scene, EXPOSURE))
+        kept = cv2.multiply(self._veil, cv2.bitwise_not(taken), scale=1.0 / 255.0)
+        air = airlight(picture, self.camera)
+        lost = cv2.convertScaleAbs(kept, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
+        return cv2.add(cv2.multiply(picture, kept, scale=1.0 / 255.0), lost)
 
     @abstractmethod
     def _spectrum(self) -> tuple[float, float]:
@@ -92,6 +94,7 @@ class Rain(_Precipitation):
 
     LEAST, MOST = 0.5, 200.0
     REACHES = (1.0, 1.2), (2.0, 2.0), (3.0, 3.0)
+    IN_BOX = 1200
 
     def _prepare(self, random: np.random.Generator) -> None:
         limits = self.REACHES[0][0], self._largest()
@@ -125,6 +128,7 @@ class Snow(_Precipitation):
 
     LEAST, MOST = 0.1, 10.0
     REACHES = (1.0, 2.0), (2.0, 6.0), (3.0, 10.0)
+    IN_BOX = 2100
 
     def _spectrum(self) -> tuple[float, float]:
         return 3800.0 * self.amount**-0.87, 2.55 * self.amount**-0.48

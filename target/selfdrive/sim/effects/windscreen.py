@@ -1,6 +1,7 @@
 """Rain drops on the windscreen in front of the camera: they stay where they land until the wiper comes by."""
 
 from math import tan
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,6 +20,27 @@ SETS = 3  # drops of so many wipes, which then repeat
 COARSE = 8  # px of the picture to one of that which is seen through drops
 BLUR = 5.0  # of these: glass is out of focus, and so is what drops show
 WIDE = 0.9  # share of the picture that a drop shows, upside down, as a strong lens does
+
+
+class Pixels(NamedTuple):
+    """Pixels of drops in the order in which these land; drop k has the ones from ends[k] to ends[k + 1]."""
+
+    places: np.ndarray  # in the picture
+    sources: np.ndarray  # which pixel of the coarse picture is seen there
+    shares: np.ndarray  # in 64ths, int16
+    ends: np.ndarray
+
+    @classmethod
+    def of(cls, drops: list[np.ndarray]) -> "Pixels":
+        """From an array of places, sources and shares for each drop."""
+        places, sources, shares = np.concatenate(drops, axis=1)
+        ends = np.concatenate([[0], np.cumsum([drop.shape[1] for drop in drops])])
+        return cls(places, sources, shares.astype(np.int16), ends)
+
+    def first(self, drops: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places, sources and shares of so many drops."""
+        end = self.ends[min(drops, self.ends.size - 1)]
+        return self.places[:end], self.sources[:end], self.shares[:end]
 
 
 class Windscreen:
@@ -42,15 +64,17 @@ class Windscreen:
     def seen(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         """The picture through the glass; a new array."""
         wipe, since = divmod(scene.t + self._start, WIPE)
-        places, sources, shares, ends = self._sets[int(wipe) % SETS]
+        wholly, edges = self._sets[int(wipe) % SETS]
         landed = int(self._per_metre * _speed(scene.v_ego) * since)
-        end = ends[min(landed, ends.size - 1)]
         through = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
         through = cv2.GaussianBlur(through, (0, 0), BLUR).reshape(-1)
         seen = picture.copy()
-        flat, place = seen.reshape(-1), places[:end]
-        before = flat[place].astype(np.int16)
-        flat[place] = before + ((through[sources[:end]] - before) * shares[:end] >> 6)
+        flat = seen.reshape(-1)
+        places, sources, shares = edges.first(landed)
+        before = flat[places].astype(np.int16)
+        flat[places] = before + ((through[sources] - before) * shares >> 6)
+        places, sources, _ = wholly.first(landed)
+        flat[places] = through[sources]
         return seen
 
 
@@ -61,31 +85,26 @@ def _speed(v_ego: float) -> float:
 
 def _landed(
     random: np.random.Generator, camera: CameraModel, diameters: np.ndarray, size: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(places, sources, shares, ends) of drops in the order in which they land.
-
-    For each pixel that a drop covers: its place in the picture, which pixel of the coarse picture is seen
-    there, and its share in 64ths. The first k drops have the first ends[k] of them.
-    """
+) -> tuple[Pixels, Pixels]:
+    """Pixels that drops of these diameters cover wholly, and those at their edges."""
     free = np.ones((camera.rows, camera.width), dtype=bool)
     grid = np.arange(free.size).reshape(free.shape)
     middles = random.uniform(size=(diameters.size, 2)) * (camera.width, camera.rows)
     shapes = np.exp(random.normal(0.0, 0.12, size=diameters.size))
-    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    drops: list[np.ndarray] = []
     for (column, row), shape, radius in zip(
         middles, shapes, 0.5 * SPREAD * camera.fx / DISTANCE * diameters, strict=True
     ):
         right, columns = _across(column, radius * shape, camera.width)
         down, rows = _across(row, radius / shape, camera.rows)
         inner = 1.0 - np.sqrt(right**2 + (down**2)[:, None])
-        share = np.clip(inner * (64.0 * radius / EDGE) + 32.0, 0.0, 64.0).astype(np.int16)
+        share = np.clip(inner * (64.0 * radius / EDGE) + 32.0, 0.0, 64.0).astype(np.intp)
         there = (share > 0) & free[rows, columns]
         free[rows, columns] &= share <= 32  # a later drop hides a soft edge
         source = (_source(down, size[1]) * size[0])[:, None] + _source(right, size[0])
-        parts.append((grid[rows, columns][there], source[there], share[there]))
-    ends = np.concatenate([[0], np.cumsum([part[0].size for part in parts])])
-    places, sources, shares = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return places, sources, shares, ends
+        drops.append(np.stack([grid[rows, columns][there], source[there], share[there]]))
+    wholly = Pixels.of([drop[:, drop[2] == 64] for drop in drops])
+    return wholly, Pixels.of([drop[:, drop[2] < 64] for drop in drops])
 
 
 def _across(middle: float, radius: float, size: int) -> tuple[np.ndarray, slice]:
