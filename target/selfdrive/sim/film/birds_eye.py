@@ -1,6 +1,6 @@
 """The road from above, ahead to the right: where car and lead are, and where the controller sees them."""
 
-from math import cos, sin
+from math import copysign, cos, sin
 
 import cv2
 import numpy as np
@@ -28,11 +28,13 @@ class BirdsEye:
 
     def __init__(self, width: int, height: int, colour: pen.Colour) -> None:
         self._size, self._colour = (width, height), colour
+        self._shift = 0.0  # m by which the strip follows a car that leaves the road
         self._scale = height / (3.0 * LANE_WIDTH + 2.0 * (SHOULDER + 0.3))
         self.ahead = width / self._scale - BEHIND  # m that are shown
 
     def draw(self, frame: Frame) -> np.ndarray:
         """The strip of a frame, BGR."""
+        self._shift = copysign(max(0.0, abs(frame.offset) - LANE_WIDTH), frame.offset)
         strip = np.full((self._size[1], self._size[0], 3), VERGE, np.uint8)
         self._draw_road(strip, frame.position)
         self._draw_seen(strip, frame)
@@ -96,5 +98,5 @@ class BirdsEye:
     def _places(self, x: object, y: object) -> np.ndarray:
         """Points `x` m ahead and `y` m left of the lane's middle, in the strip."""
         columns = (np.asarray(x, float) + BEHIND) * self._scale
-        rows = 0.5 * self._size[1] - np.asarray(y, float) * self._scale
+        rows = 0.5 * self._size[1] - (np.asarray(y, float) - self._shift) * self._scale
         return np.stack([columns, rows], axis=1)

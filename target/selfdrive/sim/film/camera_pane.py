@@ -120,7 +120,7 @@ class CameraPane:
                 up = arm if end == top else -arm
                 shape = np.array([(at + way * arm, end), (at, end), (at, end + up)], float)
                 pen.stroke(pane, shape, colour, 1)
-        pen.write(pane, label, (right + 6, top + 8), colour, pen.SMALL, bold=True, halo=True)
+        pen.tag(pane, label, (right + 8, top + 10), colour)
 
     def _sideways(self, frame: Frame, distance: float) -> float:
         """How far (m) the lane has moved to the left in view where the lead is."""

@@ -45,11 +45,8 @@ def write(
     size: float = NORMAL,
     *,
     bold: bool = False,
-    halo: bool = False,
 ) -> None:
-    """Text whose base line begins at `at`; with a `halo` it can be read on any picture."""
-    if halo:
-        cv2.putText(canvas, text, at, _FONT, size, PAPER, 4, cv2.LINE_AA)
+    """Text whose base line begins at `at`."""
     cv2.putText(canvas, text, at, _FONT, size, colour, 2 if bold else 1, cv2.LINE_AA)
 
 
@@ -66,6 +63,13 @@ def shortened(text: str, room: int, size: float = NORMAL, *, bold: bool = False)
     while text and width(text + "...", size, bold=bold) > room:
         text = text[:-1]
     return text.rstrip() + "..."
+
+
+def tag(canvas: np.ndarray, text: str, at: tuple[int, int], colour: Colour) -> None:
+    """Small text on a dark plate, whose base line begins at `at`: it can be read on any picture."""
+    x, y = at
+    cv2.rectangle(canvas, (x - 4, y - 13), (x + width(text, SMALL) + 4, y + 5), PAPER, cv2.FILLED)
+    write(canvas, text, at, colour, SMALL)
 
 
 def chip(canvas: np.ndarray, text: str, at: tuple[int, int], fill: Colour, ink: Colour = PAPER) -> None:

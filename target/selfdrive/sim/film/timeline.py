@@ -22,7 +22,8 @@ FOOT, HEAD = 18, 18  # pixels beneath the plots for seconds, above them for mark
 GAP = 6  # pixels between plots and between labels
 TICKS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
 MOST_TICKS = 16
-LEAST_OFFSET, LEAST_DISTANCE = 0.3, 10.0  # m that a plot shows at least
+LEAST_OFFSET, MOST_OFFSET = 0.3, 4.0  # m; what the plot reaches to, within these
+LEAST_DISTANCE, LEAST_GAP = 10.0, -10.0  # m; the plot reaches to the one at least, down to the other at most
 
 
 class Timeline:
@@ -125,10 +126,10 @@ def _span(values: np.ndarray, *, symmetric: bool) -> tuple[float, float]:
     """The lowest and highest value that a plot shows."""
     finite = values[np.isfinite(values)]
     if symmetric:
-        most = max(LEAST_OFFSET, 1.1 * float(np.abs(finite).max(initial=0.0)))
+        most = min(max(LEAST_OFFSET, 1.1 * float(np.abs(finite).max(initial=0.0))), MOST_OFFSET)
         return -most, most
     most = float(finite.max(initial=LEAST_DISTANCE))
-    return min(0.0, float(finite.min(initial=0.0))), most
+    return max(LEAST_GAP, float(finite.min(initial=0.0))), most
 
 
 def _pieces(there: np.ndarray) -> list[slice]:
