@@ -11,12 +11,16 @@ import cv2
 import numpy as np
 
 from selfdrive.visiond.band_filter import Points
-from selfdrive.visiond.road_view import REACH, RoadView
+from selfdrive.visiond.road_view import RoadView
 
 BIN = 0.1  # m, of the votes
 SIDEWAYS = 4.0  # m, how far to the left and to the right lines are looked for
 LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
 SCATTER = 0.005  # share of a line's rows in which points lie by chance, on the cleanest road
+AROUND = (
+    np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
+)  # bins of y where a line has no votes itself
+BESIDE = 0.8  # m, how far from a line points are counted to know how many are there by chance
 ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m, how far from a line points count in each round of the fit
 ALIKE = 10.0  # points that err alike, as neighbours do: so many tell no more than one
 FAINT = 0.02  # share of rows that makes a line probable where nothing else gives points; a dash is 0.05
@@ -72,7 +76,6 @@ class Voters:
         self.weight = points.weight * view.share[points.row]
         self.precision = self.weight / (ALIKE * (BLUR[0] + BLUR[1] * scale) ** 2)
         self.rows = max(rows, 1.0)
-        self.density = float(self.weight.sum()) / (self.rows * 2.0 * REACH)  # points in a row, by m
 
 
 def elect(voters: Voters, belief: Belief) -> Pose:
@@ -81,7 +84,8 @@ def elect(voters: Voters, belief: Belief) -> Pose:
     dip = _candidates(*belief.dip, DIP_STEP)
     left, dip = np.repeat(left, len(dip)), np.tile(dip, len(left))
     votes = _votes(voters, left, dip)
-    support = np.log1p(votes / np.float32(SCATTER + 0.5 * BIN * voters.density))
+    around = cv2.filter2D(votes, -1, AROUND, borderType=cv2.BORDER_REFLECT)
+    support = np.log1p(np.maximum(votes - around, 0.0) / (around + np.float32(SCATTER)))
     support -= (0.25 * (_unlikely(left, *belief.left) + _unlikely(dip, *belief.dip)))[:, None]
     y = SIDEWAYS - BIN * (np.arange(votes.shape[1]) + 0.5)
     best, found = -np.inf, (0, 0, 0)
@@ -147,7 +151,9 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
         information = design.T @ weighted + expected.T @ expected
         pull = error.ravel() @ weighted + expected.T @ (believed - expected @ state)
         state = state + np.linalg.solve(information, pull)
-    chance = 4.0 / 3.0 * near * voters.density
+    off = np.abs(error / metre)
+    beside = ((off > near) & (off < BESIDE)) @ voters.weight / voters.rows
+    chance = beside * (4.0 / 3.0 * near / (2.0 * (BESIDE - near)))
     seen = np.maximum(count @ voters.weight / voters.rows - chance, 0.0)
     prob = 1.0 - np.exp(-seen / (FAINT + chance))
     return Pose(*state.tolist(), *prob.tolist())
