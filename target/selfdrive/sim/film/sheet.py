@@ -98,7 +98,9 @@ class _Side:
         alerts = [name for name in frame.alerts if name in COUNTED_ALERTS]
         foot = PANE[1]
         if frame.hazards:
-            words = ", ".join(f"{name} {self._events.names.get(name, '')}".strip() for name in frame.hazards)
+            words = ", ".join(frame.hazards)
+            if len(frame.hazards) == 1:
+                words = f"{words}: {self._events.names.get(words, '')}".removesuffix(": ")
             foot = _bar(pane, foot, f"HAZARD {words}", pen.HAZARD, pen.INK)
             cv2.rectangle(pane, (1, 1), (PANE[0] - 2, PANE[1] - 2), pen.HAZARD, 3)
         if alerts:
