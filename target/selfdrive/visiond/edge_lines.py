@@ -13,7 +13,7 @@ MIN_SPREAD = 3.0  # standard deviation of the rows it covers
 MAX_SLOPE = 0.15  # a line that leads further from the car's heading is none of its lane's
 BESIDE = 8.0  # m ahead: where it is decided which line is nearest
 TRIES = 8  # clusters on each side that are looked at, from the nearest
-REACHES = 0.3, 0.2, 0.2  # m: how far from a line edges belong to it, each time it is fitted
+REACHES = 0.3, 0.2  # m: how far from a line edges belong to it, each time it is fitted
 LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and as many out of it
 MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
 SURE_PIXELS = 80.0  # edge pixels of a line about which there is no doubt
@@ -51,7 +51,8 @@ class EdgeLines:
         `labels` the cluster.
         """
         row, column = np.divmod(np.flatnonzero(mask), mask.shape[1])
-        points = Points(row + self._first[0], column + self._first[1], rising, self._scale.take(row))
+        scale = self._scale.take(row)
+        points = Points(row + float(self._first[0]), column + float(self._first[1]), rising, scale)
         clustered = labels >= 0
         points, labels = points.some(clustered), labels[clustered]
         if not labels.size:
@@ -73,11 +74,10 @@ class EdgeLines:
             own = points.some(np.abs(points.column - a * points.row - b) * points.scale <= reach)
             if own.row.size < MIN_PIXELS:
                 return None
-            _, spread, slopes, starts = _fit(own.row, own.column, np.zeros(own.row.size, np.intp))
-            a, b = float(slopes[0]), float(starts[0])
+            spread, a, b = _fit_one(own.row, own.column)
         y, slope = self._model.line_on_road(a, b)
         away = (own.column - a * own.row - b) * own.scale
-        if spread[0] < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
+        if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
             return None
         doubt = float(np.mean(away**2)) / SURE_SPREAD**2
         return RoadLine(y=y, slope=slope, prob=min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt))
@@ -96,10 +96,19 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
 
 
+def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
+    """Standard deviation of the rows, a and b of column = a * row + b."""
+    mean_row = float(row.mean())
+    down = row - mean_row
+    power = float(down @ down)
+    a = float(down @ column) / max(power, 1.0)
+    return (power / row.size) ** 0.5, a, float(column.mean()) - a * mean_row
+
+
 def _fit(
     row: np.ndarray, column: np.ndarray, label: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """For each cluster: pixels, standard deviation of their rows, a and b of column = a * row + b."""
+    """For each cluster: pixels, and what `_fit_one` finds."""
     size = np.bincount(label)
     mean_row, mean_column = (np.bincount(label, value) / size for value in (row, column))
     down, across = row - mean_row.take(label), column - mean_column.take(label)

@@ -34,5 +34,8 @@ class LaneNet:
         )
 
     def score(self, features: np.ndarray) -> np.ndarray:
-        """Log odds that there is a mark, for each row of `features` (windows x features, float32)."""
+        """Log odds that there is a mark, for `features` (..., windows, features) in float32.
+
+        A stack of few windows each is multiplied without further threads, and so alike on any machine.
+        """
         return np.tanh(features @ self._hidden + self._hidden_bias) @ self._out + self._out_bias

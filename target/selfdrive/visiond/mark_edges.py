@@ -3,8 +3,6 @@
 import cv2
 import numpy as np
 
-from selfdrive.visiond.hog import STRIDE, WINDOW
-
 RATIO = 1.6  # how much steeper than its surroundings' root mean square an edge is
 FLOOR = 40.0  # of the Sobel sum, whose weights come to 4: less is grain, however even the surroundings
 
@@ -25,15 +23,13 @@ def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
 def edges(part: np.ndarray, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mask (uint8, 0 or 1) of steep edges in `part` (uint8) within `tiles`, and which of them get brighter.
 
-    Steep is relative to the surroundings, of a window's size, so light and haze do not matter. The second
+    Steep is relative to the root mean square of the tiles around, so light and haze do not matter. The second
     has one bool for each set pixel of the mask, in row-major order: to its right the picture is brighter.
     """
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)
     power = cv2.multiply(gradient, gradient)
-    limit = cv2.blur(power, (WINDOW, WINDOW))
-    steep = power > np.maximum(RATIO**2 * limit, FLOOR**2)
-    inside = cv2.resize(
-        tiles, (tiles.shape[1] * STRIDE, tiles.shape[0] * STRIDE), interpolation=cv2.INTER_NEAREST
-    )
-    mask = cv2.bitwise_and(steep.view(np.uint8), inside)
+    around = cv2.blur(cv2.resize(power, tiles.shape[::-1], interpolation=cv2.INTER_AREA), (3, 3))
+    limit = np.where(tiles, np.maximum(RATIO**2 * around, FLOOR**2), np.inf).astype(np.float32)
+    size = part.shape[::-1]
+    mask = (power > cv2.resize(limit, size, interpolation=cv2.INTER_NEAREST)).view(np.uint8)
     return mask, gradient.take(np.flatnonzero(mask)) > 0.0

@@ -11,12 +11,13 @@ from selfdrive.messages import CameraView
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.edge_lines import EdgeLines
-from selfdrive.visiond.hog import Hog, windows
+from selfdrive.visiond.hog import FEATURES, Hog, windows
 from selfdrive.visiond.lane_net import LaneNet
 from selfdrive.visiond.mark_edges import edges, tiles_with_mark
 from selfdrive.visiond.road_region import RoadRegion
 
 EPS, MIN_SAMPLES = 4, 8  # pixels, edge pixels
+STACK = 8  # windows that the net looks at in one multiplication
 NEED = 2  # marked windows of the four that share a tile
 
 
@@ -27,6 +28,7 @@ class PaperDetector:
         self._region = RoadRegion(model)
         self._hog = Hog(*self._region.shape)
         self._net = LaneNet.load()
+        self._looked_at = _stacked(self._region.windows)
         self._lines = EdgeLines(model, self._region)
 
     def detect(self, view: CameraView) -> LaneLines:
@@ -40,8 +42,15 @@ class PaperDetector:
 
     def _marked(self, part: np.ndarray) -> np.ndarray:
         """Which windows (rows x columns, bool) hold a lane mark."""
-        looked_at = self._region.windows
-        features = windows(self._hog.blocks(part))[looked_at]
-        marked = np.zeros(looked_at.shape, bool)
-        marked[looked_at] = self._net.score(features.reshape(len(features), -1)) > 0.0
+        found = windows(self._hog.blocks(part))
+        features = found[self._looked_at].reshape(-1, STACK, FEATURES)
+        marked = np.zeros(found.shape[:2], bool)
+        marked[self._looked_at] = self._net.score(features).ravel() > 0.0
         return marked
+
+
+def _stacked(looked_at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the windows looked at, the last repeated to fill the last stack."""
+    row, column = np.nonzero(looked_at)
+    spare = -row.size % STACK
+    return np.pad(row, (0, spare), mode="edge"), np.pad(column, (0, spare), mode="edge")

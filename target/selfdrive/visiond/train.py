@@ -1,31 +1,32 @@
 """Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond.train`.
 
 It learns from windows of rendered roads only, all drawn from the seed, and prints how many windows of other
-such roads it gets right. `--small` takes a minute less and forty times fewer roads, to see that it works.
-Needs scikit-learn; the detector does not.
+such roads it gets right. It takes some minutes; `--small`, for a trial, some seconds. Needs scikit-learn,
+which the detector does not.
 """
 
 import argparse
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.neural_network import MLPClassifier
+from threadpoolctl import threadpool_limits
 
 from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
 from selfdrive.visiond.training_windows import labelled_windows
 
-SCENES, SMALL = 1200, 30  # to learn from
-TEST_SHARE = 0.1  # of as many scenes again, to be tested with
+FULL, SMALL = (600, 60), (12, 4)  # roads to learn from, and to be tested with
 EPOCHS = 25
 DECAY = 3e-3  # penalty on large weights
 
 
 def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
     """The net fitted to these windows."""
-    from sklearn.neural_network import MLPClassifier
-
     model = MLPClassifier(
         hidden_layer_sizes=(HIDDEN,),
         activation="tanh",
@@ -35,7 +36,9 @@ def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
         n_iter_no_change=EPOCHS,
         random_state=seed,
     )
-    model.fit(features, labels)
+    with threadpool_limits(1), warnings.catch_warnings():  # sums depend on the number of threads
+        warnings.simplefilter("ignore", ConvergenceWarning)  # it is meant to stop after so many epochs
+        model.fit(features, labels)
     hidden, out = (weights.astype(np.float32) for weights in model.coefs_)
     hidden_bias, out_bias = (bias.astype(np.float32) for bias in model.intercepts_)
     return LaneNet(hidden, hidden_bias, out[:, 0], out_bias)
@@ -49,10 +52,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--small", action="store_true", help="few roads, for a trial")
     chosen = parser.parse_args(arguments)
     cv2.setNumThreads(1)
-    scenes = SMALL if chosen.small else SCENES
+    scenes, others = SMALL if chosen.small else FULL
     learn, test = (np.random.default_rng([chosen.seed, purpose]) for purpose in (0, 1))
     net = train(*labelled_windows(scenes, learn), chosen.seed)
-    features, labels = labelled_windows(round(TEST_SHARE * scenes), test)
+    features, labels = labelled_windows(others, test)
     marked = net.score(features) > 0.0
     net.save(chosen.out)
     right, found, false = (np.mean(part) for part in (marked == labels, marked[labels], marked[~labels]))

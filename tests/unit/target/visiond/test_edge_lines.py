@@ -1,0 +1,70 @@
+"""From edges to lines: what counts as a lane mark, and where it is on the road."""
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.visiond.dbscan import dbscan
+from selfdrive.visiond.edge_lines import EdgeLines
+from selfdrive.visiond.mark_edges import edges
+from selfdrive.visiond.road_region import RoadRegion
+
+MODEL = CameraModel()
+REGION = RoadRegion(MODEL)
+TONE = 90
+
+
+def seen(*strips: tuple[float, float, int], slope: float = 0.0):
+    """The lines found in a picture with strips along the road: from y to y (m, left first), grey level."""
+    row = np.arange(MODEL.rows)[:, np.newaxis]
+    column = np.arange(MODEL.width)[np.newaxis]
+    picture = np.full((MODEL.rows, MODEL.width), TONE, np.uint8)
+    for left, right, tone in strips:
+        (a, b), (c, d) = (MODEL.line_in_picture(y, slope) for y in (left, right))
+        inside = (column >= a * row + b) & (column < c * row + d)
+        picture[inside & (row > MODEL.horizon)] = tone
+    part = np.ascontiguousarray(picture[REGION.part])
+    tiles = np.ones((REGION.shape[0] // 16, REGION.shape[1] // 16), np.uint8)
+    mask, rising = edges(part, tiles)
+    return EdgeLines(MODEL, REGION).nearest(mask, rising, dbscan(mask, 4, 8))
+
+
+@pytest.mark.parametrize("slope", [-0.05, 0.0, 0.05])
+def test_bright_strips_are_lines(slope):
+    """Two strips of paint are found where their middles are."""
+    left, right = seen((1.9, 1.78, 200), (-1.6, -1.72, 200), slope=slope)
+    assert (left.y, left.slope) == pytest.approx((1.84, slope), abs=0.02)
+    assert (right.y, right.slope) == pytest.approx((-1.66, slope), abs=0.02)
+
+
+def test_the_nearest_strip_counts():
+    """Of three strips to the left the one next to the middle is the lane's."""
+    left, right = seen((5.6, 5.5, 210), (3.3, 3.2, 210), (1.4, 1.3, 140))
+    assert left.y == pytest.approx(1.35, abs=0.03)
+    assert right is None
+
+
+@pytest.mark.parametrize("strip", [(1.0, -9.0, 30), (1.1, 0.98, 30), (9.0, 0.7, 160)])
+def test_a_step_and_a_dark_strip_are_none(strip):
+    """Where the picture only gets darker, only brighter, or darker and then brighter, no paint lies."""
+    assert seen(strip) == (None, None)
+
+
+def test_paint_behind_such_a_step_is_found():
+    """A shadow's edge next to the middle does not hide the line beyond it."""
+    left, _ = seen((9.0, 0.9, 60), (1.9, 1.78, 160))
+    assert left.y == pytest.approx(1.84, abs=0.03)
+
+
+def test_less_contrast_and_other_light_change_no_edge():
+    """Haze that takes half the contrast and adds light leaves the same edges."""
+    part = np.full((64, 96), 80, np.uint8)
+    part[:, 40:46] = 180
+    tiles = np.ones((4, 6), np.uint8)
+    assert np.array_equal(edges(part, tiles)[0], edges(part // 2 + 90, tiles)[0])
+
+
+def test_a_camera_that_sees_no_road_is_refused():
+    """Looking up, it has too few rows of road; the error says how many."""
+    with pytest.raises(ConfigError, match="0 rows of road"):
+        RoadRegion(CameraModel.from_view(width=640, rows=480, horizon=470.0, focal=600.0, height=1.2))

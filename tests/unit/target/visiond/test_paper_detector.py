@@ -1,0 +1,135 @@
+"""The paper's lane detector on rendered roads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.sim.road_look import Look, standard_look
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond.dbscan import dbscan
+from selfdrive.visiond.lane_net import LaneNet
+from selfdrive.visiond.mark_edges import edges, tiles_with_mark
+from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, NEED, PaperDetector
+from selfdrive.visiond.road_region import RoadRegion
+from sklearn.cluster import DBSCAN
+from threadpoolctl import threadpool_limits
+
+CALTECH = CameraModel()
+LOW = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=579.0, height=1.21)
+HIGH = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=500.0, height=1.68)
+POSES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.2, -0.03), (-0.3, 0.04))  # offset in m, heading in rad
+
+
+def view(picture: np.ndarray) -> CameraView:
+    """A view of which only the picture is right."""
+    return CameraView(
+        left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture
+    )
+
+
+@pytest.fixture(scope="module", params=["caltech", "low", "high"])
+def road(request) -> RoadRenderer:
+    """The standard road before three cameras."""
+    return RoadRenderer({"caltech": CALTECH, "low": LOW, "high": HIGH}[request.param], "solid", 5, periods=3)
+
+
+@pytest.fixture(scope="module")
+def faded() -> RoadRenderer:
+    """A road whose right line cannot be seen, and with no lanes beside it."""
+    look = standard_look()
+    look = replace(look, right=replace(look.right, fade=1.0), far_left=None, far_right=None)
+    return RoadRenderer(CALTECH, look, 5, periods=3)
+
+
+@pytest.mark.parametrize(("offset", "heading"), POSES)
+def test_both_lines_are_found_where_they_are(road, offset, heading):
+    """Within 6 cm and 0.6 degrees, wherever the car is in its lane, and through any camera."""
+    found = PaperDetector(road.model).detect(view(road.grey(4.0, offset, heading)))
+    for line, (y, slope) in zip(found[:2], road.truth(offset, heading), strict=True):
+        assert line.prob > 0.5
+        assert line.y == pytest.approx(y, abs=0.06)
+        assert line.slope == pytest.approx(slope, abs=0.01)
+    assert found.path.y == pytest.approx(0.5 * (found.left.y + found.right.y))
+
+
+def test_no_picture_is_remembered():
+    """A detector that has seen other pictures finds what a new one finds, to the last bit."""
+    road = RoadRenderer(CALTECH, "dashed", 3, periods=3)
+    detector, picture = PaperDetector(CALTECH), road.grey(7.0, 0.3)
+    expected = PaperDetector(CALTECH).detect(view(picture))
+    for offset in (-1.0, 0.0, 1.0):
+        detector.detect(view(road.grey(2.0, offset)))
+    assert detector.detect(view(picture)) == expected
+
+
+def test_a_picture_may_be_read_only_and_stays_as_it_is():
+    """Pictures are mapped from a file that many processes share."""
+    picture = RoadRenderer(CALTECH, "solid", 1, periods=2).grey(0.0)
+    before = picture.copy()
+    picture.flags.writeable = False
+    assert PaperDetector(CALTECH).detect(view(picture)).left.prob > 0.5
+    assert np.array_equal(picture, before)
+
+
+@pytest.mark.parametrize("level", [0, 97, 255])
+def test_where_nothing_is_seen_nothing_is_claimed(level):
+    """An even picture has no lines: probability 0, and the lines where those of a lane would be."""
+    found = PaperDetector(CALTECH).detect(view(np.full((480, 640), level, np.uint8)))
+    assert [(line.y, line.prob) for line in found] == [(1.85, 0.0), (-1.85, 0.0), (0.0, 0.0)]
+
+
+def test_with_one_line_the_path_is_half_a_lane_beside_it(faded):
+    """The line that cannot be seen has probability 0, the path follows the other."""
+    found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 0.4)))
+    assert found.left.prob > 0.5
+    assert found.right.prob == 0.0
+    assert found.path.y == pytest.approx(1.45 - 1.85, abs=0.06)
+
+
+def test_the_middle_of_the_car_divides_left_from_right(faded):
+    """A car that has crossed its left line has it on its right."""
+    found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 2.6)))
+    assert found.right.y == pytest.approx(1.85 - 2.6, abs=0.08)
+
+
+def test_shadows_and_seams_beside_the_middle_are_not_lines():
+    """Hard shadows and tar seams all over the lane move neither line by a tenth of the lane."""
+    look = Look(shadows=0.35, shadow_depth=0.6, seams=8.0, cracks=12.0, patches=6.0, joint_tone=-50.0)
+    road = RoadRenderer(CALTECH, look, 11, periods=8)
+    detector = PaperDetector(CALTECH)
+    for position in np.arange(0.0, 90.0, 6.0):
+        found = detector.detect(view(road.grey(position)))
+        assert found.left.y == pytest.approx(1.85, abs=0.3)
+        assert found.right.y == pytest.approx(-1.85, abs=0.3)
+
+
+def test_real_edges_get_the_clusters_of_scikit_learn():
+    """Label for label, on the edges of rendered roads as they are in front of a detector."""
+    region = RoadRegion(CALTECH)
+    for look in (Look(), Look(shadows=0.5, shadow_depth=0.6, cracks=20.0, grain=9.0)):
+        part = RoadRenderer(CALTECH, look, 2, periods=3).grey(3.0)[region.part]
+        everywhere = tiles_with_mark(np.ones(region.windows.shape, bool), 1)
+        mask = edges(np.ascontiguousarray(part), everywhere)[0]
+        expected = DBSCAN(eps=EPS, min_samples=MIN_SAMPLES, metric="chebyshev").fit_predict(np.argwhere(mask))
+        assert expected.max() > 0
+        assert np.array_equal(dbscan(mask, EPS, MIN_SAMPLES), expected)
+
+
+def test_what_is_seen_does_not_depend_on_the_number_of_threads():
+    """The net's sums are the same bits with one thread and with two."""
+    features = np.random.default_rng(0).random((24, 8, 1764), dtype=np.float32)
+    net = LaneNet.load()
+    with threadpool_limits(1):
+        alone = net.score(features)
+    with threadpool_limits(2):
+        assert np.array_equal(net.score(features), alone)
+
+
+def test_a_tile_needs_its_share_of_marked_windows():
+    """A single marked window lights its four tiles only where one is enough."""
+    marked = np.zeros((3, 4), bool)
+    marked[1, 2] = True
+    assert tiles_with_mark(marked, 1).sum() == 4
+    assert tiles_with_mark(marked, NEED).sum() == 0

@@ -1,0 +1,51 @@
+"""Training: the same windows and the same net from the same seed, and a net that knows marks."""
+
+import numpy as np
+import pytest
+from selfdrive.visiond import train
+from selfdrive.visiond.lane_net import LaneNet
+from selfdrive.visiond.training_windows import EACH, labelled_windows
+
+
+@pytest.fixture(scope="module")
+def sample() -> tuple[np.ndarray, np.ndarray]:
+    """Windows of two roads that the shipped net has not seen."""
+    return labelled_windows(2, np.random.default_rng(99))
+
+
+def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
+    """With and without a mark, at most so many of each from a picture; a second draw gives the same bytes."""
+    features, labels = sample
+    assert 0.4 < labels.mean() < 0.6
+    assert len(labels) <= 2 * 6 * 2 * EACH
+    again = labelled_windows(1, np.random.default_rng(99))
+    number = len(again[1])
+    assert np.array_equal(again[0], features[:number])
+    assert np.array_equal(again[1], labels[:number])
+
+
+def test_the_shipped_net_knows_marks_on_roads_it_has_not_seen(sample):
+    """It tells at least three in four windows right, of roads drawn to be hard."""
+    features, labels = sample
+    assert np.mean((LaneNet.load().score(features) > 0.0) == labels) >= 0.75
+
+
+def test_weights_can_be_stored_and_loaded(tmp_path):
+    """A net that was written and read again is the same, and is written in the same bytes."""
+    net = LaneNet.load()
+    net.save(tmp_path / "a.npz")
+    LaneNet.load(tmp_path / "a.npz").save(tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+@pytest.mark.slow
+def test_training_anew_gives_the_same_net_which_agrees_with_the_shipped_one(tmp_path, sample, capsys):
+    """Two small trainings write the same bytes; most windows are judged as by the net that ships."""
+    for name in ("a.npz", "b.npz"):
+        assert train.main(["--small", "--out", str(tmp_path / name)]) == 0
+    assert "are told right" in capsys.readouterr().out
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    small, shipped = (
+        net.score(sample[0]) > 0.0 for net in (LaneNet.load(tmp_path / "a.npz"), LaneNet.load())
+    )
+    assert np.mean(small == shipped) >= 0.65
