@@ -56,8 +56,8 @@ class Belief(NamedTuple):
     Without a past: the lane is 3.7 m wide and the car well inside it, heading nearly along the road.
     """
 
-    middle: tuple[float, float] = (0.0, 1.0)  # m
-    width: tuple[float, float] = (3.7, 0.5)  # m
+    middle: tuple[float, float] = (0.0, 0.8)  # m
+    width: tuple[float, float] = (3.7, 0.42)  # m
     left: tuple[float, float] = (0.0, 40.0)  # px
     dip: tuple[float, float] = (0.0, 6.0)  # px
 
