@@ -4,7 +4,7 @@ Written from results.csv and the run folder alone, so it can be made again at an
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,11 +38,12 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One experiment in the page: its row, and where its diff and plot are seen from the report."""
+    """One experiment in the page: its row, and where its diff, plot and stills are seen from the report."""
 
     row: Row
     patch: str | None
     plot: str | None
+    stills: tuple[tuple[str, str], ...]  # (time, link)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,8 +125,20 @@ def _reading_order(row: Row) -> tuple[str, ...]:
 
 def _line(folder: RunFolder, row: Row) -> Line:
     out = folder.path / FOLDER
-    plot = folder.path / "plots" / f"{row.experiment_id}.svg"
-    return Line(row=row, patch=_link(folder.patch(row.experiment_id), out), plot=_link(plot, out))
+    plots, name = folder.path / "plots", row.experiment_id
+    return Line(
+        row=row,
+        patch=_link(folder.patch(name), out),
+        plot=_link(plots / f"{name}.svg", out),
+        stills=tuple(_stills(plots.glob(f"{name}-*s.jpg"), name, out)),
+    )
+
+
+def _stills(files: Iterable[Path], name: str, seen_from: Path) -> Iterator[tuple[str, str]]:
+    """What is shown of each still, and its link; earliest first."""
+    for file in sorted(files, key=lambda file: (len(file.name), file.name)):
+        if link := _link(file, seen_from):
+            yield file.stem.removeprefix(f"{name}-").replace("s", " s"), link
 
 
 def _link(file: Path, seen_from: Path) -> str | None:

@@ -122,7 +122,8 @@ code { font-size: .9em; }
 </table></div>
 {% endif %}
 <h2>Experiments</h2>
-<p>Times are seconds of simulation. A plot is made by <code>mutator show EXPERIMENT</code>.</p>
+<p>Times are seconds of simulation. A plot is made by <code>mutator show EXPERIMENT</code>, a picture
+by its option <code>--still</code>.</p>
 <div class="scroll"><table>
 <tr><th>experiment</th><th>fault</th><th>scenario</th><th>method</th><th>trigger</th><th>outcome</th>
 <th>activated</th><th>manifested</th><th>hazards</th><th>alerts</th><th>first alert</th><th>reaction</th>
@@ -137,7 +138,9 @@ code { font-size: .9em; }
 <td>{{ hazards(row) }}</td><td>{{ row.alerts | join(", ") }}</td>
 <td class="number">{{ row.t_alert | seconds }}</td><td class="number">{{ row.reaction_time | seconds }}</td>
 <td>{% if line.patch %}<a href="{{ line.patch }}">diff</a>{% endif %}
-{% if line.plot %}<a href="{{ line.plot }}">plot</a>{% endif %}</td></tr>
+{% if line.plot %}<a href="{{ line.plot }}">plot</a>{% endif %}
+{% for time, link in line.stills %}<a href="{{ link }}">{{ time }}</a>
+{% endfor %}</td></tr>
 {% endfor %}
 </table></div>
 <h2>Where this comes from</h2>

@@ -30,6 +30,7 @@ Examples:
   mutator show 3f9a                          of the newest run in runs/
   mutator show 3f9a --run runs/first --no-plot
   mutator show 3f9a --video 3f9a.mp4         drives both runs again, with a film
+  mutator show 3f9a --still 14.5             a picture of it, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
 """
 
@@ -72,8 +73,8 @@ def show(
     view.print_experiment(terminal, found.experiment, patch)
     if found.record is None:
         terminal.say(str(view.not_run(found)))
-        return
-    view.print_verdict(terminal, found.record)
+    else:
+        view.print_verdict(terminal, found.record)
     if drawn:
         terminal.say(f"plot: {short_path(drawn)}")
     for path in filmed:
@@ -106,7 +107,7 @@ def _film(
     from mutator.cli import experiment_view as view
     from mutator.film import Shot, film_experiment
 
-    shots = [_still(text) for text in stills]
+    shots = [_still(text, found) for text in stills]
     shots += [Shot(out=video)] if video else []
     if not shots:
         return []
@@ -121,17 +122,21 @@ def _film(
     return [shot.out for shot in shots]
 
 
-def _still(text: str) -> "Shot":
+def _still(text: str, found: "Found") -> "Shot":
+    """The still of `T=FILE`, or of `T` alone: it is kept beside the plots, where the report finds it."""
     from mutator.film import Shot
 
-    t, _, name = text.partition("=")
+    t, named, name = text.partition("=")
     try:
         time = float(t)
     except ValueError:
         time = math.nan
-    if not name or not math.isfinite(time):
-        raise MutatorError(f"'{text}'", where="--still", expected="a time in s and a file: 14.5=early.png")
-    return Shot(out=Path(name), t=time)
+    if not math.isfinite(time) or (named and not name):
+        raise MutatorError(
+            f"'{text}'", where="--still", expected="a time in s, alone or with a file: 14.5 or 14.5=early.png"
+        )
+    kept = found.folder.path / "plots" / f"{found.experiment.id}-{time:.2f}s.jpg"
+    return Shot(out=Path(name) if name else kept, t=time)
 
 
 def plot_path(run: Path, experiment_id: str) -> Path:

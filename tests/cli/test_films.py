@@ -60,11 +60,19 @@ def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
     assert "differs" not in answer.err
 
 
+def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
+    """It is kept beside the plots, and the page links it by its time."""
+    answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
+    assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
+    page = Path(cli("report", "runs/a", "--json").json["page"])
+    assert f'<a href="../plots/{name}-1.50s.jpg">1.50 s</a>' in page.read_text()
+
+
 def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
     """A format that the target does not write is wrong input, in the target's own words."""
     answer = cli("show", name, "--no-plot", "--video", "a.avi")
     assert answer.code == 2
-    assert "a.avi: not a .json file" in answer.err
+    assert "a.avi: no .avi here" in answer.err
     assert not list(Path("runs/a").glob("film-*"))
 
 
@@ -81,9 +89,9 @@ def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
     assert "`film`" in answer.err
 
 
-@pytest.mark.parametrize("still", ["1.5", "early=a.json", "=a.json", "nan=a.json", "1.5="])
-def test_a_still_needs_a_time_and_a_file(cli: Cli, name: str, still: str) -> None:
-    """Anything else is wrong input, and shows how it is written."""
+@pytest.mark.parametrize("still", ["early", "early=a.json", "=a.json", "nan=a.json", "1.5="])
+def test_a_still_needs_a_time(cli: Cli, name: str, still: str) -> None:
+    """Anything else, or a file without a name, is wrong input; the error shows how it is written."""
     answer = cli("show", name, "--no-plot", "--still", still)
     assert answer.code == 2
     assert "14.5=early.png" in answer.err

@@ -7,8 +7,8 @@ from pathlib import Path
 
 def main(arguments):
     golden, faulty, events, out, *time = arguments
-    if not out.endswith(".json"):
-        print(f"error: {out}: not a .json file", file=sys.stderr)
+    if out.endswith(".avi"):
+        print(f"error: {out}: no .avi here", file=sys.stderr)
         return 2
     shown = {
         "golden": float(Path(golden, "offset.txt").read_text()),
