@@ -41,6 +41,27 @@ def test_arguments(toy: Workspace) -> None:
         manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
 
 
+def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
+    """Filming adds arguments with a folder in the run's output; the command's module is checked as any."""
+    with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
+        toy.manifest("toy").filming()
+    path = toy.library / "targets" / "toy.yaml"
+    film = 'film: {run: [--film, "{film}"], module: toycar.show, args: [], still: []}\n'
+    plain = path.read_text()
+    path.write_text(plain + film)
+    filmed = toy.manifest("toy").filming()
+    given = filmed.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"))
+    assert given == (
+        *toy.manifest("toy").arguments(scenario=Path("s.yaml"), seed=3, out=Path("o")),
+        "--film",
+        "o/film",
+    )
+    assert filmed.tree.digest == toy.manifest("toy").tree.digest
+    path.write_text(plain + film.replace("toycar.show", "toycar/show"))
+    with pytest.raises(MutatorError, match="'toycar/show'; expected a dotted module name"):
+        toy.manifest("toy")
+
+
 def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
     """An option overrides the manifest's root."""
     path = toy.library / "targets" / "toy.yaml"

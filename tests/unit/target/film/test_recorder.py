@@ -1,6 +1,6 @@
 """What a film keeps of a run, and that the run does not notice."""
 
-import json
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -8,6 +8,9 @@ import pytest
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.film.reel import read_reel
 from selfdrive.sim.run import main
+from selfdrive.visiond.visiond import Visiond
+
+SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"
 
 
 def outputs(folder):
@@ -54,19 +57,34 @@ def test_a_free_road_has_no_lead(drive):
     assert read_reel(drive("--no-lead") / "film").frames[-1].d_rel is None
 
 
-def test_a_run_that_breaks_off_leaves_what_went_before(drive):
-    """Each line of the index is whole as soon as it is written: the last one missing harms no other."""
-    film = drive() / "film"
-    lines = (film / "film.jsonl").read_text().splitlines()
-    (film / "film.jsonl").write_text("\n".join(lines[:4]) + "\n")
-    assert len(read_reel(film).frames) == 3
-    assert json.loads(lines[0])["schema"] == "film/1"
+def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
+    """Where visiond publishes nothing the film has no lines, not those of the message before."""
+    publish = Visiond.publish
+    monkeypatch.setattr(Visiond, "publish", lambda own, model: model.t < 0.2 and publish(own, model))
+    frames = read_reel(drive() / "film").frames
+    assert [frame.lines is not None for frame in frames] == [True] * 4 + [False] * 6
+    assert frames[-1].camera_lead is None
+
+
+def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
+    """A crash of the controller loses none of the pictures before it."""
+    publish = Visiond.publish
+
+    def crash(own, model):
+        assert model.t < 0.2
+        publish(own, model)
+
+    monkeypatch.setattr(Visiond, "publish", crash)
+    words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path)]
+    with pytest.raises(AssertionError):
+        main([*words, "--film", str(tmp_path / "film")])
+    assert len(read_reel(tmp_path / "film").frames) == 4
 
 
 def test_a_film_that_cannot_be_written(tmp_path, capsys):
     """A folder that cannot be made is told, with its name, and nothing is run."""
     (tmp_path / "file").touch()
-    words = ["--scenario", "fault_library/scenarios/S1.yaml", "--out", str(tmp_path / "out")]
+    words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out")]
     assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2
     assert "file/film" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
