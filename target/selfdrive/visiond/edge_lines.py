@@ -29,8 +29,8 @@ class Points(NamedTuple):
     scale: np.ndarray
 
     def some(self, chosen: np.ndarray) -> "Points":
-        """Those that are chosen."""
-        return Points(*(part[chosen] for part in self))
+        """Those with these indices."""
+        return Points(*[part.take(chosen) for part in self])
 
 
 class EdgeLines:
@@ -50,11 +50,11 @@ class EdgeLines:
         For each of its pixels, in row-major order, `rising` tells whether the picture gets brighter there,
         `labels` the cluster.
         """
-        row, column = np.divmod(np.flatnonzero(mask), mask.shape[1])
+        row, column = np.divmod(np.flatnonzero(mask.view(bool)), mask.shape[1])
         scale = self._scale.take(row)
         points = Points(row + float(self._first[0]), column + float(self._first[1]), rising, scale)
-        clustered = labels >= 0
-        points, labels = points.some(clustered), labels[clustered]
+        clustered = np.flatnonzero(labels >= 0)
+        points, labels = points.some(clustered), labels.take(clustered)
         if not labels.size:
             return None, None
         size, spread, a, b = _fit(points.row, points.column, labels)
@@ -71,7 +71,8 @@ class EdgeLines:
     def _line(self, a: float, b: float, points: Points) -> RoadLine | None:
         """The line through all edges about column = a * row + b; None if they are not those of a mark."""
         for reach in REACHES:
-            own = points.some(np.abs(points.column - a * points.row - b) * points.scale <= reach)
+            away = np.abs(points.column - a * points.row - b) * points.scale
+            own = points.some(np.flatnonzero(away <= reach))
             if own.row.size < MIN_PIXELS:
                 return None
             spread, a, b = _fit_one(own.row, own.column)
@@ -98,11 +99,11 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
 
 def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
     """Standard deviation of the rows, a and b of column = a * row + b."""
-    mean_row = float(row.mean())
+    mean_row, mean_column = float(row.sum()) / row.size, float(column.sum()) / row.size
     down = row - mean_row
     power = float(down @ down)
     a = float(down @ column) / max(power, 1.0)
-    return (power / row.size) ** 0.5, a, float(column.mean()) - a * mean_row
+    return (power / row.size) ** 0.5, a, mean_column - a * mean_row
 
 
 def _fit(

@@ -31,5 +31,5 @@ def edges(part: np.ndarray, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     around = cv2.blur(cv2.resize(power, tiles.shape[::-1], interpolation=cv2.INTER_AREA), (3, 3))
     limit = np.where(tiles, np.maximum(RATIO**2 * around, FLOOR**2), np.inf).astype(np.float32)
     size = part.shape[::-1]
-    mask = (power > cv2.resize(limit, size, interpolation=cv2.INTER_NEAREST)).view(np.uint8)
-    return mask, gradient.take(np.flatnonzero(mask)) > 0.0
+    steep = power > cv2.resize(limit, size, interpolation=cv2.INTER_NEAREST)
+    return steep.view(np.uint8), gradient.take(np.flatnonzero(steep)) > 0.0

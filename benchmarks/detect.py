@@ -1,0 +1,88 @@
+"""What the paper's lane detector costs: `python benchmarks/detect.py`.
+
+Prints the median CPU time (ms, one thread) of a detection and of its steps, on the rendered road: clean, and
+with rain, snow and noise that fill it with edges. A run of 30 s makes 600 detections.
+"""
+
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "target"))
+
+from selfdrive.common.camera_model import CameraModel  # noqa: E402
+from selfdrive.sim.effects import PaperRain, PaperSnow  # noqa: E402
+from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
+from selfdrive.visiond.dbscan import dbscan  # noqa: E402
+from selfdrive.visiond.edge_lines import EdgeLines  # noqa: E402
+from selfdrive.visiond.hog import Hog  # noqa: E402
+from selfdrive.visiond.mark_edges import edges, tiles_with_mark  # noqa: E402
+from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, NEED, PaperDetector  # noqa: E402
+from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
+
+REPEATS = 300
+STEPS = "detect", "hog", "edges", "dbscan", "lines", "edge pixels"
+
+
+def median_ms(work: Callable[[], object]) -> float:
+    """Median CPU time of `work` over many repeats: what others do on the machine does not count."""
+    times = []
+    for _ in range(REPEATS):
+        start = time.thread_time()
+        work()
+        times.append(time.thread_time() - start)
+    return 1e3 * statistics.median(times)
+
+
+def pictures(model: CameraModel) -> dict[str, np.ndarray]:
+    """The same moment on the road, in fair weather and foul."""
+    clean = RoadRenderer(model, "solid", 0).grey(3.0)
+    moment = SimpleNamespace(t=2.0, position=3.0, v_ego=26.8)
+    found = {"clean": clean}
+    for level in (1, 3, 5, 10):
+        found[f"rain {level}"] = PaperRain(level, 1, model).apply(clean, moment)
+    found["snow 10"] = PaperSnow(10, 1, model).apply(clean, moment)
+    noise = np.random.default_rng(0).normal(0.0, 12.0, clean.shape)
+    found["noise"] = np.clip(clean + noise, 0, 255).astype(np.uint8)
+    return found
+
+
+def measure(model: CameraModel, picture: np.ndarray) -> list[float]:
+    """Medians (ms) of the detection as it is, and of its steps with every window marked."""
+    detector, region = PaperDetector(model), RoadRegion(model)
+    hog, lines = Hog(*region.shape), EdgeLines(model, region)
+    part = np.ascontiguousarray(picture[region.part])
+    tiles = tiles_with_mark(np.ones(region.windows.shape, bool), NEED)
+    mask, rising = edges(part, tiles)
+    labels = dbscan(mask, EPS, MIN_SAMPLES)
+    return [
+        median_ms(lambda: detector.detect(SimpleNamespace(picture=picture))),
+        median_ms(lambda: hog.blocks(part)),
+        median_ms(lambda: edges(part, tiles)),
+        median_ms(lambda: dbscan(mask, EPS, MIN_SAMPLES)),
+        median_ms(lambda: lines.nearest(mask, rising, labels)),
+        float(mask.sum()),
+    ]
+
+
+def main() -> None:
+    """Print the table."""
+    cv2.setNumThreads(1)
+    model = CameraModel()
+    print(f"{'':10}" + "".join(f"{step:>12}" for step in STEPS))
+    with threadpool_limits(1):
+        for name, picture in pictures(model).items():
+            *times, pixels = measure(model, picture)
+            print(f"{name:10}" + "".join(f"{value:12.2f}" for value in times) + f"{pixels:12.0f}")
+
+
+if __name__ == "__main__":
+    main()
