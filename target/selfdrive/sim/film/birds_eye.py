@@ -93,7 +93,10 @@ class BirdsEye:
             pen.stroke(strip, ends, colour, 1)
             column, row = ends[1].astype(int).tolist()
             cv2.circle(strip, (column, row), 3, colour, cv2.FILLED, cv2.LINE_AA)
-            pen.write(strip, f"{name} {distance:.1f} m", (column + 7, row + 5), colour, pen.SMALL)
+            words = f"{name} {distance:.1f} m"
+            room = self._size[0] - pen.width(words, pen.SMALL)
+            left = column + 7 if column + 7 <= room else column - 7 - pen.width(words, pen.SMALL)
+            pen.write(strip, words, (left, row + 5), colour, pen.SMALL)
 
     def _places(self, x: object, y: object) -> np.ndarray:
         """Points `x` m ahead and `y` m left of the lane's middle, in the strip."""
