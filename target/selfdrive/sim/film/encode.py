@@ -1,10 +1,12 @@
-"""Writes pictures as a video: H.264 or VP9 in an .mp4, or an animated .gif."""
+"""Writes pictures as a video, H.264 in an .mp4 or an animated .gif, or as a still."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
+from PIL import Image
 
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.film import pen
@@ -15,7 +17,6 @@ GIF_WIDTH = 800
 GIF_COLOURS = 128
 H264 = {"crf": "25", "preset": "veryfast"}
 STILLS = ".png", ".jpg"
-VP9 = cv2.VideoWriter.fourcc(*"vp09")  # what browsers play of all that OpenCV's own library can write
 
 
 def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
@@ -58,12 +59,6 @@ def _check_writable(path: Path) -> None:
 
 
 def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
-    """With PyAV H.264, which all players know; without it VP9, twenty times as slow, which browsers know."""
-    try:
-        import av
-    except ImportError:
-        _write_vp9(pictures, path)
-        return
     with av.open(str(path), "w", options={"movflags": "faststart"}) as file:
         stream = None
         for picture in pictures:
@@ -76,23 +71,11 @@ def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
             file.mux(stream.encode())
 
 
-def _write_vp9(pictures: Iterable[np.ndarray], path: Path) -> None:
-    writer = cv2.VideoWriter()
-    for picture in pictures:
-        if not writer.isOpened():
-            rows, columns = picture.shape[:2]
-            writer.open(str(path), cv2.CAP_FFMPEG, VP9, float(PICTURES_PER_S), (columns, rows))
-        writer.write(picture)
-    writer.release()
-
-
 def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
     """Smaller and with fewer pictures; colours from one palette, so that what stands still costs nothing.
 
     The palette has the sheet's own colours, and for the rest those of the picture in the middle.
     """
-    from PIL import Image
-
     small = []
     for index, picture in enumerate(pictures):
         if index % GIF_EVERY == 0:
