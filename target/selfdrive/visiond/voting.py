@@ -137,7 +137,7 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
     believed = means / sigmas
     state = np.array(pose[:4])
     n = len(voters.left)
-    terms = np.zeros((2, n, 4))
+    terms = np.zeros((2, n, 5))  # what error changes with each unknown, and the error
     terms[:, :, 0] = 1.0
     for near in ROUNDS:
         metre = voters.metre * (voters.drop + state[1])
@@ -146,10 +146,12 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
         count = np.maximum(1.0 - (error / (metre * near)) ** 2, 0.0)
         terms[:, :, 1] = y * voters.metre
         terms[0, :, 2] = terms[1, :, 3] = metre
-        design = terms.reshape(2 * n, 4)
-        weighted = design * (count * voters.precision).reshape(-1, 1)
-        information = design.T @ weighted + expected.T @ expected
-        pull = error.ravel() @ weighted + expected.T @ (believed - expected @ state)
+        terms[:, :, 4] = error
+        design = terms.reshape(2 * n, 5)
+        # One product, small enough for one thread: the sum's order must not depend on the number of cores.
+        sums = design.T @ (design[:, :4] * (count * voters.precision).reshape(-1, 1))
+        information = sums[:4] + expected.T @ expected
+        pull = sums[4] + expected.T @ (believed - expected @ state)
         state = state + np.linalg.solve(information, pull)
     off = np.abs(error / metre)
     beside = ((off > near) & (off < BESIDE)) @ voters.weight / voters.rows
