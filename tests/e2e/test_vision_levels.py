@@ -1,0 +1,58 @@
+"""Disturbed pictures in the closed loop: each effect at each level, seen by either detector."""
+
+import csv
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mutator import campaign_run
+from mutator.plan import Choices
+from mutator.records import read_records
+from mutator.workspace import Workspace
+
+pytestmark = pytest.mark.slow
+
+FEW = Choices(only='fault_type in ("rain", "occlusion") and value == 5')
+
+
+@pytest.fixture(scope="module")
+def workspace() -> Workspace:
+    return Workspace.find(root=Path(__file__).parents[2])
+
+
+def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
+    """How many levels of each fault type led out of the lane; every run must have ended well."""
+    summary = campaign_run.run(workspace, f"vision_levels_{detector}", out, workers=2)
+    assert (summary.exit_code, summary.done) == (0, 69)
+    rows = list(csv.DictReader((out / "results.csv").open()))
+    assert {(row["status"], row["activated"]) for row in rows} == {("ok", "1")}
+    return Counter(row["fault_type"] for row in rows if row["h3"] == "1")
+
+
+def test_levels(workspace: Workspace, tmp_path: Path) -> None:
+    """Rain, snow, contrast mislead the published detector, fog, brightness, blur do not; the other sees more."""
+    paper = departures(workspace, tmp_path / "paper", "paper")
+    robust = departures(workspace, tmp_path / "robust", "robust")
+    assert all(paper[name] > 0 for name in ("rain", "snow", "contrast"))
+    assert sum(paper[name] for name in ("fog", "brightness", "blur")) <= 2
+    assert robust.total() < paper.total() / 2
+    assert robust["rain"] + robust["snow"] + robust["occlusion"] == 0
+
+
+def test_the_cache_of_pictures_changes_nothing(
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A campaign that finds no pictures in the cache, and one that finds them, come to the same bytes."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    runs = [tmp_path / "cold", tmp_path / "warm"]
+    for out in runs:
+        assert not (out.name == "cold" and (tmp_path / ".cache").exists())
+        assert campaign_run.run(workspace, "vision_levels_paper", out, workers=2, choices=FEW).exit_code == 0
+    assert (tmp_path / ".cache" / "selfdrive").is_dir()
+    cold, warm = runs
+    assert len(read_records(cold)) == 2
+    assert read_records(cold) == read_records(warm)
+    for name in ("trace.npz", "record.json"):
+        place = Path("golden") / "S1+pictures+paper_detector" / name
+        assert (cold / place).read_bytes() == (warm / place).read_bytes()
