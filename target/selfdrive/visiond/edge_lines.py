@@ -12,12 +12,13 @@ MIN_PIXELS = 24  # of a cluster, or a line, that is looked at
 MIN_SPREAD = 3.0  # standard deviation of the rows it covers
 MAX_SLOPE = 0.15  # a line that leads further from the car's heading is none of its lane's
 BESIDE = 8.0  # m ahead: where it is decided which line is nearest
+CROWD = 0.8  # m beyond the nearest line there is no other one: the one with more edges counts
 TRIES = 8  # clusters on each side that are looked at, from the nearest
 REACHES = 0.3, 0.2  # m: how far from a line edges belong to it, each time it is fitted
 LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and as many out of it
 MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
 SURE_PIXELS = 80.0  # edge pixels of a line about which there is no doubt
-SURE_SPREAD = 0.15  # m: root mean square distance of a line's edges from it that halves its probability
+SURE_SPREAD = 0.25  # m: root mean square distance of a line's edges from it that halves its probability
 
 
 class Points(NamedTuple):
@@ -64,24 +65,41 @@ class EdgeLines:
         for side in (1.0, -1.0):
             away = np.where(usable, side * (y + BESIDE * slope), -1.0)
             order = [k for k in np.argsort(away) if away[k] >= 0.0][:TRIES]
-            lines = (self._line(float(a[k]), float(b[k]), points) for k in order)
-            sides.append(next((line for line in lines if line is not None), None))
+            sides.append(
+                self._first_line([(float(away[k]), float(a[k]), float(b[k])) for k in order], points)
+            )
         return sides[0], sides[1]
 
-    def _line(self, a: float, b: float, points: Points) -> RoadLine | None:
-        """The line through all edges about column = a * row + b; None if they are not those of a mark."""
+    def _first_line(self, clusters: list[tuple[float, float, float]], points: Points) -> RoadLine | None:
+        """The line of the first of the clusters (m away, a, b) that is one, or a better one close to it."""
+        best, first, most, where = None, 0.0, 0, 0.0
+        for away, a, b in clusters:
+            if best is not None and (away > first + CROWD or away < where + REACHES[0]):
+                continue
+            line, pixels = self._line(a, b, points)
+            if line is not None and pixels > most:
+                first = first if best else away
+                best, most, where = line, pixels, away
+        return best
+
+    def _line(self, a: float, b: float, points: Points) -> tuple[RoadLine | None, int]:
+        """The line through all edges about column = a * row + b, and their number.
+
+        None if they are not those of a mark.
+        """
         for reach in REACHES:
             away = np.abs(points.column - a * points.row - b) * points.scale
             own = points.some(np.flatnonzero(away <= reach))
             if own.row.size < MIN_PIXELS:
-                return None
+                return None, 0
             spread, a, b = _fit_one(own.row, own.column)
         y, slope = self._model.line_on_road(a, b)
         away = (own.column - a * own.row - b) * own.scale
         if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
-            return None
+            return None, 0
         doubt = float(np.mean(away**2)) / SURE_SPREAD**2
-        return RoadLine(y=y, slope=slope, prob=min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt))
+        prob = min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt)
+        return RoadLine(y=y, slope=slope, prob=prob), own.row.size
 
 
 def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
