@@ -31,7 +31,7 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
 
 
 def test_levels(workspace: Workspace, tmp_path: Path) -> None:
-    """Rain, snow, contrast mislead the published detector, fog, brightness, blur do not; the other sees more."""
+    """Rain, snow, contrast mislead the published detector, fog and blur do not; the other one sees more."""
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
     assert all(paper[name] > 0 for name in ("rain", "snow", "contrast"))
