@@ -13,7 +13,7 @@ from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.hog import STRIDE, WINDOW
 
 NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always looked at, the furthest may be left out
-SIDE = 4.5  # m: half a lane and the car's own offset, twice
+SIDE = 3.8  # m: a lane's line when the car is all but in the next lane
 TURN = 0.08  # m further out for each metre ahead
 
 

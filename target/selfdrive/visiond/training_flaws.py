@@ -46,7 +46,7 @@ class Ground:
     def _texture(self, rng: np.random.Generator) -> np.ndarray:
         """Grass, stones, dry earth: grey levels for the whole picture."""
         fine = rng.standard_normal(self._left.shape, dtype=np.float32)
-        fine = cv2.GaussianBlur(fine, (0, 0), rng.uniform(0.6, 2.5), sigmaY=rng.uniform(0.6, 6.0))
+        fine = cv2.GaussianBlur(fine, (0, 0), rng.uniform(0.6, 2.5), sigmaY=rng.uniform(0.6, 2.5))
         return self._tone + fine * (rng.uniform(2.0, 40.0) / max(float(fine.std()), 1e-6))
 
 
