@@ -1,0 +1,45 @@
+"""Driving by the paper's detector: the five scenarios on rendered roads."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from selfdrive.sim.scenario import load_scenario
+from selfdrive.sim.simulator import Simulator
+from selfdrive.sim.vision import Pictures
+
+SCENARIOS = Path(__file__).resolve().parents[4] / "fault_library" / "scenarios"
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory) -> Path:
+    """A folder for rendered pictures that all runs share."""
+    return tmp_path_factory.mktemp("pictures")
+
+
+def drive(name: str, marks: str, cache: Path):
+    """Result of a run of the scenario on a road with these marks."""
+    simulator = Simulator()
+    pictures = Pictures(detector="paper", marks=marks, cache=cache)
+    simulator.reset(load_scenario(SCENARIOS / f"{name}.yaml"), 0, pictures)
+    while not simulator.done:
+        simulator.step()
+    return simulator.result()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
+def test_the_lane_is_kept_between_solid_lines(name, cache):
+    """No hazard, no alert that steering is at its limit, and never more than 0.3 m from the middle."""
+    result = drive(name, "solid", cache)
+    assert set(result.record["hazards"].values()) == {None}
+    assert "steer_saturated" not in [alert["name"] for alert in result.record["alerts"]]
+    assert np.abs(result.trace["lateral_offset"]).max() <= 0.3
+
+
+@pytest.mark.slow
+def test_gaps_between_dashes_make_it_wander_but_not_leave(cache):
+    """Where a gap fills its view it follows the other line, and stays in its lane."""
+    result = drive("S3", "dashed", cache)
+    assert result.record["hazards"]["H3"] is None
+    assert np.abs(result.trace["lateral_offset"]).max() <= 0.5
