@@ -51,10 +51,10 @@ class ImageFolder:
         root = read_yaml(text.decode(errors="replace"), str(self._calibration), _KEYS)
         root.text("schema", (SCHEMA,))
         self.name = root.text("name")
-        self._width, self._rows = (int(root.number(key, 16, _LARGEST)) for key in ("width", "rows"))
+        self._width, self._rows = (_pixels(root, key, _LARGEST) for key in ("width", "rows"))
         model = _model(root, self._width, self._rows)
-        width = int(root.number("resize_width", 16, self._width, default=self._width))
-        self.model = _resized(model, width)
+        smaller = "resize_width" in root
+        self.model = _resized(model, _pixels(root, "resize_width", self._width)) if smaller else model
         if ("fps" in root) == ("spacing_m" in root):
             root.fail("both or none of fps, spacing_m", "exactly one of them", f"fps are {_KEYS['fps']}")
         self.fps = root.number("fps", 0.1, 1000.0) if "fps" in root else None
@@ -66,12 +66,12 @@ class ImageFolder:
     def read(self) -> Iterator[np.ndarray]:
         """The frames (uint8, rows x width). Raises ConfigError at the first that is not as it should be."""
         for path in self.files:
-            frame = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+            frame = _decoded(_bytes(path, "a frame", "put it there"))
             if frame is None:
                 raise ConfigError(
                     "not readable as a picture",
                     where=str(path),
-                    expected="a picture such as PNG or JPEG",
+                    expected="a whole picture such as PNG or JPEG",
                     remedy="replace it",
                 )
             rows, width = frame.shape
@@ -86,6 +86,12 @@ class ImageFolder:
                 size = self.model.width, self.model.rows
                 frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
             yield frame
+
+
+def _pixels(root: Section, key: str, most: int) -> int:
+    value = root.number(key, 16, most)
+    root.check(key, value == int(value), "a whole number of pixels", f"{key} is {_KEYS[key]}")
+    return int(value)
 
 
 def _model(root: Section, width: int, rows: int) -> CameraModel:
@@ -134,7 +140,10 @@ def _listed(folder: Path, root: Section) -> list[Path]:
         "files below the folder",
         "put them there",
     )
-    files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
+    try:
+        files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
+    except ValueError as error:
+        root.check("files", False, "a pattern such as *.png, */*.png or **/*.png", str(error))
     root.check("files", bool(files), f"the name of a file in {folder}", "no file is called so")
     for missing in _gaps(files):
         raise ConfigError(
@@ -175,6 +184,20 @@ def _frame(path: Path, match: re.Match[str], number: int) -> Path:
     """The path of the frame with another number."""
     name, digits = path.name, len(match[1])
     return path.with_name(f"{name[: match.start()]}{number:0{digits}}{name[match.end() :]}")
+
+
+def _decoded(data: bytes) -> np.ndarray | None:
+    """The grey picture (uint8) in a file's bytes, None where there is none, or not all of one."""
+    # Of a JPEG file that is cut off OpenCV makes up the rest; its last scan must have an end.
+    if data[:2] == b"\xff\xd8" and data.rfind(b"\xff\xda") > data.rfind(b"\xff\xd9"):
+        return None
+    try:
+        frame = cv2.imdecode(
+            np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+        )
+    except cv2.error:  # an empty file, or a size beyond what OpenCV reads
+        return None
+    return frame
 
 
 def _bytes(path: Path, expected: str, remedy: str) -> bytes:

@@ -7,6 +7,7 @@ follow from. Processes map that file and so share its memory. A file appears the
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
 from hashlib import sha256
+from io import SEEK_END, BytesIO
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
@@ -16,7 +17,7 @@ import numpy as np
 from selfdrive.common import camera_model
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim import lead_picture, road_look, road_renderer, road_texture
+from selfdrive.sim import image_folder, lead_picture, road_look, road_renderer, road_texture
 from selfdrive.sim.image_folder import ImageFolder
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
@@ -53,10 +54,22 @@ class ImageLibrary:
 def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
     """The pictures a run asks for, from the cache where they are there. ConfigError where it cannot be."""
     cv2.setNumThreads(1)
-    cache = pictures.cache.expanduser()
+    cache = _cache_folder(pictures.cache)
     if pictures.frames is not None:
         return _own(ImageFolder(pictures.frames), cache)
     return _rendered(CameraModel(), pictures.marks, seed, cache)
+
+
+def _cache_folder(cache: Path) -> Path:
+    try:
+        return cache.expanduser()
+    except RuntimeError:
+        raise ConfigError(
+            "no home folder is known",
+            where=str(cache),
+            expected="a folder to keep pictures in",
+            remedy="choose another --cache, or set HOME",
+        ) from None
 
 
 def _rendered(model: CameraModel, marks: str, seed: int, cache: Path) -> ImageLibrary:
@@ -75,7 +88,8 @@ def _rendered(model: CameraModel, marks: str, seed: int, cache: Path) -> ImageLi
 
 def _own(folder: ImageFolder, cache: Path) -> ImageLibrary:
     model = folder.model
-    digest = _digest([cv2.__version__.encode(), folder.digest.encode()])
+    read_by = [Path(module.__file__).read_bytes() for module in (camera_model, image_folder)]
+    digest = _digest([cv2.__version__.encode(), folder.digest.encode(), *read_by])
     shape = (len(folder.files), model.rows, model.width)
     return ImageLibrary(
         name=folder.name,
@@ -120,8 +134,7 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Frames) -> None:
     with NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as file:
         part = Path(file.name)
         try:
-            header = {"descr": "|u1", "fortran_order": False, "shape": shape}
-            np.lib.format.write_array_header_1_0(file, header)
+            file.write(_header(shape))
             total = 0
             for frame in frames:
                 file.write(frame.tobytes())
@@ -136,18 +149,27 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Frames) -> None:
 
 def _mapped(path: Path, shape: tuple[int, int, int]) -> np.ndarray | None:
     """The frames in that file; None where there is no such file, or not a whole one."""
+    header = _header(shape)
+    end = len(header) + _size(shape)
     try:
-        frames = np.load(path, mmap_mode="r", allow_pickle=False)
-        end = path.stat().st_size - CHECK.itemsize
         with path.open("rb") as file:
-            file.seek(max(0, end))
+            begins = file.read(len(header))
+            file.seek(0, SEEK_END)
+            if begins != header or file.tell() != end + CHECK.itemsize:
+                return None
+            file.seek(end)
             check = file.read()
-    except (FileNotFoundError, ValueError, EOFError):
+            frames = np.memmap(file, np.uint8, "r", len(header), shape)
+    except FileNotFoundError:
         return None
-    whole = frames.shape == shape and frames.dtype == np.uint8 and frames.offset + frames.size == end
-    if not whole or check != _check(sum(map(_sum, frames))):
-        return None
-    return frames.view(np.ndarray)
+    return frames.view(np.ndarray) if check == _check(sum(map(_sum, frames))) else None
+
+
+def _header(shape: tuple[int, int, int]) -> bytes:
+    """How NumPy's files of such an array begin."""
+    header = BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "|u1", "fortran_order": False, "shape": shape})
+    return header.getvalue()
 
 
 def _sum(frame: np.ndarray) -> int:

@@ -1,6 +1,8 @@
 """A user's own frames: calibration, order, and errors that name the file."""
 
 import re
+import struct
+import zlib
 from dataclasses import astuple
 from pathlib import Path
 
@@ -114,6 +116,37 @@ def test_an_unreadable_frame_is_named(folder, content):
     assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected ")
 
 
+def test_a_frame_that_is_cut_off_is_named(folder):
+    """Half a JPEG or PNG file is not taken for a picture, although its header and first rows are there."""
+    picture = np.random.default_rng(0).integers(0, 256, (48, 64), dtype=np.uint8)
+    for kind in (".png", ".jpg"):
+        whole = cv2.imencode(kind, picture)[1].tobytes()
+        (folder / "7.png").write_bytes(whole)
+        assert len(list(ImageFolder(folder).read())) == 12
+        (folder / "7.png").write_bytes(whole[: len(whole) // 2])
+        assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected a whole ")
+
+
+def test_a_frame_too_large_to_be_read_is_named(folder):
+    """A header that promises billions of pixels ends with a message, too."""
+    header = b"IHDR" + struct.pack(">II5B", 60000, 60000, 8, 0, 0, 0, 0)
+    png = cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes()
+    (folder / "7.png").write_bytes(
+        png[:12] + header + zlib.crc32(header).to_bytes(4) + png[12 + len(header) + 4 :]
+    )
+    assert error(folder).startswith(f"{folder}/7.png: not readable as a picture")
+
+
+def test_colour_depth_and_transparency_do_not_matter(folder):
+    """Grey, colour with and without alpha, and 16 bits a channel are all read as 8 bit grey; one will do."""
+    for path in folder.glob("*.png"):
+        path.unlink()
+    for shape, kind in (((48, 64), np.uint8), ((48, 64, 4), np.uint8), ((48, 64), np.uint16)):
+        cv2.imwrite(str(folder / "1.png"), np.full(shape, 90 * (257 if kind == np.uint16 else 1), kind))
+        (frame,) = ImageFolder(folder).read()
+        assert frame.dtype == np.uint8 and (frame == 90).all()
+
+
 def test_a_missing_frame_is_named(folder):
     """A gap in the numbers is a frame that is missing, not a jump ahead."""
     (folder / "7.png").unlink()
@@ -158,6 +191,8 @@ def test_several_sequences_follow_each_other(folder):
         ("horizon_row: 20", "horizon_row: 47", "camera.yaml:6: horizon_row: '47'"),
         ("*.png", "*.tif", "expected the name of a file in"),
         ("*.png", "../*.png", "expected files below the folder"),
+        ("*.png", "**.png", "camera.yaml:3: files: '**.png', expected a pattern such as *.png"),
+        ("width: 64", "width: 64.5", "camera.yaml:4: width: '64.5', expected a whole number of pixels"),
         ("rows: 48", "rows: many", "camera.yaml:5: rows: 'many'"),
         ("rows: 48", "rows: 48\nresize_width: 128", "resize_width: '128', expected a number from 16 to 64"),
     ],

@@ -86,8 +86,10 @@ def test_frames_are_made_once(tmp_path):
         lambda data: data[:200] + bytes([data[200] ^ 1]) + data[201:],
         lambda data: b"no array of numbers",
         lambda data: data[:128] + bytes(len(data) - 128),
+        lambda data: b"PK\x03\x04" + data[4:],
+        lambda data: data[:80] + b"(" + data[81:],
     ],
-    ids=["short", "header only", "empty", "long", "one bit", "other content", "zeros"],
+    ids=["short", "header only", "empty", "long", "one bit", "other content", "zeros", "archive", "header"],
 )
 def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
     """A cache file that is not whole is replaced, and then sound again."""
@@ -115,6 +117,17 @@ def test_a_cache_that_cannot_be_written_is_an_error_that_names_it(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(ConfigError, match=r"file/cache.*choose another --cache"):
         cached(tmp_path / "file" / "cache", DIGEST, SHAPE, noise)
+
+
+def test_without_a_home_folder_the_cache_must_be_named(monkeypatch):
+    """Where nobody knows the home folder, the message says that --cache is the way out."""
+
+    def no_home(_):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "expanduser", no_home)
+    with pytest.raises(ConfigError, match=r"~/\.cache/selfdrive: no home folder.*choose another --cache"):
+        open_library(Pictures(), 0)
 
 
 def test_processes_may_make_the_same_frames_at_once(tmp_path):
