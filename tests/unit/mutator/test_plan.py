@@ -262,11 +262,14 @@ def test_cost_is_stated(toycar: Workspace) -> None:
     assert measured.cpu_s > 100 * one.cpu_s / 10
 
 
+BEYOND = ("vision_weather",)  # modules of faults that are not published ones
+
+
 def test_quickstart_shows_everything(clone: Workspace) -> None:
-    """60 experiments: every variant of the library in guided and random, every scenario and context."""
+    """60 experiments: every published variant in guided and random, every scenario and context."""
     plan = make_plan(clone, "quickstart")
     experiments = plan.experiments
-    variants = {f"{spec.name}/{v.name}" for spec in clone.specs() for v in spec}
+    variants = {f"{spec.name}/{v.name}" for spec in clone.specs() if spec.module not in BEYOND for v in spec}
     assert len(experiments) == 60
     assert {(e.fault.spec, e.method) for e in experiments} == {(v, m) for v in variants for m in Method}
     scenarios = Counter(e.scenario for e in experiments)
@@ -281,11 +284,10 @@ def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
     return make_plan(clone, path, **choices)
 
 
-def test_the_whole_library_expands_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
-    """Without a sample every value meets every scenario and context; the readings differ in faults only."""
+def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
+    """Without a sample they are the published 11,280, each value in each scenario and context, in both ways."""
     described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
-    values = sum(spec.count for spec in clone.specs())
-    assert len(described.experiments) == len(coded.experiments) == values * 5 * 4 * 2
+    assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
     assert len({e.id for e in described.experiments}) == len(described.experiments)
     for one, other in zip(described.experiments, coded.experiments, strict=True):
         assert (one.fault.spec, one.fault.value) == (other.fault.spec, other.fault.value)
