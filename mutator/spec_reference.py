@@ -123,8 +123,8 @@ MODELS = """\
 A model is a template in `templates/` with the parameters below. A model that inserts puts lines before or
 after the anchored statement; one that guards wraps the statement itself. A parameter in *the variable's unit*
 may be given in any unit of the same dimension. `target` may be left out where the anchor names the variable.
-A *variable* is a name that the function of the anchor knows; an *import* is the dotted name of a module of the
-target and of something defined in it, which the injected lines import.
+A *variable* is a name that the function of the anchor knows; an *import* is the dotted name of a module of
+the target and of something defined in it, which the injected lines import.
 """
 
 

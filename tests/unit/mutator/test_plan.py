@@ -285,7 +285,7 @@ def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
 
 
 def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
-    """Without a sample they are the published 11,280, each value in each scenario and context, in both ways."""
+    """Without a sample they are the published 11,280: each value in each scenario and context."""
     described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
     assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
     assert len({e.id for e in described.experiments}) == len(described.experiments)
