@@ -54,10 +54,11 @@ class EdgeLines:
         row, column = np.divmod(np.flatnonzero(mask.view(bool)), mask.shape[1])
         scale = self._scale.take(row)
         points = Points(row + float(self._first[0]), column + float(self._first[1]), rising, scale)
-        clustered = np.flatnonzero(labels >= 0)
-        points, labels = points.some(clustered), labels.take(clustered)
-        if not labels.size:
+        clustered = labels >= 0
+        if not clustered.any():
             return None, None
+        if not clustered.all():
+            points, labels = points.some(np.flatnonzero(clustered)), labels[clustered]
         size, spread, a, b = _fit(points.row, points.column, labels)
         y, slope = self._model.line_on_road(a, b)
         usable = (size >= MIN_PIXELS) & (spread >= MIN_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
@@ -87,9 +88,10 @@ class EdgeLines:
 
         None if they are not those of a mark.
         """
+        own = points
         for reach in REACHES:
-            away = np.abs(points.column - a * points.row - b) * points.scale
-            own = points.some(np.flatnonzero(away <= reach))
+            away = np.abs(own.column - a * own.row - b) * own.scale
+            own = own.some(np.flatnonzero(away <= reach))
             if own.row.size < MIN_PIXELS:
                 return None, 0
             spread, a, b = _fit_one(own.row, own.column)
@@ -97,7 +99,7 @@ class EdgeLines:
         away = (own.column - a * own.row - b) * own.scale
         if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
             return None, 0
-        doubt = float(np.mean(away**2)) / SURE_SPREAD**2
+        doubt = float(away @ away) / away.size / SURE_SPREAD**2
         prob = min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt)
         return RoadLine(y=y, slope=slope, prob=prob), own.row.size
 
@@ -108,10 +110,10 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     `away` (m, right positive) is how far each edge is from the middle. A shadow's edge does only one of the
     two, a dark seam does them the other way round.
     """
-    share = float(np.mean(rising))
-    if not LEAST_SHARE <= share <= 1.0 - LEAST_SHARE:
+    brighter, darker = away[rising], away[~rising]
+    if min(brighter.size, darker.size) < LEAST_SHARE * away.size:
         return False
-    width = float(np.mean(away[~rising]) - np.mean(away[rising]))
+    width = float(darker.sum()) / darker.size - float(brighter.sum()) / brighter.size
     return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
 
 
