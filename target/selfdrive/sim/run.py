@@ -81,7 +81,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--scenario", type=Path, required=True, metavar="FILE", help="scenario YAML")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the results go")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers")
+    parser.add_argument("--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers")
     parser.add_argument("--no-lead", action="store_true", help="run without the lead vehicle")
     parser.add_argument("--plant", choices=PLANTS, help="plant to drive on, instead of the scenario's")
     parser.add_argument("--pictures", action="store_true", help="see the road in pictures, not ideally")
@@ -99,6 +99,10 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _pictures(options: argparse.Namespace) -> Pictures | None:
     if not options.pictures:
+        if options.frames:
+            raise ConfigError(
+                f"--frames {options.frames}", expected="--pictures with it", remedy="give both or none"
+            )
         return None
     return Pictures(
         detector=options.detector,
@@ -107,6 +111,12 @@ def _pictures(options: argparse.Namespace) -> Pictures | None:
         translation=options.translation,
         cache=options.cache,
     )
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+    return int(text)
 
 
 def _positive(text: str) -> int:

@@ -8,11 +8,14 @@ import cv2
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
 
 CELL = 0.04  # m, a column of the map
 REACH = 5.2  # m, to the left and to the right
 FINEST = 1.3 / 0.12  # px/m; where fewer, a mark of 0.12 m is too narrow to be told from texture
 FARTHEST = 35.0  # m
+LEAST_DROP = 13.0  # px below the horizon: beyond what a camera's pitch may be off
+LEAST_ROWS = 8
 LEVELS = 3  # the picture, at half and at a quarter of its size
 BLEND = 40.0  # px/m beyond which the next smaller picture is used
 
@@ -22,6 +25,7 @@ class RoadView:
 
     Per row of the map, nearest last: `drop` (px below the horizon), `scale` (px of the picture per m of road)
     and `share` (rows of the picture it stands for). `y` (m, left positive) by column, largest first.
+    Raises ConfigError if the camera sees too little of the road.
     """
 
     def __init__(self, model: CameraModel) -> None:
@@ -34,6 +38,13 @@ class RoadView:
                 self._levels.append(_maps(model, of_level, self.y, level))
                 rows += of_level
                 shares += [2.0**level] * len(of_level)
+        if len(rows) < LEAST_ROWS:
+            raise ConfigError(
+                f"{len(rows)} rows in which marks are wide enough, up to {FARTHEST:.0f} m ahead",
+                where="the camera's calibration",
+                expected=f"at least {LEAST_ROWS}",
+                remedy="use larger pictures, or a camera that sees the road before the car",
+            )
         self.drop = np.array(rows, np.float32) - np.float32(model.horizon)
         self.scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows], np.float32)
         self.share = np.array(shares, np.float32)
@@ -61,7 +72,7 @@ def _rows_of(model: CameraModel, level: int) -> list[float]:
     return [
         row
         for row in rows
-        if row > model.horizon + 1.0
+        if row > model.horizon + LEAST_DROP
         and model.distance(row) < FARTHEST
         and max(finest, FINEST) <= 1.0 / model.metres_per_pixel(row) < coarsest
     ]

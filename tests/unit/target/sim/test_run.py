@@ -96,7 +96,18 @@ def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
     assert "choose another --out" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [[], ["--max-steps", "0"], ["--seed", "x"], ["--max-steps", "many"]])
+def test_frames_without_pictures(scenarios, tmp_path, capsys):
+    """Who names a folder of frames and forgets to ask for pictures is told, not driven by ideal sight."""
+    arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), "--max-steps", "1"]
+    assert main([*arguments, "--frames", "mine"]) == 2
+    assert "--frames mine, expected --pictures" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["--max-steps", "0"], ["--seed", "x"], ["--seed", "-1"], ["--max-steps", "many"]],
+)
 def test_wrong_arguments(scenarios, tmp_path, arguments, capsys):
     """Missing or impossible arguments end with code 2, and speak of what was given."""
     full = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), *arguments]
@@ -105,4 +116,4 @@ def test_wrong_arguments(scenarios, tmp_path, arguments, capsys):
     assert caught.value.code == 2
     error = capsys.readouterr().err.rsplit("error: ", 1)[1]
     assert repr(arguments[-1]) in error if arguments else "required" in error
-    assert "_positive" not in error
+    assert "_positive" not in error and "_seed" not in error

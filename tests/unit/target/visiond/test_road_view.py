@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.road_view import CELL, RoadView
 
 CAMERAS = {
@@ -52,3 +53,10 @@ def test_near_rows_are_means_of_many_pixels():
     road = view.map(picture)
     middle = np.abs(view.y) < 1.5
     assert road[-10:][:, middle].std() < 0.4 * picture.std()
+
+
+def test_a_camera_that_sees_no_road_near_enough_is_refused():
+    """Where marks are narrower than can be told from texture, the message speaks of the calibration."""
+    far = CameraModel.from_view(width=640, rows=480, horizon=463, focal=600, height=1.35)
+    with pytest.raises(ConfigError, match=r"calibration: 0 rows .* expected at least 8"):
+        RoadView(far)

@@ -1,0 +1,24 @@
+"""Driving by the geometric detector: the five scenarios on rendered roads."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from selfdrive.sim.run import simulate
+from selfdrive.sim.scenario import load_scenario
+from selfdrive.sim.vision import ROBUST, Pictures
+
+SCENARIOS = Path(__file__).resolve().parents[4] / "fault_library" / "scenarios"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("marks", ["solid", "dashed"])
+@pytest.mark.parametrize("seed", [0, 2**40])
+def test_the_lane_is_kept(marks, seed, tmp_path):
+    """No hazard, no alert that steering is at its limit, never more than 0.3 m from the middle: S1 to S5."""
+    for name in ("S1", "S2", "S3", "S4", "S5"):
+        pictures = Pictures(detector=ROBUST, marks=marks, cache=tmp_path)
+        result = simulate(load_scenario(SCENARIOS / f"{name}.yaml"), seed, pictures)
+        assert set(result.record["hazards"].values()) == {None}
+        assert "steer_saturated" not in [alert["name"] for alert in result.record["alerts"]]
+        assert np.abs(result.trace["lateral_offset"]).max() <= 0.3
