@@ -46,15 +46,10 @@ class ImageFolder:
 
     def __init__(self, folder: Path) -> None:
         self._calibration = folder / CALIBRATION
-        remedy = "write it as docs/how-to/use-your-own-frames.md says"
-        text = _bytes(self._calibration, "the calibration of the frames in this folder", remedy)
-        root = read_yaml(text.decode(errors="replace"), str(self._calibration), _KEYS)
-        root.text("schema", (SCHEMA,))
+        text, root = _calibration(folder)
         self.name = root.text("name")
-        self._width, self._rows = (_pixels(root, key, _LARGEST) for key in ("width", "rows"))
-        model = _model(root, self._width, self._rows)
-        smaller = "resize_width" in root
-        self.model = _resized(model, _pixels(root, "resize_width", self._width)) if smaller else model
+        self._width, self._rows = _size(root)
+        self.model = _camera(root)
         if ("fps" in root) == ("spacing_m" in root):
             root.fail("both or none of fps, spacing_m", "exactly one of them", f"fps are {_KEYS['fps']}")
         self.fps = root.number("fps", 0.1, 1000.0) if "fps" in root else None
@@ -88,10 +83,37 @@ class ImageFolder:
             yield frame
 
 
+def camera_of(folder: Path) -> CameraModel:
+    """The camera that the calibration in `folder` describes, whatever frames lie there."""
+    return _camera(_calibration(folder)[1])
+
+
+def _calibration(folder: Path) -> tuple[bytes, Section]:
+    """The calibration's bytes, and what stands in it."""
+    path = folder / CALIBRATION
+    remedy = "write it as docs/how-to/use-your-own-frames.md says"
+    text = _bytes(path, "the calibration of the frames in this folder", remedy)
+    root = read_yaml(text.decode(errors="replace"), str(path), _KEYS)
+    root.text("schema", (SCHEMA,))
+    return text, root
+
+
+def _size(root: Section) -> tuple[int, int]:
+    """Width and height of the frames in the folder."""
+    return _pixels(root, "width", _LARGEST), _pixels(root, "rows", _LARGEST)
+
+
 def _pixels(root: Section, key: str, most: int) -> int:
     value = root.number(key, 16, most)
     root.check(key, value == int(value), "a whole number of pixels", f"{key} is {_KEYS[key]}")
     return int(value)
+
+
+def _camera(root: Section) -> CameraModel:
+    """The camera of the frames as they are read."""
+    width, rows = _size(root)
+    model = _model(root, width, rows)
+    return _resized(model, _pixels(root, "resize_width", width)) if "resize_width" in root else model
 
 
 def _model(root: Section, width: int, rows: int) -> CameraModel:

@@ -21,7 +21,7 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
-from selfdrive.sim.image_folder import CALIBRATION, ImageFolder
+from selfdrive.sim.image_folder import CALIBRATION, camera_of
 from selfdrive.visiond.detector import LaneDetector, LaneLines
 
 EXIT_INPUT = 2
@@ -101,7 +101,7 @@ def canonical(colour: np.ndarray, source: Source) -> np.ndarray:
 def read_frames(folder: Path, truth: Path) -> list[Frame]:
     """The frames that the truth file names. Raises ConfigError for what is missing or cannot be read."""
     images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGES]
-    own = _source_of(ImageFolder(folder).model) if (folder / CALIBRATION).exists() else None
+    own = _source_of(camera_of(folder)) if (folder / CALIBRATION).exists() else None
     frames = []
     for key, entry in _read_truth(truth).items():
         source = own or SOURCES.get(key.partition("_")[0])
@@ -234,13 +234,13 @@ def _read_truth(path: Path) -> dict:
 def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
     """Columns of both lines in row 278: from the lines where there are any, else from their centres."""
     try:
-        if "L" in entry and "R" in entry:
+        if entry.get("L") and entry.get("R"):
             left, right = (entry[side][0] * ROW + entry[side][1] for side in "LR")
         else:
             centres = entry["gt"]
             left, right = (centres[side] for side in ("LR" if isinstance(centres, dict) else (0, 1)))
         left, right = float(left), float(right)
-    except (KeyError, IndexError, TypeError, ValueError):
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError):
         left, right = 0.0, 0.0
     if left < right:
         return left, right
@@ -253,27 +253,34 @@ def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
 
 
 def _image(key: str, images: list[Path], folder: Path) -> Path:
-    """The key's file: `KEY.jpg`, or without the key's first word. Raises ConfigError when it is missing."""
-    for stem in (key, key.partition("_")[2]):
-        for path in images:
-            if path.stem == stem:
-                return path
+    """The key's file: `KEY.jpg`, or without the key's first word. Raises ConfigError when it is missing.
+
+    Of files of one name it is the one in a folder called as the key's first word.
+    """
+    camera, _, name = key.partition("_")
+    named = [path for path in images if path.stem == key] or [path for path in images if path.stem == name]
+    if len(named) > 1:
+        named = [path for path in named if camera in path.relative_to(folder).parts]
+    if len(named) == 1:
+        return named[0]
     raise ConfigError(
-        f"no frame {key!r}",
+        f"{'more than one' if named else 'no'} frame {key!r}",
         where=str(folder),
-        expected=f"{key}.jpg or {key.partition('_')[2]}.jpg (or .png, .jpeg) in the folder or below",
-        remedy="add it or take it out of the truth file",
+        expected=f"{key}.jpg or {name}.jpg (or .png, .jpeg) in the folder or below, of several in {camera}/",
+        remedy="leave one such file there, or take it out of the truth file",
     )
 
 
 def _write_overlays(folder: Path, detector: str, findings: list[Finding]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     for finding in findings:
         path = folder / f"{detector}_{finding.frame.key}.png"
-        if not cv2.imwrite(str(path), draw(finding)):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(cv2.imencode(".png", draw(finding))[1])
+        except OSError as error:
             raise ConfigError(
-                "cannot be written", where=str(path), expected="a writable folder", remedy="choose another"
-            )
+                str(error.strerror), where=str(path), expected="a writable folder", remedy="choose another"
+            ) from None
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -81,12 +81,50 @@ def test_lines_win_over_centres(frames, capsys):
     assert "2 of 2" in capsys.readouterr().out
 
 
+def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
+    """An entry whose lines are null is judged by its centres."""
+    lines = _lines(frames)
+    left, right = (lines["p1_one"][side] for side in "LR")
+    lines["p1_one"] = {
+        "L": None,
+        "R": None,
+        "gt": {"L": left[0] * 278 + left[1], "R": right[0] * 278 + right[1]},
+    }
+    _write(frames, lines)
+    assert _run(frames) == 0
+    assert "2 of 2" in capsys.readouterr().out
+
+
+def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, capsys):
+    """The key's first word picks the folder; where it does not, the frame is refused, not guessed."""
+    folder = frames / "frames"
+    for camera in ("p1", "tus"):
+        (folder / camera).mkdir()
+        cv2.imwrite(str(folder / camera / "one.png"), np.zeros((540, 960, 3), np.uint8))
+    (folder / "one.png").rename(folder / "p1" / "one.png")
+    assert _run(frames) == 0
+    assert "2 of 2" in capsys.readouterr().out
+    (folder / "p1").rename(folder / "other")
+    (folder / "tus").rename(folder / "another")
+    assert _run(frames) == 2
+    assert "p1_one" in capsys.readouterr().err
+
+
+def test_overlays_that_cannot_be_written_are_named(frames, capsys):
+    """A file in the way of the folder ends with its name."""
+    (frames / "drawn").write_text("in the way")
+    assert _run(frames, "--overlays", str(frames / "drawn")) == 2
+    assert "drawn/robust_p1_one.png" in capsys.readouterr().err
+
+
 def test_a_folder_s_own_camera_is_used(frames, capsys):
     """A camera.yaml beside the frames makes keys of any kind possible."""
     (frames / "frames" / "camera.yaml").write_text(
         "schema: camera/1\nname: mine\nfiles: '*.png'\nwidth: 960\nrows: 540\n"
         "horizon_row: 318\nfocal_px: 868.5\nheight_m: 1.21\nfps: 20\n"
     )
+    for number in (3, 4, 9):  # no sequence: what is to be looked at is in the truth file
+        (frames / "frames" / f"{number}.png").write_bytes(b"")
     _write(frames, {"one": _lines(frames)["p1_one"]})
     assert _run(frames) == 0
     assert "1 of 1" in capsys.readouterr().out
