@@ -1,12 +1,19 @@
 """The command that compares detected lanes with the truth."""
 
 import json
+from functools import cache
 
 import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.evaluate import SOURCES, TUSIMPLE, UDACITY, canonical, main
+
+
+@cache
+def _road(model):
+    """A road, painted once."""
+    return RoadRenderer(model, "solid", 1, periods=2)
 
 
 @pytest.fixture
@@ -16,7 +23,7 @@ def frames(tmp_path):
     (folder / "deep").mkdir(parents=True)
     lines = {}
     for key, name, model in (("p1_one", "one.png", UDACITY), ("tus_two", "deep/tus_two.png", TUSIMPLE)):
-        road = RoadRenderer(model, "solid", 1, periods=2)
+        road = _road(model)
         left, right = (model.line_in_picture(y, slope) for y, slope in road.truth(0.2, 0.01))
         source = SOURCES[key.partition("_")[0]]
         down = source.vanishing_row * 640 / (960 if key.startswith("p1") else 1280) - 200
