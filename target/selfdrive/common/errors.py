@@ -1,5 +1,9 @@
 """Errors that a user can mend."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class ConfigError(Exception):
     """A wrong input file. The text reads `file:line: got, expected, remedy`."""
@@ -9,3 +13,13 @@ class ConfigError(Exception):
     ) -> None:
         place = f"{where}:{line}: " if line is not None else f"{where}: " if where else ""
         super().__init__(f"{place}{got}, expected {expected}; {remedy}")
+
+
+@contextmanager
+def writing(where: Path, *, expected: str, remedy: str) -> Iterator[None]:
+    """Makes what the file system refuses within it a ConfigError that names `where`."""
+    try:
+        yield
+    except OSError as error:
+        got = error.strerror or str(error)
+        raise ConfigError(got, where=str(where), expected=expected, remedy=remedy) from None

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from selfdrive.common.errors import ConfigError
+from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
 from selfdrive.sim.vision import DEFAULT_CACHE, DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
@@ -59,20 +59,13 @@ def write(result: SimulationResult, folder: Path) -> None:
     np.savez(buffer, **result.trace)
     trace = buffer.getvalue()
     record = {**result.record, "trace_digest": sha256(trace).hexdigest()}
-    try:
+    with writing(folder, expected="a writable folder", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         part, final = folder / "record.json.part", folder / "record.json"
         final.unlink(missing_ok=True)
         (folder / "trace.npz").write_bytes(trace)
         part.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
         part.replace(final)
-    except OSError as error:
-        raise ConfigError(
-            str(error.strerror),
-            where=str(folder),
-            expected="a writable folder",
-            remedy="choose another --out",
-        ) from None
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:

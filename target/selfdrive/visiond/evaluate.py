@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.common.errors import ConfigError
+from selfdrive.common.errors import ConfigError, writing
 from selfdrive.messages import CameraView
 from selfdrive.sim.image_folder import CALIBRATION, camera_of
 from selfdrive.visiond.detector import LaneDetector, LaneLines
@@ -274,13 +274,9 @@ def _image(key: str, images: list[Path], folder: Path) -> Path:
 def _write_overlays(folder: Path, detector: str, findings: list[Finding]) -> None:
     for finding in findings:
         path = folder / f"{detector}_{finding.frame.key}.png"
-        try:
+        with writing(path, expected="a writable folder", remedy="choose another --overlays"):
             folder.mkdir(parents=True, exist_ok=True)
             path.write_bytes(cv2.imencode(".png", draw(finding))[1])
-        except OSError as error:
-            raise ConfigError(
-                str(error.strerror), where=str(path), expected="a writable folder", remedy="choose another"
-            ) from None
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:

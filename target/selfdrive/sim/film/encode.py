@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from selfdrive.common.errors import ConfigError
+from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.film import pen
 
 PICTURES_PER_S = 20
@@ -31,8 +31,9 @@ def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
             expected=f"a name that ends in {' or '.join(writers)}",
             remedy="choose another --out",
         )
-    _check_writable(path)
-    writers[path.suffix](pictures, path)
+    with writing(path, expected="a writable file", remedy="choose another --out"):
+        _make_room(path)
+        writers[path.suffix](pictures, path)
 
 
 def write_still(picture: np.ndarray, path: Path) -> None:
@@ -43,19 +44,15 @@ def write_still(picture: np.ndarray, path: Path) -> None:
             expected=f"a name that ends in {' or '.join(STILLS)}",
             remedy="choose another --out",
         )
-    _check_writable(path)
-    cv2.imwrite(str(path), picture)
+    with writing(path, expected="a writable file", remedy="choose another --out"):
+        _make_room(path)
+        path.write_bytes(cv2.imencode(path.suffix, picture)[1])
 
 
-def _check_writable(path: Path) -> None:
-    """Find out before the work is done."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    except OSError as error:
-        raise ConfigError(
-            str(error.strerror), where=str(path), expected="a writable file", remedy="choose another --out"
-        ) from None
+def _make_room(path: Path) -> None:
+    """Find out before the work is done whether the file can be written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch()
 
 
 def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:

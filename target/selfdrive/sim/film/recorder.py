@@ -7,11 +7,12 @@ reads: a run with a film leaves the same bytes as without.
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
 
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.common.errors import ConfigError
+from selfdrive.common.errors import writing
 from selfdrive.manager import Manager
 from selfdrive.messages import VIEW_LENGTH, CameraView, ModelData
 from selfdrive.sim.truth import GroundTruth
@@ -23,21 +24,17 @@ JPEG_QUALITY = 95  # noise that an effect has added is to be seen as it was
 
 
 class Film:
-    """A film in the making, in `folder`, which is made if need be. Raises ConfigError if it cannot be."""
+    """A film in the making, in `folder`, which is made if need be. Raises ConfigError if it cannot be.
+
+    A film that cannot be kept any longer, as on a full disk, ends the run with ConfigError.
+    """
 
     def __init__(self, folder: Path, camera: CameraModel) -> None:
         self._folder = folder
         self._count = 0
-        try:
+        with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
             (folder / INDEX).write_text(_line({"schema": SCHEMA, "camera": asdict(camera)}))
-        except OSError as error:
-            raise ConfigError(
-                str(error.strerror),
-                where=str(folder),
-                expected="a writable folder",
-                remedy="choose another --film",
-            ) from None
 
     def take(
         self, truth: GroundTruth, view: CameraView, manager: Manager, hazards: Mapping[str, float | None]
@@ -62,7 +59,7 @@ class Film:
             "text": state.alert_text1,
             "hazards": [name for name, t in hazards.items() if t is not None],
         }
-        with (self._folder / INDEX).open("a") as file:
+        with self._writing(), (self._folder / INDEX).open("a") as file:
             file.write(_line(entry))
         self._count += 1
 
@@ -73,8 +70,13 @@ class Film:
         import cv2  # runs without pictures do without
 
         name = f"{self._count:05d}.jpg"
-        cv2.imwrite(str(self._folder / name), view.picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        data = cv2.imencode(".jpg", view.picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+        with self._writing():
+            (self._folder / name).write_bytes(data)
         return name
+
+    def _writing(self) -> AbstractContextManager[None]:
+        return writing(self._folder, expected="a writable folder", remedy="choose another --film")
 
 
 def _seen(model: ModelData | None, t: float) -> dict | None:

@@ -92,3 +92,15 @@ def test_the_command_tells_what_is_wrong(tmp_path, capsys):
     error = capsys.readouterr().err
     assert "film.jsonl: no film" in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.png"])
+def test_a_full_disk_is_told_with_the_file(tmp_path, name):
+    """What cannot be written to its end is an error that names the file, not a traceback or a torn file."""
+    path = tmp_path / name
+    path.symlink_to("/dev/full")
+    with pytest.raises(ConfigError, match=f"{name}: No space left on device"):
+        if name == "a.png":
+            write_still(next(pictures()), path)
+        else:
+            write_video(pictures(), path)

@@ -90,6 +90,15 @@ def test_a_film_that_cannot_be_written(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
+    """A disk that is full when the second picture comes ends the run with the folder's name."""
+    (tmp_path / "film").mkdir()
+    (tmp_path / "film" / "00001.jpg").symlink_to("/dev/full")
+    words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out"), *seeing]
+    assert main([*words, "--film", str(tmp_path / "film")]) == 2
+    assert f"{tmp_path}/film: No space left" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
 def test_what_is_no_film_is_told(tmp_path, text):
     """An index that is missing parts is refused by its name."""
