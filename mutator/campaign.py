@@ -55,6 +55,8 @@ class Canary:
 class Campaign:
     """A campaign file, checked. Times are seconds of simulation; `source` is the file as it was read.
 
+    `sample` is how many experiments are taken: each variant as often, or, with `proportional`, each fault
+    type in each scenario in proportion to its number, guided and random ones in pairs.
     `setting` names changes of the manifest that every run of the campaign is made with.
     `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
@@ -77,6 +79,7 @@ class Campaign:
     random_until_s: float
     hold_s: float | None
     sample: int | None
+    proportional: bool
     seed: int
     canary: Canary
     limits: Limits
@@ -137,10 +140,17 @@ class _CampaignModel(StrictModel):
     methods: list[Literal["guided", "random"]] = Field(min_length=1)
     triggers: _TriggersModel
     sample: int | None = Field(None, ge=1)
+    proportional: bool = False
     seed: int = Field(ge=0, lt=2**63)
     canary: _CanaryModel
     limits: _LimitsModel = _LimitsModel()
     chunk: int = Field(20, ge=1, le=1000)
+
+    @model_validator(mode="after")
+    def _check(self) -> "_CampaignModel":
+        if self.proportional and self.sample is None:
+            raise ValueError("proportional without sample: say how many")
+        return self
 
 
 def load_campaign(path: Path) -> Campaign:
@@ -174,6 +184,7 @@ def load_campaign(path: Path) -> Campaign:
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
         sample=model.sample,
+        proportional=model.proportional,
         seed=model.seed,
         canary=Canary(**model.canary.model_dump()),
         limits=Limits(**{field.name: getattr(model.limits, field.name) for field in fields(Limits)}),

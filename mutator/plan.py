@@ -19,7 +19,7 @@ from mutator.locks import owned
 from mutator.model import Experiment
 from mutator.provenance import check_sources, sources, versions
 from mutator.runfolder import HEAD, SCHEMA, RunFolder
-from mutator.sample import pick
+from mutator.sample import pick, pick_in_proportion
 from mutator.workspace import Workspace
 
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
@@ -145,7 +145,7 @@ def _choose(
     experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int
 ) -> tuple[Experiment, ...]:
     if campaign.sample is not None:
-        experiments = pick(experiments, campaign.sample, seed)
+        experiments = _sample(experiments, campaign, campaign.sample, seed)
     for text, wanted in ((choices.only, True), (choices.exclude, False)):
         if text is not None:
             accepts = compile_filter(text, PLAN_COLUMNS)
@@ -160,6 +160,19 @@ def _choose(
             remedy="widen --only, --exclude or the campaign's faults",
         )
     return experiments
+
+
+def _sample(
+    experiments: tuple[Experiment, ...], campaign: Campaign, count: int, seed: int
+) -> tuple[Experiment, ...]:
+    if not campaign.proportional:
+        return pick(experiments, count, seed)
+    try:
+        return pick_in_proportion(experiments, count, seed)
+    except ValueError as err:
+        raise campaign.error(
+            ("sample",), f"sample {count}", expected=str(err), remedy="correct the number"
+        ) from None
 
 
 def freeze(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:

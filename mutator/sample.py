@@ -1,5 +1,6 @@
 """A small part of many experiments that still shows everything: picked evenly, the same each time."""
 
+import random
 from collections import Counter, defaultdict, deque
 from collections.abc import Hashable, Iterable, Sequence
 
@@ -58,3 +59,49 @@ def _marks(cell: _Cell) -> Iterable[Hashable]:
 
 def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
     return [taken[mark] for mark in _marks(cell)]
+
+
+def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+    """`count` of the experiments, in their order, guided and random ones in pairs: of each fault type in
+    each scenario in proportion to its number, but at least one pair; a systematic sample within each.
+
+    A ValueError tells a count that is too small for that, or that does not come out in whole pairs.
+    """
+    if count >= len(experiments):
+        return tuple(experiments)
+    strata: dict[_Stratum, dict[_Pair, list[Experiment]]] = defaultdict(dict)
+    for experiment in experiments:
+        fault = experiment.fault
+        stratum = (fault.module, fault.fault_type, experiment.scenario)
+        strata[stratum].setdefault(_pair(experiment), []).append(experiment)
+    size = len({experiment.method for experiment in experiments})
+    if count % size or count // size < len(strata):
+        raise ValueError(f"a multiple of {size}, {size * len(strata)} or more")
+    chosen: set[str] = set()
+    for stratum, number in _allot({key: len(pairs) for key, pairs in strata.items()}, count // size).items():
+        pairs = sorted(strata[stratum], key=lambda pair: (*pair[:2], digest([seed, pair])))
+        start = random.Random(digest([seed, stratum])).random()
+        for i in range(number):
+            members = strata[stratum][pairs[int((i + start) * len(pairs) / number)]]
+            chosen.update(member.id for member in members)
+    return tuple(e for e in experiments if e.id in chosen)
+
+
+_Stratum = tuple[str, str, str]  # module, fault type, scenario
+_Pair = tuple[str, str, str]  # variant, row of the context table, fault
+
+
+def _pair(experiment: Experiment) -> _Pair:
+    """What a guided experiment and its random partner have in common within a scenario."""
+    row = experiment.trigger.name.removeprefix("random/")
+    return (experiment.fault.spec, row, experiment.fault.id)
+
+
+def _allot(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
+    """`total` seats for strata of these sizes, one each and then by Sainte-Lague's rule (1910), as for the
+    seats of a parliament: the next goes to whom it brings nearest to its share."""
+    seats = dict.fromkeys(sizes, 1)
+    while sum(seats.values()) < total:
+        next_one = max(sizes, key=lambda key: (sizes[key] / (2 * seats[key] + 1), key))
+        seats[next_one] += 1
+    return seats

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from mutator.model import Experiment, Method
-from mutator.sample import pick, spread
+from mutator.sample import pick, pick_in_proportion, spread
 
 SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
 
@@ -63,3 +63,25 @@ def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
 def test_values_are_spread(count: int, wanted: int, indices: list[int]) -> None:
     """Some of a variant's values are taken evenly from its range, never one twice."""
     assert spread(count, wanted) == indices
+
+
+def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experiment]) -> None:
+    """Half of all: half of each fault type in each scenario, every guided experiment with its partner."""
+    picked = pick_in_proportion(many, 56, seed=1)
+    assert len(picked) == len({e.id for e in picked}) == 56
+    assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
+    keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
+    assert keys[Method.GUIDED] == keys[Method.RANDOM]
+    assert pick_in_proportion(many, 56, seed=1) == picked
+    assert pick_in_proportion(many, 56, seed=2) != picked
+
+
+def key(experiment: Experiment) -> tuple[str, str, str]:
+    return experiment.scenario, experiment.fault.id, experiment.trigger.name.removeprefix("random/")
+
+
+@pytest.mark.parametrize("count", [10, 57])
+def test_in_proportion_refuses_what_does_not_come_out(many: list[Experiment], count: int) -> None:
+    """A number that is odd, or too small for a pair of each type in each scenario, is refused."""
+    with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
+        pick_in_proportion(many, count, seed=1)
