@@ -94,7 +94,7 @@ class Rain(_Precipitation):
 
     LEAST, MOST = 0.5, 200.0
     REACHES = (1.0, 1.2), (2.0, 2.0), (3.0, 3.0)
-    IN_BOX = 1200
+    IN_BOX = 900
 
     def _prepare(self, random: np.random.Generator) -> None:
         limits = self.REACHES[0][0], self._largest()
