@@ -19,12 +19,12 @@ def markdown(content: "Content") -> str:
     """The report as Markdown."""
     parts = [f"# {content.name}", _outcome_text(content), NOTES.replace("\n", " ")]
     for table in content.tables:
-        parts += [f"## {table.title}", _markdown_table(table.heads, table.lines)]
+        parts += [f"## {table.title}", markdown_table(table.heads, table.lines)]
     if content.failed:
         parts += ["## Runs that did not end well", _failed_text(content)]
     parts += [
         "## Where this comes from",
-        _markdown_table(["what", "value"], [list(f) for f in content.facts]),
+        markdown_table(["what", "value"], [list(f) for f in content.facts]),
     ]
     parts.append("The table of all experiments is `results.csv`; `index.html` lists them with their diffs.")
     return "\n\n".join(parts) + "\n"
@@ -39,12 +39,14 @@ def _failed_text(content: "Content") -> str:
     lines = [
         [r.status.value, r.experiment_id, r.fault, r.scenario, r.detail] for r in content.failed[:LISTED]
     ]
-    table = _markdown_table(["status", "experiment", "fault", "scenario", "what was said"], lines)
+    table = markdown_table(["status", "experiment", "fault", "scenario", "what was said"], lines)
     more = len(content.failed) - LISTED
     return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
 
 
-def _markdown_table(heads: list[str], lines: list[list[str]]) -> str:
+def markdown_table(heads: list[str], lines: list[list[str]]) -> str:
+    """A table of texts in Markdown, whatever is in them."""
+
     def row(cells: list[str]) -> str:
         return "| " + " | ".join(c.replace("|", "\\|").replace("\n", " ") for c in cells) + " |"
 

@@ -1,0 +1,1 @@
+"""What the results of a campaign say: pure functions from a frame of results to tables with intervals."""

@@ -1,0 +1,72 @@
+"""The results of a run as a pandas frame, a row per usable experiment.
+
+Beside the columns of results.csv it has `kind` (`radar/chaff`), `row` (the context row whose trigger or whose
+random partner it is), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
+is_alert`. Times are s of simulation, NaN: did not happen.
+"""
+
+from pathlib import Path
+
+import pandas as pd
+
+from mutator.errors import MutatorError
+from mutator.tables import UNUSABLE
+
+_NEEDED = (
+    "experiment_id",
+    "fault_id",
+    "module",
+    "fault_type",
+    "scenario",
+    "method",
+    "trigger",
+    "seed",
+    "status",
+)
+_TIMES = ("t_activation", "t_manifest", "t_alert")
+_RANDOM = "random/"  # what a random partner's trigger is named: random/C1
+
+
+def load(results: Path) -> pd.DataFrame:
+    """The usable experiments of a results.csv, in its order; MutatorError when it is not one.
+
+    Harness errors and mutants that could not be made are left out; a crash or timeout counts as injected.
+    """
+    try:
+        frame = pd.read_csv(results, dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as err:
+        raise MutatorError(
+            f"no results can be read here ({err})", where=results, remedy="make them: `mutator report DIR`"
+        ) from None
+    missing = [name for name in (*_NEEDED, *_TIMES) if name not in frame.columns]
+    if missing:
+        raise MutatorError(
+            f"not a results table: no column '{missing[0]}'",
+            where=results,
+            remedy="make it anew: `mutator report DIR`",
+        )
+    return prepare(frame)
+
+
+def prepare(frame: pd.DataFrame) -> pd.DataFrame:
+    """Rows of text as read from results.csv, typed and with the derived columns."""
+    frame = frame[~frame["status"].isin([str(status) for status in UNUSABLE])].reset_index(drop=True)
+    hazards = hazard_names(frame)
+    for name in (*_TIMES, *(f"t_{hazard.lower()}" for hazard in hazards)):
+        frame[name] = pd.to_numeric(frame[name])
+    frame["kind"] = frame["module"] + "/" + frame["fault_type"]
+    frame["row"] = frame["trigger"].str.removeprefix(_RANDOM)
+    frame["t_hazard"] = frame[[f"t_{hazard.lower()}" for hazard in hazards]].min(axis=1)
+    for flag, time in (
+        ("is_activated", "t_activation"),
+        ("is_manifested", "t_manifest"),
+        ("is_hazard", "t_hazard"),
+        ("is_alert", "t_alert"),
+    ):
+        frame[flag] = frame[time].notna()
+    return frame
+
+
+def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
+    """Hazards that the table has a flag and a time for, sorted: `H1`, with columns `h1` and `t_h1`."""
+    return tuple(sorted(name.upper() for name in frame.columns if f"t_{name}" in frame.columns))

@@ -1,0 +1,39 @@
+"""A count of a whole, with its interval."""
+
+import math
+from dataclasses import dataclass
+
+CONFIDENCE = 0.95
+_DIGITS = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Share:
+    """`count` of `of`, with the Wilson interval of the rate (NaN when there was nothing to count)."""
+
+    count: int
+    of: int
+    low: float
+    high: float
+
+    @property
+    def rate(self) -> float:
+        return self.count / self.of if self.of else math.nan
+
+    def __str__(self) -> str:
+        """`35.8 % (1316/3678; 34.2 to 37.4)`; `- (0/0)` of nothing."""
+        if not self.of:
+            return "- (0/0)"
+        interval = f"{100 * self.low:.1f} to {100 * self.high:.1f}"
+        return f"{100 * self.rate:.1f} % ({self.count}/{self.of}; {interval})"
+
+
+def share(count: int, of: int) -> Share:
+    """`count` of `of` with its 95 % Wilson interval (statsmodels)."""
+    from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
+
+    if not of:
+        return Share(count=count, of=of, low=math.nan, high=math.nan)
+    low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE, method="wilson")
+    # rounded: the last bits differ between machines, and 0 of n begins at 0, not at 2e-18
+    return Share(count=count, of=of, low=round(float(low), _DIGITS), high=round(float(high), _DIGITS))

@@ -1,0 +1,67 @@
+"""A table ready to be written: as CSV with a column for each number, and as Markdown to be read."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mutator.report_page import markdown_table
+from mutator.statistics.share import Share
+
+Cell = Share | float | int | str | None
+_SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """One table. `name` is its file's, `note` says what is counted; every line has a cell for each head."""
+
+    name: str
+    title: str
+    note: str
+    heads: tuple[str, ...]
+    lines: tuple[tuple[Cell, ...], ...]
+
+    def texts(self) -> list[list[str]]:
+        """The cells as they are read."""
+        return [[_text(cell) for cell in line] for line in self.lines]
+
+    def markdown(self) -> str:
+        """Title, note and table."""
+        return f"## {self.title}\n\n{self.note}\n\n{markdown_table(list(self.heads), self.texts())}\n"
+
+    def csv(self) -> str:
+        """A share becomes five columns: count, of, rate and both ends of its interval (all of 1, not %)."""
+        wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(
+            name
+            for head, is_wide in zip(self.heads, wide, strict=True)
+            for name in ([f"{head}: {part}" for part in _SHARE_COLUMNS] if is_wide else [head])
+        )
+        for line in self.lines:
+            writer.writerow(_values(line, wide))
+        return out.getvalue()
+
+
+def _values(line: Sequence[Cell], wide: Sequence[bool]) -> list[object]:
+    values: list[object] = []
+    for cell, is_wide in zip(line, wide, strict=True):
+        if isinstance(cell, Share):
+            values += [cell.count, cell.of, *map(_number, (cell.rate, cell.low, cell.high))]
+        else:
+            value = _number(cell) if isinstance(cell, float) else cell
+            values += [value, *[None] * (len(_SHARE_COLUMNS) - 1)] if is_wide else [value]
+    return values
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.6g}"
+
+
+def _text(cell: Cell) -> str:
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return "-"
+    return f"{cell:.3g}" if isinstance(cell, float) else str(cell)

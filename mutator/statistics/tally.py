@@ -1,0 +1,57 @@
+"""Counts of one group of experiments: of a run, or as published."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any
+
+import pandas as pd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tally:
+    """How many of a group's faults were injected, activated and so on; None: not known.
+
+    Alerts and hazards are counted from activation on. `hazards_no_alerts`: no alert in the whole run.
+    """
+
+    injected: int
+    activated: int
+    hazards: int
+    manifested: int | None = None
+    alerts: int | None = None
+    hazards_no_alerts: int | None = None
+    alerts_no_hazards: int | None = None
+
+
+def tally(frame: pd.DataFrame) -> Tally:
+    """Count the rows of a frame of results."""
+    hazard, alert = frame["is_hazard"], frame["is_alert"]
+    return Tally(
+        injected=len(frame),
+        activated=int(frame["is_activated"].sum()),
+        manifested=int(frame["is_manifested"].sum()),
+        hazards=int(hazard.sum()),
+        alerts=int(alert.sum()),
+        hazards_no_alerts=int((hazard & ~alert).sum()),
+        alerts_no_hazards=int((alert & ~hazard).sum()),
+    )
+
+
+def total(tallies: Iterable[Tally]) -> Tally:
+    """The sum of groups; a count that one of them lacks is not known of all."""
+    all_of_them = list(tallies)
+    sums: dict[str, Any] = {}
+    for field in fields(Tally):
+        counts = [getattr(one, field.name) for one in all_of_them]
+        sums[field.name] = None if None in counts else sum(counts)
+    return Tally(**sums)
+
+
+def by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
+    """Counts by (method, scenario), as in the paper's table II."""
+    return {(str(m), str(s)): tally(group) for (m, s), group in frame.groupby(["method", "scenario"])}
+
+
+def by_kind(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
+    """Counts by (method, module/fault type), as in the paper's table III."""
+    return {(str(m), str(k)): tally(group) for (m, k), group in frame.groupby(["method", "kind"])}

@@ -1,0 +1,29 @@
+"""Hand-made results for the tests of statistics."""
+
+from typing import Any
+
+import pandas as pd
+
+from mutator.statistics.frame import prepare
+
+_EMPTY = ("t_activation", "t_manifest", "h1", "t_h1", "h2", "t_h2", "h3", "t_h3", "alerts", "t_alert")
+_ROW = {
+    "module": "radar",
+    "fault_type": "chaff",
+    "fault_id": "a",
+    "scenario": "S1",
+    "method": "guided",
+    "trigger": "C2",
+    "seed": "1",
+    "status": "ok",
+    **dict.fromkeys(_EMPTY, ""),
+}
+
+
+def results(*rows: dict[str, Any]) -> pd.DataFrame:
+    """A frame of rows that say what is unlike a guided chaff run in S1 that was not activated."""
+    texts = [
+        _ROW | {"experiment_id": str(i)} | {name: str(value) for name, value in row.items()}
+        for i, row in enumerate(rows)
+    ]
+    return prepare(pd.DataFrame(texts))
