@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
+from mutator.stpa_coverage import Coverage, coverage
 from mutator.trigger import VARIABLES, check_condition
 from mutator.yamlio import Source, StrictModel, read
 
@@ -36,12 +37,15 @@ class ContextRow:
 
 @dataclass(frozen=True, kw_only=True)
 class ContextTable:
-    """A context table of the hazard analysis."""
+    """A context table of the hazard analysis. Its rows cover everything exactly once, as `coverage` says."""
 
     name: str
+    about: str
     path: Path
     constants: Mapping[str, float]
     rows: tuple[ContextRow, ...]
+    coverage: Coverage
+    source: Source
 
     def triggers(
         self,
@@ -74,7 +78,7 @@ class ContextTable:
 class HazardList:
     """Accidents and hazards: id -> description; hazards also name the accidents they may lead to."""
 
-    path: Path
+    source: Source
     accidents: Mapping[str, str]
     hazards: Mapping[str, str]
     leads_to: Mapping[str, tuple[str, ...]]
@@ -109,7 +113,11 @@ class _HazardsModel(StrictModel):
 
 
 def load_context_table(path: Path) -> ContextTable:
-    """Read a context table; every condition is checked as a trigger condition."""
+    """Read a context table; every condition is checked as a trigger condition.
+
+    MutatorError also for contexts that leave something uncovered or overlap, where that can be proved, and
+    for rows that do not judge the same control actions.
+    """
     model, source = read(path, _TableModel, CONTEXT_SCHEMA)
     for name in model.constants:
         if not _CONSTANT.match(name) or name in VARIABLES:
@@ -128,7 +136,47 @@ def load_context_table(path: Path) -> ContextTable:
         )
         for name, row in model.contexts.items()
     )
-    return ContextTable(name=model.name, path=path, constants=dict(model.constants), rows=rows)
+    _check_actions(rows, source)
+    return ContextTable(
+        name=model.name,
+        about=model.about,
+        path=path,
+        constants=dict(model.constants),
+        rows=rows,
+        coverage=_covered_once(rows, source),
+        source=source,
+    )
+
+
+def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:
+    for row in rows[1:]:
+        if row.actions.keys() != rows[0].actions.keys():
+            raise source.error(
+                ("contexts", row.id, "actions"),
+                f"the actions {', '.join(row.actions) or 'none'} in context '{row.id}'",
+                expected=f"those of '{rows[0].id}': {', '.join(rows[0].actions) or 'none'}",
+                remedy="judge every control action in every context",
+            )
+
+
+def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
+    found = coverage({row.id: row.condition for row in rows})
+    if found.place is None:
+        return found
+    if not found.rows:
+        raise source.error(
+            ("contexts",),
+            f"no context holds at {found.place}",
+            expected="contexts that cover everything exactly once",
+            remedy="add a context or widen one",
+        )
+    first, second = found.rows[:2]
+    raise source.error(
+        ("contexts", second, "when"),
+        f"context '{second}' overlaps '{first}' at {found.place}",
+        expected="contexts that cover everything exactly once",
+        remedy="narrow one of the two",
+    )
 
 
 def _condition(text: str, constants: Mapping[str, float], source: Source, row: str) -> str:
@@ -153,7 +201,7 @@ def load_hazards(path: Path) -> HazardList:
                     remedy="correct it or describe the accident",
                 )
     return HazardList(
-        path=path,
+        source=source,
         accidents=dict(model.accidents),
         hazards={name: hazard.about for name, hazard in model.hazards.items()},
         leads_to={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},

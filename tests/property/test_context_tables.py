@@ -1,0 +1,44 @@
+"""Proofs about context tables against what single observations say."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mutator.stpa_coverage import coverage
+from mutator.trigger import check_condition, evaluate
+
+NUMBERS = st.sampled_from([-1.0, 0.0, 0.5, 2.0])
+COMPARISON = st.builds(
+    lambda name, sign, number: f"{name} {sign} {number!r}",
+    st.sampled_from(["hwt", "rs", "v_ego"]),
+    st.sampled_from(["<", "<=", ">", ">=", "==", "!="]),
+    NUMBERS,
+)
+CONDITION = st.recursive(
+    COMPARISON,
+    lambda inner: (
+        st.builds("({} and {})".format, inner, inner)
+        | st.builds("({} or {})".format, inner, inner)
+        | st.builds("not ({})".format, inner)
+    ),
+    max_leaves=4,
+)
+ANYWHERE = NUMBERS | st.floats(allow_nan=False)
+
+
+def contexts_at(conditions: dict[str, str], hwt: float, rs: float, v_ego: float) -> tuple[str, ...]:
+    values = {"hwt": hwt, "rs": rs, "v_ego": v_ego}
+    return tuple(row for row, condition in conditions.items() if evaluate(condition, values))
+
+
+@given(CONDITION, CONDITION, ANYWHERE, ANYWHERE, ANYWHERE)
+def test_what_is_proved_holds_everywhere(
+    first: str, second: str, hwt: float, rs: float, v_ego: float
+) -> None:
+    """Where a table is proved no observation, infinite ones included, is in no context or in two."""
+    texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
+    right = {row: check_condition(text) for row, text in texts.items()}
+    assert coverage(right).place is None
+    assert len(contexts_at(right, hwt, rs, v_ego)) == 1
+    loose = {"A": check_condition(first), "B": check_condition(second)}
+    if len(contexts_at(loose, hwt, rs, v_ego)) != 1:
+        assert coverage(loose).place is not None
