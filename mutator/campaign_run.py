@@ -196,7 +196,7 @@ def _frozen(workspace: Workspace, campaign: str | Path, out: Path, choices: Choi
             remedy="use another folder, or give the run's own file: " + str(out / "campaign.yaml"),
         )
     for name, value in asdict(choices).items():
-        frozen = head["choices"][name]
+        frozen = head["choices"].get(name)
         if name in ("seed", "reading"):
             frozen = head[name]
         if value is not None and value != frozen:

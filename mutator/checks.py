@@ -23,7 +23,7 @@ from mutator.trigger import always
 from mutator.workspace import Workspace
 
 SCHEMA = "checks/1"
-_FILE = "checks.json"
+FILE = "checks.json"
 _OTHER_HASH_SEED = 4242
 _GOLDEN, _AGAIN, _NULL, _CANARY = "golden", "golden again", "null mutant", "canary"
 
@@ -52,7 +52,7 @@ class _Run:
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
     """Mean CPU time of the golden runs in a folder; None before they ran."""
-    path = folder.path / _FILE
+    path = folder.path / FILE
     return read_json(path, SCHEMA)["run_cpu_s"] if path.is_file() else None
 
 
@@ -74,7 +74,7 @@ def run_checks(
         text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
         raise CheckFailed(
             f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
-            where=folder.path / _FILE,
+            where=folder.path / FILE,
             remedy="mend target, templates or canary; the campaign does not start before all pass",
         )
     return results
@@ -122,7 +122,7 @@ class _Checks:
         self._check_same_as_before(goldens)
         cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
         write_json(
-            self.folder.path / _FILE,
+            self.folder.path / FILE,
             {
                 "schema": SCHEMA,
                 "digest": self.digest,
@@ -134,7 +134,7 @@ class _Checks:
         yield from results
 
     def _before(self) -> dict[str, Any] | None:
-        path = self.folder.path / _FILE
+        path = self.folder.path / FILE
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:

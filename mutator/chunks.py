@@ -29,15 +29,17 @@ class Pending:
 
 
 def pending(folder: RunFolder, records: dict[str, Record]) -> tuple[Pending, ...]:
-    """Every chunk that has experiments without a record, or with a harness error, which is tried again."""
+    """Every chunk of the folder's share that has experiments without a record, or with a harness error,
+    which is tried again."""
     done = {name for name, record in records.items() if record.status is not Status.HARNESS_ERROR}
     names = planfile.ids(folder.path) if done else None
+    shard = folder.shard
     left: list[Pending] = []
     for index, (_, _, count) in enumerate(folder.head["chunks"]):
         if names is None:
             places = tuple(range(count))
         else:
             places = tuple(i for i in range(count) if next(names) not in done)
-        if places:
+        if places and (shard is None or shard.has(index)):
             left.append(Pending(index, places))
     return tuple(left)

@@ -20,6 +20,7 @@ from mutator.model import Experiment
 from mutator.provenance import check_sources, sources, versions
 from mutator.runfolder import HEAD, SCHEMA, RunFolder
 from mutator.sample import pick, pick_in_proportion
+from mutator.shards import Shard
 from mutator.workspace import Workspace
 
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
@@ -38,6 +39,7 @@ class Choices:
     only: str | None = None
     exclude: str | None = None
     limit: int | None = None
+    shard: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,14 +105,16 @@ def make_plan(
     only: str | None = None,
     exclude: str | None = None,
     limit: int | None = None,
+    shard: str | None = None,
 ) -> Plan:
     """Expand a campaign (a name of the library or a file) into its plan; nothing is written or run.
 
     `only`/`exclude` are filter expressions (`mutator.filters`) over the columns known before running;
-    `limit` keeps that many experiments, picked like a campaign's `sample`.
+    `limit` keeps that many experiments, picked like a campaign's `sample`; `shard` (`k/n`) is the share
+    of the plan that its run folder will run.
     """
     loaded = load_campaign(workspace.campaign(campaign))
-    choices = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    choices = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     seed = loaded.seed if seed is None else seed
     reading = reading or loaded.reading
     _check(choices, loaded)
@@ -118,6 +122,12 @@ def make_plan(
     experiments = _choose(expansion.experiments(), loaded, choices, seed)
     canary = expansion.canary()
     chunks = cut([(e.scenario, e.changes) for e in experiments], loaded.chunk)
+    if shard is not None and Shard.parse(shard).of > len(chunks):
+        raise MutatorError(
+            f"shard {shard}",
+            expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
+            remedy="use fewer shards, or a smaller chunk in the campaign",
+        )
     content = [[e.id for e in experiments], chunks, canary.id, plain(loaded.canary), plain(loaded.limits)]
     return Plan(
         campaign=loaded,
@@ -272,7 +282,7 @@ def load_plan(out: Path) -> Plan:
     fault = planfile.fault_from(canary["fault"])
     return Plan(
         campaign=load_campaign(folder.path / "campaign.yaml"),
-        choices=Choices(**{f.name: head["choices"][f.name] for f in fields(Choices)}),
+        choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
         seed=head["seed"],
         reading=head["reading"],
         experiments=planfile.read_all(folder.path),

@@ -27,6 +27,7 @@ from mutator.errors import MutatorError
 from mutator.golden import golden_key
 from mutator.jsonio import read_json
 from mutator.locks import owned
+from mutator.shards import Shard
 
 SCHEMA = "run/1"
 HEAD = "run.json"
@@ -71,8 +72,17 @@ class RunFolder:
 
     @property
     def planned(self) -> int:
-        """Number of planned experiments."""
-        return int(self.head["experiments"])
+        """Number of experiments planned for this folder: of its shard, or all."""
+        shard = self.shard
+        if shard is None:
+            return int(self.head["experiments"])
+        return sum(count for i, (_, _, count) in enumerate(self.head["chunks"]) if shard.has(i))
+
+    @property
+    def shard(self) -> Shard | None:
+        """The share of the plan that is run here; None: all of it."""
+        text = self.head["choices"].get("shard")  # runs of before there were shards do not say
+        return Shard.parse(text) if text else None
 
     @property
     def limits(self) -> Limits:

@@ -1,4 +1,4 @@
-"""`plan`, `run`, `report` and `clean`: campaigns and their run folders."""
+"""`plan`, `run`, `merge`, `report` and `clean`: campaigns and their run folders."""
 
 import shlex
 import sys
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Exclude, Json, Limit, Only, OutRun, Place, Reading, Seed, with_place
+from mutator.cli.options import Exclude, Json, Limit, Only, OutRun, Place, Reading, Seed, ShardOf, with_place
 from mutator.cli.progress import duration
 from mutator.errors import MutatorError
 
@@ -26,6 +26,7 @@ def register(app: typer.Typer) -> None:
     """Add the verbs to the command line."""
     app.command("plan", epilog=PLAN_EXAMPLES)(plan)
     app.command("run", epilog=RUN_EXAMPLES)(run)
+    app.command("merge", epilog=MERGE_EXAMPLES)(merge)
     app.command("report", epilog=REPORT_EXAMPLES)(report)
     app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
@@ -98,6 +99,7 @@ RUN_EXAMPLES = """\b
 Examples:
   mutator run quickstart --out runs/first -n 2
   mutator run my_campaign.yaml --out runs/mine --limit 20
+  mutator run quickstart --out runs/part1 --shard 1/3
   mutator run quickstart --out runs/s1 --only 'scenario == "S1" and method == "guided"'
 
 Interrupted or killed, the same command goes on where it stopped.
@@ -116,6 +118,7 @@ def run(
     limit: Limit = None,
     seed: Seed = None,
     reading: Reading = None,
+    shard: ShardOf = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -127,7 +130,7 @@ def run(
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     try:
         with campaign_progress(terminal) as notify:
             summary = campaign_run.run(
@@ -185,6 +188,34 @@ def show_counts(terminal: Terminal, run: Path) -> None:
     terminal.table(heads, lines, right=range(1, len(heads)), total=True)
     endings = ", ".join(f"{name} {n}" for name, n in tables.outcome_counts(rows).items())
     terminal.say(f"outcomes: {endings}")
+
+
+MERGE_EXAMPLES = """\b
+Examples:
+  mutator merge runs/part1 runs/part2 runs/part3 --out runs/whole
+"""
+
+
+def merge(
+    shards: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The run folder of each shard.")],
+    out: OutRun,
+    as_json: Json = False,
+) -> None:
+    """Merge the shards of a plan into one run folder.
+
+    It is the one that a single machine would have made: the same results, byte for byte.
+    """
+    from mutator import merge as merging
+    from mutator.runfolder import RunFolder
+
+    terminal = Terminal(as_json)
+    with terminal.wait("merging"):
+        results = merging.merge(shards, out)
+    planned = RunFolder.open(out).planned
+    if as_json:
+        terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
+    terminal.say(f"{planned} experiments of {len(shards)} shards: {short_path(results)}")
+    terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
 
 
 REPORT_EXAMPLES = """\b

@@ -38,6 +38,10 @@ Exclude = Annotated[
     str | None, typer.Option(metavar="EXPR", help="Leave out experiments for which this holds.")
 ]
 Limit = Annotated[int | None, typer.Option(min=1, help="At most so many experiments, spread over the plan.")]
+ShardOf = Annotated[
+    str | None,
+    typer.Option("--shard", metavar="K/N", help="Run the K-th of N shares of the plan; see `merge`."),
+]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 
 

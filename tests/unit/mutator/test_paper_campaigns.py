@@ -122,7 +122,7 @@ def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) ->
 
 
 def test_the_reference_campaign_takes_all_of_five_types(library: Workspace) -> None:
-    """On the reference plant: every value of the five fault types, as coded, in all scenarios and contexts."""
+    """On the reference plant: every value of five fault types, as coded, in all scenarios and contexts."""
     plan = make_plan(library, "paper_reference")
     wanted = ("ghost_vehicle", "jamming", "steer", "path_model", "camera_unavailable")
     assert kinds(plan, Method.GUIDED) == {kind: n for kind, n in INJECTED.items() if kind[1] in wanted}

@@ -1,0 +1,30 @@
+"""Shards: a plan's chunks dealt out to several machines, which need not know of each other."""
+
+import re
+from dataclasses import dataclass
+
+from mutator.errors import MutatorError
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """Share `number` (from 1) of `of`: every `of`-th chunk, so that each share has some of everything."""
+
+    number: int
+    of: int
+
+    @classmethod
+    def parse(cls, text: str) -> "Shard":
+        """`k/n`, as on the command line; MutatorError for anything else."""
+        found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
+        if not found or int(found[1]) > int(found[2]):
+            raise MutatorError(
+                f"shard '{text}'",
+                expected="k/n, the k-th of n shares, such as 1/3",
+                remedy="correct --shard",
+            )
+        return cls(int(found[1]), int(found[2]))
+
+    def has(self, chunk: int) -> bool:
+        """Whether the chunk of this index (from 0) is of this share."""
+        return chunk % self.of == self.number - 1

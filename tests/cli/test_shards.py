@@ -1,0 +1,24 @@
+"""`run --shard` and `merge` on the command line."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+
+def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
+    """A share says how much of it is done; `merge` says what it made, and refuses to make it twice."""
+    ran = cli("run", "small", "--out", "part", "--shard", "1/2", "--limit", 4)
+    assert ran.code == 0, ran.err
+    assert "2 of 2 experiments done" in ran.err + ran.out
+    missing = cli("merge", "part", "--out", "whole")
+    assert missing.code == 2
+    assert "no folder of shard 2/2" in missing.err
+    assert cli("run", "small", "--out", "rest", "--shard", "2/2", "--limit", 4).code == 0
+    merged = cli("merge", "part", "rest", "--out", "whole", "--json")
+    assert merged.code == 0, merged.err
+    assert merged.json == {"run": "whole", "shards": 2, "experiments": 4}
+    again = cli("merge", "part", "rest", "--out", "whole")
+    assert again.code == 2
+    assert "holds a run" in again.err

@@ -1,0 +1,161 @@
+"""Shards run apart and merged are the run of one machine."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator import campaign_run
+from mutator.errors import CheckFailed, MutatorError
+from mutator.merge import merge
+from mutator.plan import Choices, make_plan
+from mutator.records import read_records
+from mutator.runfolder import RunFolder
+from mutator.workspace import Workspace
+
+Runs = dict[str, Path]
+DERIVED = ("results.csv", "results.parquet", "plan.csv", "plan/experiments.jsonl")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Runs:
+    """The small campaign whole (`whole`), and as two shards (`1/2`, `2/2`) in folders of their own."""
+    folder = tmp_path_factory.mktemp("shards")
+    toy = copy_toycar(folder)
+    made = {"whole": folder / "whole", "1/2": folder / "one", "2/2": folder / "two"}
+    for shard, out in made.items():
+        choices = Choices(shard=None if shard == "whole" else shard)
+        summary = campaign_run.run(toy, "small", out, choices=choices)
+        assert summary.exit_code == 0
+        assert summary.done == summary.planned == RunFolder.open(out).planned
+    return made
+
+
+@pytest.fixture
+def copies(runs: Runs, tmp_path: Path) -> Runs:
+    """Copies of them that a test may break."""
+    return {name: Path(shutil.copytree(path, tmp_path / path.name)) for name, path in runs.items()}
+
+
+def change_head(run: Path, **values: object) -> None:
+    head = json.loads((run / "run.json").read_text())
+    (run / "run.json").write_text(json.dumps(head | values))
+
+
+def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
+    """Results, plan and patches are those of the single run, byte for byte, in whatever order shards come."""
+    merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
+    for name in DERIVED:
+        assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
+    patches = {p.name: p.read_bytes() for p in (tmp_path / "out" / "patches").rglob("*.patch")}
+    assert patches == {p.name: p.read_bytes() for p in (runs["whole"] / "patches").rglob("*.patch")}
+    heads = [json.loads((run / "run.json").read_text()) for run in (tmp_path / "out", runs["whole"])]
+    assert heads[0] == heads[1]
+
+
+def test_shards_are_disjoint_and_all(runs: Runs) -> None:
+    """No experiment is run by two shards, and each by one; their plan digest is that of the whole."""
+    one, two, whole = (set(read_records(runs[name])) for name in ("1/2", "2/2", "whole"))
+    assert not one & two
+    assert one | two == whole
+    assert len({RunFolder.open(path).head["plan"] for path in runs.values()}) == 1
+
+
+def test_a_shard_goes_on_as_what_it_was(copies: Runs, toy: Workspace) -> None:
+    """The shard need not be said again, and another one is refused in its folder."""
+    summary = campaign_run.run(toy, "small", copies["1/2"])
+    assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
+    with pytest.raises(MutatorError, match="shard 2/2"):
+        campaign_run.run(toy, "small", copies["1/2"], choices=Choices(shard="2/2"))
+
+
+def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> None:
+    """A merged folder is complete: running its campaign there again finds nothing to do."""
+    merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
+    summary = campaign_run.run(toy, "small", tmp_path / "out")
+    assert (summary.exit_code, summary.ran, summary.done) == (0, 0, 12)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (("1/2",), "no folder of shard 2/2"),
+        (("1/2", "1/2"), "shard 1/2 a second time"),
+        (("1/2", "whole"), "a whole run, no shard"),
+    ],
+)
+def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str) -> None:
+    """A shard that is missing or given twice, and a whole run, are refused, and nothing is made."""
+    with pytest.raises(MutatorError, match=told):
+        merge([runs[name] for name in given], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_shards_of_something_else_are_told(copies: Runs, tmp_path: Path) -> None:
+    """Another plan, other sources or another number of shards is refused, with the folder's name."""
+    two = copies["2/2"]
+    head = json.loads((two / "run.json").read_text())
+    for change, told in (
+        ({"plan": "0" * 64}, "another plan"),
+        ({"sources": head["sources"] | {"target": "0" * 64}}, "another source"),
+        ({"choices": head["choices"] | {"shard": "2/3"}}, "shard 2/3"),
+    ):
+        change_head(two, **head | change)
+        with pytest.raises(MutatorError, match=told) as caught:
+            merge([copies["1/2"], two], tmp_path / "out")
+        assert str(two) in str(caught.value)
+
+
+def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path) -> None:
+    """A shard that lacks a record, or holds one of another shard, is refused with what is wrong."""
+    one, two = copies["1/2"], copies["2/2"]
+    path = next((one / "records").iterdir())
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-1]))
+    with pytest.raises(MutatorError, match=f"unfinished: {len(lines) - 2} of {len(lines) - 1}"):
+        merge([one, two], tmp_path / "out")
+    path.write_bytes(b"".join(lines))
+    shutil.copy(path, two / "records" / "0009-main.jsonl")
+    with pytest.raises(MutatorError, match="not of this shard"):
+        merge([one, two], tmp_path / "out")
+
+
+def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path) -> None:
+    """Shards whose fault-free runs differ are not put together."""
+    path = copies["2/2"] / "checks.json"
+    checks = json.loads(path.read_text())
+    path.write_text(json.dumps(checks | {"goldens": {"A": "0" * 64}}))
+    with pytest.raises(CheckFailed, match="golden run A"):
+        merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
+
+
+def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> None:
+    """The folder of another run is left as it is."""
+    before = (runs["whole"] / "results.csv").read_bytes()
+    with pytest.raises(MutatorError, match="holds a run"):
+        merge([runs["1/2"], runs["2/2"]], runs["whole"])
+    assert (runs["whole"] / "results.csv").read_bytes() == before
+
+
+def test_a_merge_that_fails_leaves_nothing(
+    runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """When results cannot be built the folder is empty again, and the same command can be given again."""
+    with monkeypatch.context() as patch, pytest.raises(RuntimeError):
+        patch.setattr("mutator.results.build", fail)
+        merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+    assert merge([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()
+
+
+def fail(run: Path) -> Path:
+    raise RuntimeError
+
+
+@pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/7"])
+def test_a_shard_that_cannot_be(toy: Workspace, shard: str) -> None:
+    """A share that is none, or more shares than chunks, is refused before anything runs."""
+    with pytest.raises(MutatorError, match=f"shard '?{shard}"):
+        make_plan(toy, "small", shard=shard)
