@@ -1,0 +1,217 @@
+"""Guided against random triggers: stratified by fault type, on matched pairs, and resampled by fault.
+
+A run is nested in its fault (the same value at the same location is tried in each context and scenario), so
+plain tests take runs for more independent than they are; `resampled` draws whole faults anew instead.
+"""
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from mutator.statistics.share import CONFIDENCE
+from mutator.statistics.tally import Tally
+
+Whole = Literal["activated", "injected"]
+WHOLES: tuple[Whole, ...] = ("activated", "injected")
+GUIDED, RANDOM = "guided", "random"
+RESAMPLES = 9999
+_SEED = 1  # of the resampling: the same results give the same interval
+_PAIR = ["fault_id", "scenario", "row", "seed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stratum:
+    """One fault type: hazards and the faults they are counted of, by method."""
+
+    kind: str
+    guided_hazards: int
+    guided: int
+    random_hazards: int
+    random: int
+
+    @property
+    def table(self) -> list[list[int]]:
+        """[hazard, none] of guided, then of random."""
+        return [
+            [self.guided_hazards, self.guided - self.guided_hazards],
+            [self.random_hazards, self.random - self.random_hazards],
+        ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pooled:
+    """Mantel-Haenszel over fault types. Above 1: hazards are likelier when guided; NaN: not defined.
+
+    `p` tests that the common odds ratio is 1, `p_equal` that it is the same in all types.
+    """
+
+    odds_ratio: float
+    low: float
+    high: float
+    risk_ratio: float
+    p: float
+    p_equal: float
+    strata: int  # those with runs of both methods
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Matched:
+    """Pairs of a guided and a random run of one fault, scenario and context row, and the exact McNemar p."""
+
+    both: int
+    guided_only: int
+    random_only: int
+    neither: int
+    p: float
+
+    @property
+    def pairs(self) -> int:
+        return self.both + self.guided_only + self.random_only + self.neither
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """Hazard rate when guided less that when random, with its bootstrap interval over `clusters` faults."""
+
+    difference: float
+    low: float
+    high: float
+    clusters: int
+
+
+def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Stratum, ...]:
+    """The fault types that have faults of both methods, from counts by (method, fault type)."""
+    made = []
+    for kind in dict.fromkeys(kind for _, kind in counts):
+        guided, random = counts.get((GUIDED, kind)), counts.get((RANDOM, kind))
+        if guided and random and getattr(guided, whole) and getattr(random, whole):
+            made.append(
+                Stratum(
+                    kind=kind,
+                    guided_hazards=guided.hazards,
+                    guided=getattr(guided, whole),
+                    random_hazards=random.hazards,
+                    random=getattr(random, whole),
+                )
+            )
+    return tuple(made)
+
+
+def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
+    """The odds of a hazard, guided against random, held constant over fault types (statsmodels)."""
+    from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
+
+    telling = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
+    if not telling:  # all or none were hazards in each type: no odds to compare
+        nan = math.nan
+        return Pooled(
+            odds_ratio=nan, low=nan, high=nan, risk_ratio=nan, p=nan, p_equal=nan, strata=len(parts)
+        )
+    table = StratifiedTable([np.array(stratum.table) for stratum in telling])
+    with np.errstate(all="ignore"):  # an odds ratio of 0 or infinity has no finite interval
+        low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE)
+        return Pooled(
+            odds_ratio=float(table.oddsratio_pooled),
+            low=float(low),
+            high=float(high),
+            risk_ratio=float(table.riskratio_pooled),
+            p=float(table.test_null_odds(correction=False).pvalue),
+            p_equal=float(table.test_equal_odds().pvalue) if len(telling) > 1 else math.nan,
+            strata=len(parts),
+        )
+
+
+def fisher(stratum: Stratum) -> float:
+    """p of Fisher's exact test of one fault type (scipy)."""
+    from scipy.stats import fisher_exact  # type: ignore[import-untyped]
+
+    return float(fisher_exact(stratum.table).pvalue)
+
+
+def holm(p_values: Sequence[float]) -> tuple[float, ...]:
+    """The p-values of several tests, adjusted by Holm's method (statsmodels)."""
+    from statsmodels.stats.multitest import multipletests  # type: ignore[import-untyped]
+
+    return tuple(map(float, multipletests(p_values, method="holm")[1])) if p_values else ()
+
+
+def pairs(frame: pd.DataFrame) -> pd.DataFrame:
+    """Each guided run with its random partner: same fault, scenario, context row and seed.
+
+    Columns end in `_guided` and `_random`; runs without a partner (unfinished or failed) are left out.
+    """
+    columns = [*_PAIR, "kind", "is_activated", "is_hazard"]
+    guided, random = (frame.loc[frame["method"] == how, columns] for how in (GUIDED, RANDOM))
+    return guided.merge(
+        random.drop(columns="kind"), on=_PAIR, suffixes=("_guided", "_random"), validate="one_to_one"
+    )
+
+
+def mcnemar(paired: pd.DataFrame) -> Matched:
+    """Whether a hazard came in the guided run, the random one, both or neither (statsmodels, exact)."""
+    from statsmodels.stats.contingency_tables import mcnemar as exact_mcnemar
+
+    guided, random = paired["is_hazard_guided"], paired["is_hazard_random"]
+    both, neither = int((guided & random).sum()), int((~guided & ~random).sum())
+    guided_only, random_only = int((guided & ~random).sum()), int((~guided & random).sum())
+    test = exact_mcnemar([[both, guided_only], [random_only, neither]], exact=True)
+    return Matched(
+        both=both,
+        guided_only=guided_only,
+        random_only=random_only,
+        neither=neither,
+        p=min(1.0, float(test.pvalue)),
+    )
+
+
+def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
+    """The difference of hazard rates, guided less random; the interval is the percentile bootstrap (scipy)
+    over faults, that is over (location, value), with all their runs in all contexts and scenarios."""
+    from scipy.stats import DegenerateDataWarning, bootstrap
+
+    counted = frame[frame["is_activated"]] if whole == "activated" else frame
+    data = _sums(counted)
+    seen = float(_rate_difference(*data))
+    clusters = len(data[0])
+    if clusters < 2 or math.isnan(seen):
+        return Difference(difference=seen, low=math.nan, high=math.nan, clusters=clusters)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DegenerateDataWarning)  # too few runs of a method: NaN says it
+        interval = bootstrap(
+            data,
+            _rate_difference,
+            paired=True,
+            vectorized=True,
+            n_resamples=RESAMPLES,
+            batch=500,
+            confidence_level=CONFIDENCE,
+            method="percentile",
+            rng=np.random.default_rng(_SEED),
+        ).confidence_interval
+    return Difference(difference=seen, low=float(interval.low), high=float(interval.high), clusters=clusters)
+
+
+def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
+    """For each fault: hazards when guided, when random, runs when guided, when random."""
+    faults = sorted(frame["fault_id"].unique())
+    guided, random = frame["method"] == GUIDED, frame["method"] == RANDOM
+    hazard = frame["is_hazard"]
+    a, b, c, d = (
+        frame.loc[rows, "fault_id"].value_counts().reindex(faults, fill_value=0).to_numpy()
+        for rows in (guided & hazard, random & hazard, guided, random)
+    )
+    return a, b, c, d
+
+
+def _rate_difference(
+    guided_hazards: Any, random_hazards: Any, guided: Any, random: Any, axis: int = -1
+) -> Any:
+    """Hazards by runs of each method, summed over faults along `axis`; NaN where a method has no run."""
+    totals = [np.sum(x, axis=axis) for x in (guided_hazards, guided, random_hazards, random)]
+    with np.errstate(invalid="ignore"):
+        return totals[0] / totals[1] - totals[2] / totals[3]

@@ -1,0 +1,98 @@
+"""The comparison of guided with random triggers as tables."""
+
+import pandas as pd
+
+from mutator.statistics import compare
+from mutator.statistics.compare import WHOLES, Whole
+from mutator.statistics.paper import Paper
+from mutator.statistics.share import share
+from mutator.statistics.sheet import Cell, Sheet
+from mutator.statistics.tally import by_kind
+
+
+def overall_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
+    """Rates, stratified odds ratio and resampled difference, per activated and per injected fault."""
+    sources = ({"paper": paper.coverage} if paper else {}) | {"here": by_kind(frame)}
+    lines: list[tuple[Cell, ...]] = []
+    for whole in WHOLES:
+        for source, counts in sources.items():
+            parts = compare.strata(counts, whole)
+            pooled = compare.mantel_haenszel(parts)
+            rates = (
+                share(sum(s.guided_hazards for s in parts), sum(s.guided for s in parts)),
+                share(sum(s.random_hazards for s in parts), sum(s.random for s in parts)),
+            )
+            odds = (pooled.strata, pooled.odds_ratio, pooled.low, pooled.high, pooled.p, pooled.p_equal)
+            lines.append((whole, source, *rates, *odds, *_resampled(frame, whole, source)))
+    return Sheet(
+        name="guided_against_random",
+        title="Guided against random: hazards",
+        note="Fault types with faults of both methods. Odds ratio: Mantel-Haenszel over fault types, above 1 "
+        "if guided faults are the more hazardous ones; p: that it is 1; p equal: that it is the same in all "
+        "types. Difference of rates (of 1): guided less random, its interval resampled by fault (location "
+        "and value), for which single runs are needed.",
+        heads=(
+            *("hazards of", "from", "guided", "random", "fault types"),
+            *("odds ratio", "odds ratio, low", "odds ratio, high", "p", "p equal"),
+            *("difference", "difference, low", "difference, high", "faults"),
+        ),
+        lines=tuple(lines),
+    )
+
+
+def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
+    if source == "paper":
+        return (None,) * 4
+    found = compare.resampled(frame, whole)
+    return (found.difference, found.low, found.high, found.clusters)
+
+
+def kinds_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
+    """Fisher's exact test of each fault type, adjusted over all of them."""
+    sources = ({"paper": paper.coverage} if paper else {}) | {"here": by_kind(frame)}
+    lines: list[tuple[Cell, ...]] = []
+    for whole in WHOLES:
+        for source, counts in sources.items():
+            parts = compare.strata(counts, whole)
+            p_values = [compare.fisher(stratum) for stratum in parts]
+            for stratum, p, adjusted in zip(parts, p_values, compare.holm(p_values), strict=True):
+                guided = share(stratum.guided_hazards, stratum.guided)
+                random = share(stratum.random_hazards, stratum.random)
+                lines.append((whole, source, stratum.kind, guided, random, p, adjusted))
+    return Sheet(
+        name="guided_against_random_by_fault_type",
+        title="Guided against random by fault type",
+        note="p: Fisher's exact test; p, Holm: adjusted over the fault types of the same source and whole.",
+        heads=("hazards of", "from", "fault type", "guided", "random", "p", "p, Holm"),
+        lines=tuple(lines),
+    )
+
+
+def pairs_sheet(frame: pd.DataFrame) -> Sheet:
+    """Exact McNemar on matched pairs, of all and of each fault type, adjusted over the types."""
+    paired = compare.pairs(frame)
+    lines: list[tuple[Cell, ...]] = []
+    for which, some in (
+        ("all", paired),
+        ("guided one activated", paired[paired["is_activated_guided"]]),
+    ):
+        kinds = {str(kind): compare.mcnemar(group) for kind, group in some.groupby("kind")}
+        adjusted = compare.holm([matched.p for matched in kinds.values()])
+        lines.append((which, "total", *_cells(compare.mcnemar(some)), None))
+        lines += [
+            (which, kind, *_cells(matched), p)
+            for (kind, matched), p in zip(kinds.items(), adjusted, strict=True)
+        ]
+    return Sheet(
+        name="matched_pairs",
+        title="Guided and random runs of the same fault, in pairs",
+        note="A pair has the same fault and value, scenario and context row. Hazards in both, in one or in "
+        "neither; p: McNemar's exact test; p, Holm: adjusted over fault types.",
+        heads=("pairs", "fault type", "N", "both", "guided only", "random only", "neither", "p", "p, Holm"),
+        lines=tuple(lines),
+    )
+
+
+def _cells(matched: compare.Matched) -> tuple[Cell, ...]:
+    counts = (matched.pairs, matched.both, matched.guided_only, matched.random_only, matched.neither)
+    return (*counts, matched.p)

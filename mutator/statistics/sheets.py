@@ -1,0 +1,83 @@
+"""All tables of a run: chosen by what its results can tell, written as CSV and Markdown."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from mutator.errors import MutatorError
+from mutator.golden import golden_key, load_trace
+from mutator.jsonio import write_atomic
+from mutator.runfolder import RunFolder
+from mutator.statistics import compare_tables, paper_tables, time_tables
+from mutator.statistics.compare import GUIDED, RANDOM
+from mutator.statistics.frame import load
+from mutator.statistics.paper import Paper, has_paper, load_paper
+from mutator.statistics.sheet import Sheet
+from mutator.statistics.tally import by_kind, by_scenario
+from mutator.workspace import Workspace
+
+FOLDER = "tables"
+_DRIVER_S = 1.8  # a driver's reaction to a warning that is seen, where no published numbers say another
+
+
+def run_sheets(folder: RunFolder) -> tuple[Sheet, ...]:
+    """The tables of a run whose results.csv is up to date; none before anything usable ran.
+
+    The published numbers come from the library found from here (`Workspace.find`); without one, or for a run of
+    other fault types, ours stand alone. Reaction times need the fault-free runs, which tell the end of a run.
+    """
+    frame = load(folder.path / "results.csv")
+    if frame.empty:
+        return ()
+    try:
+        workspace = Workspace.find()
+    except MutatorError:  # no library here: a report can be written anywhere
+        workspace = None
+    references = workspace.library / "references" if workspace else None
+    paper = load_paper(references) if references and has_paper(references) else None
+    return sheets(frame, paper, _ends(folder, workspace) if workspace else None)
+
+
+def sheets(frame: pd.DataFrame, paper: Paper | None, ends: Mapping[str, float] | None) -> tuple[Sheet, ...]:
+    """The tables of a frame. `ends`: s of simulation at which a run of each scenario ends, if known."""
+    scenarios, kinds = by_scenario(frame), by_kind(frame)
+    methods = sorted({method for method, _ in scenarios})
+    known = paper if paper and paper.coverage.keys() & kinds.keys() else None
+    made = [paper_tables.summary_sheet(method, scenarios, known) for method in methods]
+    made += [paper_tables.coverage_sheet(method, kinds, known) for method in methods]
+    if {GUIDED, RANDOM} <= set(methods):
+        made += [
+            compare_tables.overall_sheet(frame, known),
+            compare_tables.kinds_sheet(frame, known),
+            compare_tables.pairs_sheet(frame),
+        ]
+    made.append(time_tables.propagation_sheet(frame))
+    if ends is not None:
+        driver_s = paper.driver_reaction_s if paper else _DRIVER_S
+        made.append(time_tables.reaction_sheet(frame, ends, driver_s))
+    made += [time_tables.alerts_sheet(frame), time_tables.orders_sheet(frame)]
+    return tuple(sheet for sheet in made if sheet.lines)
+
+
+def write(made: Sequence[Sheet], out: Path) -> None:
+    """Write each table into `out`/tables as <name>.csv and <name>.md."""
+    folder = out / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    for sheet in made:
+        write_atomic(folder / f"{sheet.name}.csv", sheet.csv().encode())
+        write_atomic(folder / f"{sheet.name}.md", sheet.markdown().encode())
+
+
+def _ends(folder: RunFolder, workspace: Workspace) -> dict[str, float] | None:
+    """When the fault-free runs of each scenario end; None when they cannot be read (any more)."""
+    ends: dict[str, float] = {}
+    try:
+        manifest = workspace.manifest(folder.head["target"])
+        for scenario, changes in folder.head["goldens"]:
+            trace = load_trace(manifest, folder.path / "golden" / golden_key(scenario, changes), [])
+            end = float(trace[manifest.time_channel][-1])
+            ends[scenario] = max(end, ends.get(scenario, end))
+    except (MutatorError, KeyError):
+        return None
+    return ends

@@ -1,0 +1,98 @@
+"""Times, alerts and the order of hazards as tables."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple
+
+import pandas as pd
+
+from mutator.statistics import times
+from mutator.statistics.sheet import Cell, Sheet
+
+
+def propagation_sheet(frame: pd.DataFrame) -> Sheet:
+    """How fast faults get through, by method and scenario."""
+    lines: list[tuple[Cell, ...]] = []
+    for method, scenario, group in _groups(frame):
+        for step, spread in times.propagation(group).items():
+            lines.append((method, scenario, step, *astuple(spread)))
+    return Sheet(
+        name="propagation",
+        title="Propagation times by scenario",
+        note="s from one event to the other, in the N runs that had both. Manifest: first difference of an "
+        "actuator output from the fault-free run. Alert to hazard: where the alert came first; what did not "
+        "happen before the end of the run is left out here, see alert to hazard, censored.",
+        heads=(
+            "method",
+            "scenario",
+            "time",
+            "N",
+            "mean, s",
+            "lower quartile, s",
+            "median, s",
+            "upper quartile, s",
+        ),
+        lines=tuple(lines),
+    )
+
+
+def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Sheet:
+    """Kaplan-Meier of alert to hazard, by method and scenario."""
+    lines: list[tuple[Cell, ...]] = []
+    for method, scenario, group in _groups(frame):
+        found = times.reaction(group, ends, driver_s)
+        median: tuple[Cell, ...] = (found.median, found.median_low, found.median_high)
+        counts = (found.at_risk, found.events, found.at_risk - found.events, found.too_late)
+        lines.append((method, scenario, *counts, *median, found.survival, found.in_time))
+    late = f"{driver_s:g} s"
+    return Sheet(
+        name="alert_to_hazard",
+        title="From alert to hazard, censored",
+        note="Runs whose first alert came before any hazard; without a hazard they are censored at their end. "
+        "Median: Kaplan-Meier with its 95 % interval, `-` where not reached in the time observed. The last "
+        f"columns: share of alerts that no hazard follows within {late}, the driver's reaction time "
+        f"(Kaplan-Meier), and of hazards after an alert those that came more than {late} after it. Alerts "
+        "that came with the first hazard or after it are counted apart.",
+        heads=(
+            *("method", "scenario", "alerts first", "then hazard", "censored", "alert not before hazard"),
+            *("median, s", "median, low, s", "median, high, s"),
+            *(f"no hazard within {late}", f"hazards later than {late}"),
+        ),
+        lines=tuple(lines),
+    )
+
+
+def alerts_sheet(frame: pd.DataFrame) -> Sheet:
+    """Which alert came first before which hazard."""
+    lines: list[tuple[Cell, ...]] = []
+    for method, group in frame.groupby("method"):
+        counts = times.first_alert_before(group)
+        lines += [(str(method), hazard, alert, n) for (hazard, alert), n in counts.items()]
+    return Sheet(
+        name="alerts_before_hazards",
+        title="Alerts before hazards",
+        note="How often a hazard came, by the run's first alert if that came before the hazard.",
+        heads=("method", "hazard", "first alert before it", "N"),
+        lines=tuple(lines),
+    )
+
+
+def orders_sheet(frame: pd.DataFrame) -> Sheet:
+    """Which hazards came in one run, in order."""
+    lines: list[tuple[Cell, ...]] = []
+    for (method, module), group in frame.groupby(["method", "module"]):
+        lines += [(str(method), str(module), order, n) for order, n in times.hazard_orders(group).items()]
+    return Sheet(
+        name="hazard_orders",
+        title="Hazards that came together",
+        note="Runs with at least one hazard, by their hazards in the order in which they first came.",
+        heads=("method", "module", "hazards", "N"),
+        lines=tuple(lines),
+    )
+
+
+def _groups(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """By method and scenario, after each method's scenarios all of them."""
+    for method, of_method in frame.groupby("method"):
+        for scenario, group in of_method.groupby("scenario"):
+            yield str(method), str(scenario), group
+        yield str(method), "total", of_method

@@ -1,0 +1,151 @@
+"""How long faults take: from activation to effects, from the first alert to the first hazard.
+
+The alert-to-hazard time is censored: where no hazard followed an alert, one might have come after the end of
+the run. Kaplan-Meier uses these runs up to their end; a mean of the others alone would be too short.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import pandas as pd
+
+from mutator.statistics.frame import hazard_names
+from mutator.statistics.share import CONFIDENCE, Share, share
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """Of `n` times in s: mean and quartiles (NaN of none)."""
+
+    n: int
+    mean: float
+    lower: float
+    median: float
+    upper: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reaction:
+    """What is left of the drive after the first alert. Times in s; NaN: not reached or not defined.
+
+    `at_risk` runs had an alert before any hazard; a hazard then came in `events` of them, the others are
+    censored at their end. `survival` is the Kaplan-Meier share of alerts that no hazard follows within the
+    driver's reaction time; `in_time` the share of hazards after an alert that came later than that.
+    """
+
+    at_risk: int
+    events: int
+    median: float
+    median_low: float
+    median_high: float
+    survival: float
+    in_time: Share
+    too_late: int  # alerts that came after the first hazard, in no other number
+
+
+def spread(times: pd.Series) -> Spread:
+    """Mean and quartiles of the times that there are."""
+    known = times.dropna()
+    if known.empty:
+        return Spread(n=0, mean=math.nan, lower=math.nan, median=math.nan, upper=math.nan)
+    lower, median, upper = (float(known.quantile(q)) for q in (0.25, 0.5, 0.75))
+    return Spread(n=len(known), mean=float(known.mean()), lower=lower, median=median, upper=upper)
+
+
+def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
+    """Times from activation to the first difference of an actuator, alert and hazard; and from the first
+    alert to the first hazard where the alert came first."""
+    start = frame["t_activation"]
+    reaction = frame["t_hazard"] - frame["t_alert"]
+    return {
+        "activation to manifest": spread(frame["t_manifest"] - start),
+        "activation to alert": spread(frame["t_alert"] - start),
+        "activation to hazard": spread(frame["t_hazard"] - start),
+        "alert to hazard": spread(reaction[_warned(frame)]),
+    }
+
+
+def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Reaction:
+    """Kaplan-Meier (statsmodels) over the runs with an alert before any hazard.
+
+    `ends`: when a run of each scenario ends, s of simulation. Runs that crashed or ran out of time are left
+    out: nobody knows when they would have ended.
+    """
+    from statsmodels.duration.survfunc import SurvfuncRight  # type: ignore[import-untyped]
+
+    alerted = frame[frame["is_alert"] & (frame["status"] == "ok")]
+    first = alerted[~alerted["is_hazard"] | _warned(alerted)]
+    status = first["is_hazard"].astype(int)
+    times = first["t_hazard"].fillna(first["scenario"].map(ends)) - first["t_alert"]
+    # float noise apart, a hazard just at the driver's time is not later than it
+    late = times.round(6) > driver_s
+    events = int(status.sum())
+    found = {
+        "at_risk": len(first),
+        "events": events,
+        "too_late": len(alerted) - len(first),
+    }
+    in_time = share(int((late & first["is_hazard"]).sum()), events)
+    if not events:
+        nan = math.nan
+        survival = 1.0 if len(first) else nan
+        return Reaction(
+            **found, median=nan, median_low=nan, median_high=nan, survival=survival, in_time=in_time
+        )
+    curve = SurvfuncRight(times.to_numpy().round(6), status.to_numpy())
+    reached = curve.surv_prob[curve.surv_times <= driver_s]
+    low, high = _median_interval(curve)
+    return Reaction(
+        **found,
+        median=float(curve.quantile(0.5)),
+        median_low=low,
+        median_high=high,
+        survival=float(reached[-1]) if len(reached) else 1.0,
+        in_time=in_time,
+    )
+
+
+def _median_interval(curve: object) -> tuple[float, float]:
+    """The interval of the median time (log-log transformed); infinite or NaN: not reached."""
+    import numpy as np
+
+    with np.errstate(all="ignore"):  # the curve's last point may be 0, of which there is no log
+        low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)  # type: ignore[attr-defined]
+    return float(low), float(high)
+
+
+def first_alert_before(frame: pd.DataFrame) -> dict[tuple[str, str], int]:
+    """By (hazard, alert): how often a hazard came, and which alert was the run's first, if it came before;
+    `none` if there was none by then."""
+    counts: dict[tuple[str, str], int] = {}
+    for hazard in hazard_names(frame):
+        came = frame[frame[f"t_{hazard.lower()}"].notna()]
+        before = came["t_alert"] < came[f"t_{hazard.lower()}"]
+        alerts = came["alerts"].str.split(";").str[0].where(before, "none")
+        for alert, count in sorted(alerts.value_counts().items(), key=lambda item: str(item[0])):
+            counts[hazard, str(alert)] = int(count)
+    return counts
+
+
+def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
+    """How many runs had which hazards, in the order in which they came: `H3`, `H3 then H1`, `H1 with H3`."""
+    times = {hazard: frame[f"t_{hazard.lower()}"] for hazard in hazard_names(frame)}
+    orders = [
+        _order({hazard: float(column.iloc[i]) for hazard, column in times.items()}) for i in range(len(frame))
+    ]
+    return {str(k): int(v) for k, v in pd.Series(orders).value_counts().sort_index().items() if k}
+
+
+def _order(times: Mapping[str, float]) -> str:
+    came = sorted((t, hazard) for hazard, t in times.items() if not math.isnan(t))
+    text = came[0][1] if came else ""
+    for (before, _), (t, hazard) in pairwise(came):
+        text += f" {'with' if t == before else 'then'} {hazard}"
+    return text
+
+
+def _warned(frame: pd.DataFrame) -> pd.Series:
+    """Where an alert came before the first hazard; one that came with it warns of nothing."""
+    return frame["t_alert"] < frame["t_hazard"]

@@ -1,0 +1,133 @@
+"""Guided against random triggers."""
+
+import math
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from mutator.statistics import compare
+from mutator.statistics.compare import Matched, Stratum
+from mutator.statistics.compare_tables import kinds_sheet, overall_sheet, pairs_sheet
+from mutator.statistics.paper import Paper, load_paper
+
+from .results_frame import results
+
+REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
+RAN = {"t_activation": 7.0}
+HIT = RAN | {"h3": 1, "t_h3": 9.0}
+
+
+@pytest.fixture(scope="module")
+def paper() -> Paper:
+    return load_paper(REFERENCES)
+
+
+def pair(fault: str, guided: dict[str, object], random: dict[str, object]) -> list[dict[str, object]]:
+    """A guided run of a fault and its random partner."""
+    same = {"fault_id": fault, "trigger": "C1"}
+    return [same | guided, same | random | {"method": "random", "trigger": "random/C1"}]
+
+
+@pytest.fixture(scope="module")
+def frame() -> pd.DataFrame:
+    """Five pairs: both hit; guided only; random only (c, and d where the guided one slept); neither."""
+    made = [
+        *pair("a", HIT, HIT),
+        *pair("b", HIT, RAN),
+        *pair("c", RAN, HIT),
+        *pair("d", {}, HIT),
+        *pair("e", RAN, RAN),
+    ]
+    return results(*made, {"fault_id": "f", "trigger": "C1"} | HIT)  # and one that has no partner yet
+
+
+def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
+    return Stratum(
+        kind="k", guided_hazards=guided[0], guided=guided[1], random_hazards=random[0], random=random[1]
+    )
+
+
+def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
+    """Mantel-Haenszel: sum of a*d/n over sum of b*c/n, here (10*15/40 + 4*18/40) / (10*5/40 + 16*2/40)."""
+    pooled = compare.mantel_haenszel([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
+    assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
+    assert pooled.low < 1 < pooled.odds_ratio < pooled.high
+    assert 0.05 < pooled.p < 1
+
+
+def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
+    """Held constant over fault types, guided faults are the more hazardous ones per activated fault only."""
+    activated, injected = (
+        compare.mantel_haenszel(compare.strata(paper.coverage, whole)) for whole in compare.WHOLES
+    )
+    assert activated.strata == injected.strata == 17
+    assert injected.high < 1
+    assert injected.p < 1e-6
+    assert activated.odds_ratio > injected.odds_ratio
+
+
+def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
+    """A type that never is a hazard says nothing of the odds; if all are so, nothing is known."""
+    one = stratum((10, 20), (5, 20))
+    pooled = compare.mantel_haenszel([one, stratum((0, 9), (0, 9))])
+    assert pooled.odds_ratio == pytest.approx(compare.mantel_haenszel([one]).odds_ratio)
+    assert math.isnan(compare.mantel_haenszel([stratum((0, 9), (0, 9))]).odds_ratio)
+
+
+def test_holm_adjusts_as_in_the_textbook() -> None:
+    """The smallest of three is tripled, the next doubled, and none is below one before it."""
+    assert compare.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
+    assert compare.holm([]) == ()
+
+
+def test_pairs_are_of_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
+    """Every guided run meets its random partner by the name of the row; one without is left out."""
+    found = compare.pairs(frame)
+    assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
+    assert compare.mcnemar(found) == Matched(both=1, guided_only=1, random_only=2, neither=1, p=1.0)
+
+
+def test_mcnemar_is_exact() -> None:
+    """Eight discordant pairs, all to one side: twice a half to the eighth."""
+    made = [row for i in range(8) for row in pair(str(i), HIT, RAN)]
+    assert compare.mcnemar(compare.pairs(results(*made))).p == pytest.approx(2 * 0.5**8)
+
+
+def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.DataFrame) -> None:
+    """Both are told, in total and by fault type."""
+    lines = [line[:7] for line in pairs_sheet(frame).lines]
+    assert lines == [
+        ("all", "total", 5, 1, 1, 2, 1),
+        ("all", "radar/chaff", 5, 1, 1, 2, 1),
+        ("guided one activated", "total", 4, 1, 1, 1, 1),
+        ("guided one activated", "radar/chaff", 4, 1, 1, 1, 1),
+    ]
+
+
+def test_resampling_draws_whole_faults() -> None:
+    """Copies of a run in other scenarios add no information: the interval stays that of the faults."""
+    once = [row for i in range(12) for row in pair(str(i), HIT if i < 8 else RAN, HIT if i < 4 else RAN)]
+    often = [row | {"scenario": s} for s in ("S1", "S2", "S3", "S4") for row in once]
+    single, copied = (compare.resampled(results(*rows), "injected") for rows in (once, often))
+    assert single.difference == pytest.approx(4 / 12)
+    assert single == copied
+    assert single.low < 4 / 12 < single.high
+
+
+def test_a_difference_needs_runs_of_both_methods() -> None:
+    """Without random runs there is no difference and no interval."""
+    found = compare.resampled(results(HIT, RAN), "activated")
+    assert math.isnan(found.difference)
+    assert math.isnan(found.low)
+
+
+def test_the_sheets_tell_both_wholes_for_paper_and_here(frame: pd.DataFrame, paper: Paper) -> None:
+    """Per activated and per injected fault, the paper's counts are put to the same tests as ours."""
+    overall, kinds = overall_sheet(frame, paper), kinds_sheet(frame, paper)
+    assert [line[:2] for line in overall.lines] == [
+        (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")
+    ]
+    assert str(overall.lines[0][2]).startswith("35.8 % (1316/3678")
+    assert len(kinds.lines) == 2 * (17 + 1)
+    assert all(line[-1] >= line[-2] for line in kinds.lines)  # type: ignore[operator]

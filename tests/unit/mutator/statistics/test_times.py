@@ -1,0 +1,113 @@
+"""Times from activation on, censored reaction times, alerts before hazards, and hazards in order."""
+
+import math
+from typing import Any
+
+import pytest
+
+from mutator.statistics import times
+from mutator.statistics.time_tables import alerts_sheet, orders_sheet, propagation_sheet, reaction_sheet
+
+from .results_frame import results
+
+ENDS = {"S1": 30.0, "S2": 20.0}
+DRIVER_S = 1.8
+
+
+def run(alert: float | str = "", hazard: float | str = "", **more: Any) -> dict[str, Any]:
+    """A run activated at 5 s, with its first alert and H1 (s)."""
+    return {"t_activation": 5.0, "t_alert": alert, "alerts": "fcw" if alert else "", "t_h1": hazard} | more
+
+
+def test_times_count_from_activation() -> None:
+    """Manifestation, alert and hazard are as late as they came after activation, where they came."""
+    found = times.propagation(results(run(7.0, 9.0, t_manifest=5.5), run(6.0, ""), run("", ""), {}))
+    assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
+    assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
+    assert (found["activation to hazard"].n, found["activation to hazard"].median) == (1, 4.0)
+    assert (found["alert to hazard"].n, found["alert to hazard"].mean) == (1, 2.0)
+
+
+def test_no_reaction_time_without_an_alert_that_came_first() -> None:
+    """An alert with or after the hazard leaves no time to react: not 0, and not negative."""
+    frame = results(run(9.0, 9.0), run(9.5, 9.0), run("", 9.0))
+    assert times.propagation(frame)["alert to hazard"].n == 0
+    found = times.reaction(frame, ENDS, DRIVER_S)
+    assert (found.at_risk, found.events, found.too_late) == (0, 0, 2)
+    assert math.isnan(found.survival)
+
+
+def test_kaplan_meier_of_a_textbook_sample() -> None:
+    """Hazards 1, 2, 2.5 and 4 s after the alert, one censored at 3 s: survival 0.8, 0.6, 0.4, 0.4, 0."""
+    frame = results(
+        *(run(10.0, hazard) for hazard in (11.0, 12.0, 12.5, 14.0)),
+        run(17.0, "", scenario="S2"),
+        run("", 8.0),
+    )
+    found = times.reaction(frame, ENDS, DRIVER_S)
+    assert (found.at_risk, found.events) == (5, 4)
+    assert found.median == 2.5
+    assert found.median_low <= 2.5 <= found.median_high
+    assert found.survival == pytest.approx(0.8)
+    assert (found.in_time.count, found.in_time.of) == (3, 4)
+
+
+def test_the_censored_lengthen_the_median() -> None:
+    """Alerts that no hazard follows push the median out, here beyond what was observed."""
+    few = [run(10.0, 11.0 + i) for i in range(3)]
+    assert times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
+    many = times.reaction(results(*few, *[run(10.0, "")] * 7), ENDS, DRIVER_S)
+    assert math.isnan(many.median)
+    assert many.survival == pytest.approx(0.9)
+
+
+def test_alerts_without_any_hazard_are_no_median() -> None:
+    """Nothing but censored runs: everyone had time, and there is no median."""
+    found = times.reaction(results(run(10.0, "")), ENDS, DRIVER_S)
+    assert (found.survival, found.at_risk, found.events) == (1.0, 1, 0)
+    assert math.isnan(found.median)
+
+
+def test_runs_that_did_not_end_well_are_not_censored_at_the_end_of_others() -> None:
+    """Of a crashed run nobody knows how long it would have been watched."""
+    assert times.reaction(results(run(10.0, "", status="crashed")), ENDS, DRIVER_S).at_risk == 0
+
+
+def test_a_reaction_of_just_the_drivers_time_is_not_longer() -> None:
+    """11.8 - 10.0 is 1.8000000000000007 in floating point: still 1.8 s."""
+    assert times.reaction(results(run(10.0, 11.8)), ENDS, DRIVER_S).in_time.count == 0
+
+
+def test_the_first_alert_before_each_hazard() -> None:
+    """Each hazard of a run counts by itself: an alert between two hazards warned of the second alone."""
+    frame = results(
+        run(8.0, 9.0, alerts="steerSaturated;fcw"),
+        run(9.0, 10.0, alerts="fcw", t_h3=8.0),
+        run("", "", t_h3=8.0),
+    )
+    assert times.first_alert_before(frame) == {
+        ("H1", "fcw"): 1,
+        ("H1", "steerSaturated"): 1,
+        ("H3", "none"): 2,
+    }
+
+
+def test_hazards_in_the_order_in_which_they_came() -> None:
+    """H1 alone, H3 before H1, both at once; runs without hazard are not listed."""
+    frame = results(run("", 9.0), run("", 9.0, t_h3=7.0), run("", 9.0, t_h3=9.0), run())
+    assert times.hazard_orders(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
+
+
+def test_the_sheets_are_by_method_and_scenario() -> None:
+    """Scenarios of a method, then all of them; every line has a cell for each head."""
+    frame = results(run(8.0, 9.0), run(8.0, "", scenario="S2"), run("", 7.0, method="random"))
+    sheets = (
+        propagation_sheet(frame),
+        reaction_sheet(frame, ENDS, DRIVER_S),
+        alerts_sheet(frame),
+        orders_sheet(frame),
+    )
+    assert all(len(line) == len(sheet.heads) for sheet in sheets for line in sheet.lines)
+    groups = [line[:2] for line in sheets[1].lines]
+    assert groups == [("guided", s) for s in ("S1", "S2", "total")] + [("random", s) for s in ("S1", "total")]
+    assert sheets[2].lines == (("guided", "H1", "fcw", 1), ("random", "H1", "none", 1))
