@@ -27,7 +27,7 @@ THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, er
 GROUPS = (
     ("Look around", ("list", "check", "doctor")),
     ("One fault", ("try", "diff", "generate")),
-    ("Campaigns", ("plan", "run", "report", "clean")),
+    ("Campaigns", ("plan", "run", "merge", "report", "clean")),
     ("One experiment", ("show", "rerun")),
 )
 EXAMPLES = """\b
