@@ -1,18 +1,23 @@
 """The report of a run: REPORT.md, and one HTML page that needs nothing but itself, its patches and plots.
 
-Written from results.csv and the run folder alone, so it can be made again at any time, the same each time.
+Written from results.csv and the run folder, so it can be made again at any time, the same each time; the
+published numbers that statistics stand beside come from the library.
 """
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mutator import tables
 from mutator.jsonio import write_atomic
 from mutator.model import Status
 from mutator.runfolder import RunFolder
 from mutator.tables import Count, Row
+
+if TYPE_CHECKING:
+    from mutator.statistics.sheet import Sheet
 
 FOLDER = "report"
 PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
@@ -54,6 +59,7 @@ class Content:
     facts: list[tuple[str, str]]
     outcomes: dict[str, int]
     tables: list[Table]
+    statistics: "tuple[Sheet, ...]"  # written as files of their own, too
     failed: list[Row]  # runs that did not end well, harness errors first
     experiments: list[Line]
 
@@ -61,25 +67,29 @@ class Content:
 def write(run: Path) -> Report:
     """Write the report of a run folder whose results.csv is up to date."""
     from mutator.report_page import markdown, page
+    from mutator.statistics import sheets
 
     folder = RunFolder.open(run)
     rows = tables.read_results(run / "results.csv")
-    content = _content(folder, rows)
     out = run / FOLDER
     out.mkdir(exist_ok=True)
+    statistics = sheets.run_sheets(folder)
+    sheets.write(statistics, out)
+    content = _content(folder, rows, statistics)
     report = Report(markdown=out / "REPORT.md", page=out / "index.html", rows=len(rows))
     write_atomic(report.markdown, markdown(content).encode())
     write_atomic(report.page, page(content).encode())
     return report
 
 
-def _content(folder: RunFolder, rows: Sequence[Row]) -> Content:
+def _content(folder: RunFolder, rows: Sequence[Row], statistics: "tuple[Sheet, ...]") -> Content:
     failed = [r for r in rows if r.status is not Status.OK]
     return Content(
         name=str(folder.head["campaign"]),
         facts=_facts(folder, rows),
         outcomes=tables.outcome_counts(rows),
         tables=_tables(rows),
+        statistics=statistics,
         failed=sorted(
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),

@@ -20,6 +20,7 @@ def markdown(content: "Content") -> str:
     parts = [f"# {content.name}", _outcome_text(content), NOTES.replace("\n", " ")]
     for table in content.tables:
         parts += [f"## {table.title}", markdown_table(table.heads, table.lines)]
+    parts += [sheet.markdown().rstrip() for sheet in content.statistics]
     if content.failed:
         parts += ["## Runs that did not end well", _failed_text(content)]
     parts += [
@@ -108,6 +109,16 @@ code { font-size: .9em; }
 <div class="scroll"><table class="counts">
 <tr>{% for head in table.heads %}<th>{{ head }}</th>{% endfor %}</tr>
 {% for line in table.lines %}
+<tr>{% for cell in line %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}
+</table></div>
+{% endfor %}
+{% for sheet in content.statistics %}
+<h2>{{ sheet.title }}</h2>
+<p>{{ sheet.note }}</p>
+<div class="scroll"><table>
+<tr>{% for head in sheet.heads %}<th>{{ head }}</th>{% endfor %}</tr>
+{% for line in sheet.texts() %}
 <tr>{% for cell in line %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}
 </table></div>

@@ -22,40 +22,41 @@ _DRIVER_S = 1.8  # a driver's reaction to a warning that is seen, where no publi
 
 
 def run_sheets(folder: RunFolder) -> tuple[Sheet, ...]:
-    """The tables of a run whose results.csv is up to date; none before anything usable ran.
+    """The tables of a run whose results.csv is up to date.
 
-    The published numbers come from the library found from here (`Workspace.find`); without one, or for a run of
-    other fault types, ours stand alone. Reaction times need the fault-free runs, which tell the end of a run.
+    None when they would say no more than counts do: neither both methods nor published fault types. The
+    published numbers come from the library found from here (`Workspace.find`); without one ours stand alone.
     """
     frame = load(folder.path / "results.csv")
-    if frame.empty:
-        return ()
     try:
         workspace = Workspace.find()
     except MutatorError:  # no library here: a report can be written anywhere
         workspace = None
     references = workspace.library / "references" if workspace else None
     paper = load_paper(references) if references and has_paper(references) else None
+    if paper and not {kind for _, kind in paper.coverage} & set(frame["kind"]):
+        paper = None
+    if not paper and not {GUIDED, RANDOM} <= set(frame["method"]):
+        return ()
     return sheets(frame, paper, _ends(folder, workspace) if workspace else None)
 
 
 def sheets(frame: pd.DataFrame, paper: Paper | None, ends: Mapping[str, float] | None) -> tuple[Sheet, ...]:
-    """The tables of a frame. `ends`: s of simulation at which a run of each scenario ends, if known."""
+    """The tables of a frame. `ends`: s of simulation at which a run of each scenario ends, if known; without
+    them there is no table of censored times."""
     scenarios, kinds = by_scenario(frame), by_kind(frame)
     methods = sorted({method for method, _ in scenarios})
-    known = paper if paper and paper.coverage.keys() & kinds.keys() else None
-    made = [paper_tables.summary_sheet(method, scenarios, known) for method in methods]
-    made += [paper_tables.coverage_sheet(method, kinds, known) for method in methods]
+    made = [paper_tables.summary_sheet(method, scenarios, paper) for method in methods]
+    made += [paper_tables.coverage_sheet(method, kinds, paper) for method in methods]
     if {GUIDED, RANDOM} <= set(methods):
         made += [
-            compare_tables.overall_sheet(frame, known),
-            compare_tables.kinds_sheet(frame, known),
+            compare_tables.overall_sheet(frame, paper),
+            compare_tables.kinds_sheet(frame, paper),
             compare_tables.pairs_sheet(frame),
         ]
     made.append(time_tables.propagation_sheet(frame))
     if ends is not None:
-        driver_s = paper.driver_reaction_s if paper else _DRIVER_S
-        made.append(time_tables.reaction_sheet(frame, ends, driver_s))
+        made.append(time_tables.reaction_sheet(frame, ends, paper.driver_reaction_s if paper else _DRIVER_S))
     made += [time_tables.alerts_sheet(frame), time_tables.orders_sheet(frame)]
     return tuple(sheet for sheet in made if sheet.lines)
 

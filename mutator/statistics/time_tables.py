@@ -47,7 +47,7 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
     return Sheet(
         name="alert_to_hazard",
         title="From alert to hazard, censored",
-        note="Runs whose first alert came before any hazard; without a hazard they are censored at their end. "
+        note="Runs whose first alert came before any hazard; without a hazard, censored at their end. "
         "Median: Kaplan-Meier with its 95 % interval, `-` where not reached in the time observed. The last "
         f"columns: share of alerts that no hazard follows within {late}, the driver's reaction time "
         f"(Kaplan-Meier), and of hazards after an alert those that came more than {late} after it. Alerts "

@@ -96,7 +96,8 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     failed = text.split("## Runs that did not end well")[1]
     assert failed.index("harness_error") < failed.index("crashed")
     assert "the disk \\| is <gone>" in failed
-    [line] = [line for line in text.splitlines() if line.startswith("| radar/chaff ")]
+    counts = text.split("## By fault type")[1].split("##")[0]
+    [line] = [line for line in counts.splitlines() if line.startswith("| radar/chaff ")]
     assert line == "| radar/chaff | 2 | 2 | 2 | 1 | 0 | 0 | 1 | 0 | 1 | 1 | 1 |"
 
 
@@ -131,6 +132,15 @@ def test_the_report_is_the_same_each_time(run: Path) -> None:
     before = written.page.read_bytes(), written.markdown.read_bytes()
     again = report.write(run)
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
+
+
+def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
+    """They are in the Markdown, in the page, and in files of their own."""
+    written = report.write(run)
+    cell = "35.6 % (154/432; 31.3 to 40.3)"
+    files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
+    assert all(cell in file.read_text() for file in (written.markdown, written.page, files[0]))
+    assert files[1].read_text().splitlines()[1].startswith("radar/chaff,paper,432,480,0.9,")
 
 
 def test_no_report_without_a_run(tmp_path: Path) -> None:
