@@ -6,7 +6,7 @@ from mutator.statistics import compare
 from mutator.statistics.compare import WHOLES, Whole
 from mutator.statistics.paper import Paper
 from mutator.statistics.share import share
-from mutator.statistics.sheet import Cell, Sheet
+from mutator.statistics.sheet import Cell, P, Sheet
 from mutator.statistics.tally import by_kind
 
 
@@ -22,7 +22,7 @@ def overall_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
                 share(sum(s.guided_hazards for s in parts), sum(s.guided for s in parts)),
                 share(sum(s.random_hazards for s in parts), sum(s.random for s in parts)),
             )
-            odds = (pooled.strata, pooled.odds_ratio, pooled.low, pooled.high, pooled.p, pooled.p_equal)
+            odds = (pooled.strata, pooled.odds_ratio, pooled.low, pooled.high, P(pooled.p), P(pooled.p_equal))
             lines.append((whole, source, *rates, *odds, *_resampled(frame, whole, source)))
     return Sheet(
         name="guided_against_random",
@@ -58,7 +58,7 @@ def kinds_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
             for stratum, p, adjusted in zip(parts, p_values, compare.holm(p_values), strict=True):
                 guided = share(stratum.guided_hazards, stratum.guided)
                 random = share(stratum.random_hazards, stratum.random)
-                lines.append((whole, source, stratum.kind, guided, random, p, adjusted))
+                lines.append((whole, source, stratum.kind, guided, random, P(p), P(adjusted)))
     return Sheet(
         name="guided_against_random_by_fault_type",
         title="Guided against random by fault type",
@@ -76,11 +76,13 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
         ("all", paired),
         ("guided one activated", paired[paired["is_activated_guided"]]),
     ):
+        if some.empty:
+            continue
         kinds = {str(kind): compare.mcnemar(group) for kind, group in some.groupby("kind")}
         adjusted = compare.holm([matched.p for matched in kinds.values()])
         lines.append((which, "total", *_cells(compare.mcnemar(some)), None))
         lines += [
-            (which, kind, *_cells(matched), p)
+            (which, kind, *_cells(matched), P(p))
             for (kind, matched), p in zip(kinds.items(), adjusted, strict=True)
         ]
     return Sheet(
@@ -95,4 +97,4 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
 
 def _cells(matched: compare.Matched) -> tuple[Cell, ...]:
     counts = (matched.pairs, matched.both, matched.guided_only, matched.random_only, matched.neither)
-    return (*counts, matched.p)
+    return (*counts, P(matched.p))

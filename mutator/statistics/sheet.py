@@ -9,8 +9,17 @@ from dataclasses import dataclass
 from mutator.report_page import markdown_table
 from mutator.statistics.share import Share
 
-Cell = Share | float | int | str | None
 _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
+
+
+class P(float):
+    """A p-value: read as no smaller than its approximation is good for."""
+
+    def __str__(self) -> str:
+        return "< 0.0001" if self < 0.0001 else f"{float(self):.4f}"
+
+
+Cell = Share | float | int | str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,4 +73,4 @@ def _number(value: float) -> str:
 def _text(cell: Cell) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "-"
-    return f"{cell:.3g}" if isinstance(cell, float) else str(cell)
+    return str(cell) if isinstance(cell, P) or not isinstance(cell, float) else f"{cell:.3g}"

@@ -54,7 +54,7 @@ def sheets(frame: pd.DataFrame, paper: Paper | None, ends: Mapping[str, float] |
             compare_tables.kinds_sheet(frame, paper),
             compare_tables.pairs_sheet(frame),
         ]
-    made.append(time_tables.propagation_sheet(frame))
+    made.append(time_tables.propagation_sheet(frame, paper))
     if ends is not None:
         made.append(time_tables.reaction_sheet(frame, ends, paper.driver_reaction_s if paper else _DRIVER_S))
     made += [time_tables.alerts_sheet(frame), time_tables.orders_sheet(frame)]

@@ -6,11 +6,16 @@ from dataclasses import astuple
 import pandas as pd
 
 from mutator.statistics import times
+from mutator.statistics.paper import Paper
 from mutator.statistics.sheet import Cell, Sheet
 
 
-def propagation_sheet(frame: pd.DataFrame) -> Sheet:
+def propagation_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
     """How fast faults get through, by method and scenario."""
+    published = ""
+    if paper:
+        least, most = paper.least_alert_to_hazard_s, paper.most_alert_to_hazard_s
+        published = f" The paper's mean times from alert to hazard lie between {least:g} and {most:g} s."
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         for step, spread in times.propagation(group).items():
@@ -20,7 +25,7 @@ def propagation_sheet(frame: pd.DataFrame) -> Sheet:
         title="Propagation times by scenario",
         note="s from one event to the other, in the N runs that had both. Manifest: first difference of an "
         "actuator output from the fault-free run. Alert to hazard: where the alert came first; what did not "
-        "happen before the end of the run is left out here, see alert to hazard, censored.",
+        "happen before the end of the run is left out here, see alert to hazard, censored." + published,
         heads=(
             "method",
             "scenario",
@@ -48,7 +53,7 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
         name="alert_to_hazard",
         title="From alert to hazard, censored",
         note="Runs whose first alert came before any hazard; without a hazard, censored at their end. "
-        "Median: Kaplan-Meier with its 95 % interval, `-` where not reached in the time observed. The last "
+        "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` where not reached. The last "
         f"columns: share of alerts that no hazard follows within {late}, the driver's reaction time "
         f"(Kaplan-Meier), and of hazards after an alert those that came more than {late} after it. Alerts "
         "that came with the first hazard or after it are counted apart.",

@@ -102,7 +102,7 @@ def test_the_sheets_are_by_method_and_scenario() -> None:
     """Scenarios of a method, then all of them; every line has a cell for each head."""
     frame = results(run(8.0, 9.0), run(8.0, "", scenario="S2"), run("", 7.0, method="random"))
     sheets = (
-        propagation_sheet(frame),
+        propagation_sheet(frame, None),
         reaction_sheet(frame, ENDS, DRIVER_S),
         alerts_sheet(frame),
         orders_sheet(frame),
