@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from mutator import __version__
-from mutator.cli import campaigns, experiments, faults, library
+from mutator.cli import campaigns, experiments, faults, library, stpa
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
@@ -25,7 +25,7 @@ EXIT_INTERRUPTED = 130
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "check", "doctor")),
+    ("Look around", ("list", "stpa", "check", "doctor")),
     ("One fault", ("try", "diff", "generate")),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
     ("One experiment", ("show", "rerun")),
@@ -86,7 +86,7 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, faults, campaigns, experiments):
+for module in (library, stpa, faults, campaigns, experiments):
     module.register(app)
 
 

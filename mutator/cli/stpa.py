@@ -1,0 +1,197 @@
+"""`stpa`: the hazard analysis as tables, its checks, and its control structure as a picture."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mutator.cli.choose import target_name
+from mutator.cli.console import Terminal, short_path
+from mutator.cli.options import Json, Manifest, Place, with_place
+from mutator.errors import EXIT_CHECK_FAILED, MutatorError
+
+if TYPE_CHECKING:
+    from mutator.stpa import ContextTable
+    from mutator.stpa_analysis import Analysis
+
+EXAMPLES = """\b
+Examples:
+  mutator stpa                       the analysis, and whether it is complete and without contradiction
+  mutator stpa --svg structure.svg   its control structure as a picture
+  mutator stpa --json                the same for a program
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    app.command("stpa", epilog=EXAMPLES)(stpa)
+
+
+@with_place
+def stpa(
+    manifest: Manifest = None,
+    svg: Annotated[
+        Path | None, typer.Option("--svg", metavar="FILE", help="Draw the control structure.")
+    ] = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Print and check the hazard analysis.
+
+    Exit code 1 if it has a gap or a contradiction; each is told with its file and line.
+    """
+    from mutator.stpa_analysis import load_analysis
+    from mutator.stpa_checks import check_analysis
+    from mutator.stpa_drawing import draw
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace()
+    analysis = load_analysis(workspace.library / "stpa")
+    target = workspace.manifest(target_name(workspace, manifest))
+    problems = check_analysis(analysis, workspace.specs(), target)
+    if svg:
+        _write(svg, draw(analysis))
+    if as_json:
+        found = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
+        terminal.emit(_data(analysis) | {"problems": found})
+    _show(terminal, analysis)
+    if svg:
+        terminal.say(f"control structure: {short_path(svg)}")
+    for problem in problems:
+        terminal.say(str(problem), style="red")
+    if problems:
+        terminal.say(f"{len(problems)} problem(s)", style="bold red")
+        raise typer.Exit(EXIT_CHECK_FAILED)
+    faults = {fault for factor in analysis.factors.values() for fault in factor.faults}
+    terminal.say(
+        f"all well: {len(analysis.factors)} causal factors, {len(faults)} fault specs, no gap, "
+        "no contradiction",
+        style="green",
+    )
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as e:
+        raise MutatorError(
+            f"cannot be written ({e.strerror})", where=path, remedy="name another file"
+        ) from None
+
+
+def _show(terminal: Terminal, analysis: "Analysis") -> None:
+    hazards = analysis.hazards
+    _section(terminal, "accidents", ["id", "about"], hazards.accidents.items())
+    rows: Iterable[tuple[str, ...]] = (
+        (name, ", ".join(hazards.leads_to[name]), about) for name, about in hazards.hazards.items()
+    )
+    _section(terminal, "hazards", ["id", "leads to", "about"], rows)
+    _show_structure(terminal, analysis)
+    for table in analysis.tables.values():
+        _show_table(terminal, table)
+    rows = (
+        (name, a.action, a.category.value, ", ".join(a.hazards), _contexts(a.contexts), a.about)
+        for name, a in analysis.unsafe.items()
+    )
+    heads = ["id", "action", "unsafe when", "hazards", "contexts", "about"]
+    _section(terminal, "unsafe control actions", heads, rows)
+    rows = (
+        (name, ", ".join(f.where), ", ".join(f.leads_to), f.about) for name, f in analysis.factors.items()
+    )
+    _section(terminal, "causal factors", ["id", "where", "leads to", "about"], rows)
+    rows = (
+        (name, ", ".join(f.at), ", ".join(f.faults) or f"none: {f.no_fault}")
+        for name, f in analysis.factors.items()
+    )
+    _section(terminal, "what stands for them", ["id", "in the target", "faults"], rows)
+
+
+def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:
+    structure = analysis.structure
+    rows: Iterable[tuple[str, ...]] = (
+        (name, component.kind.value, ", ".join(component.process_model), component.about)
+        for name, component in structure.components.items()
+    )
+    _section(terminal, "control structure", ["component", "kind", "process model", "about"], rows)
+    rows = (
+        (
+            name,
+            structure.links[action.link].from_,
+            structure.links[action.link].to,
+            action.channel,
+            action.about,
+        )
+        for name, action in structure.control_actions.items()
+    )
+    _section(terminal, "control actions", ["action", "from", "to", "channel", "about"], rows)
+    actions = {action.link for action in structure.control_actions.values()}
+    rows = (
+        (name, link.from_, link.to, link.label)
+        for name, link in structure.links.items()
+        if name not in actions
+    )
+    _section(terminal, "feedback and other links", ["link", "from", "to", "carries"], rows)
+
+
+def _show_table(terminal: Terminal, table: "ContextTable") -> None:
+    """A context table: the trigger that each row makes, and what is hazardous there."""
+    actions = list(table.rows[0].actions)
+    heads = ["context", "trigger"]
+    heads += [head for action in actions for head in (f"{action}", f"no {action}")] + ["about"]
+    rows = []
+    for row in table.rows:
+        cells = [
+            verdict for a in actions for verdict in (row.actions[a].provided, row.actions[a].not_provided)
+        ]
+        rows.append((row.id, row.condition, *(cell or "-" for cell in cells), row.about))
+    _section(terminal, f"contexts of {table.name}", heads, rows, end=_coverage(table))
+
+
+def _coverage(table: "ContextTable") -> str:
+    found = table.coverage
+    if found.beyond:
+        return f"whether they cover everything once could not be proved: {found.beyond}"
+    return f"they cover everything exactly once: proved in {found.cells} cells"
+
+
+def _contexts(names: list[str]) -> str:
+    return ", ".join(name.partition("/")[2] for name in names)
+
+
+def _section(
+    terminal: Terminal, title: str, heads: list[str], rows: Iterable[tuple[str, ...]], end: str = ""
+) -> None:
+    cells = [tuple(" ".join(cell.split()) for cell in row) for row in rows]
+    terminal.say(f"{title} ({len(cells)})", style="bold")
+    terminal.table(heads, cells)
+    if end:
+        terminal.say(end)
+    terminal.say()
+
+
+def _data(analysis: "Analysis") -> dict[str, Any]:
+    """The analysis for a program; conditions have their constants put in."""
+    hazards = analysis.hazards
+    return {
+        "accidents": hazards.accidents,
+        "hazards": {
+            name: {"about": about, "leads_to": hazards.leads_to[name]}
+            for name, about in hazards.hazards.items()
+        },
+        "control_structure": analysis.structure.model_dump(mode="json", by_alias=True),
+        "context_tables": {
+            table.name: {
+                "coverage": {"cells": table.coverage.cells, "beyond": table.coverage.beyond},
+                "contexts": table.rows,
+            }
+            for table in analysis.tables.values()
+        },
+        "unsafe_control_actions": _plain(analysis.unsafe),
+        "causal_factors": _plain(analysis.factors),
+    }
+
+
+def _plain(models: Any) -> dict[str, Any]:
+    return {name: model.model_dump(mode="json") for name, model in models.items()}

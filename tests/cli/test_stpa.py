@@ -1,0 +1,83 @@
+"""`stpa`."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CLONE = Path(__file__).parents[2]
+Cli = Callable[..., Any]
+
+
+def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
+    """All parts of the analysis that ships are shown, with what was proved, and the picture is written."""
+    answer = cli("--root", CLONE, "stpa", "--svg", "structure.svg")
+    assert answer.code == 0, answer.err
+    for wanted in (
+        "accidents (3)",
+        "hazards (3)",
+        "hwt > 2.0 and rs > 0.0",
+        "they cover everything exactly once: proved in 9 cells",
+        "unsafe control actions (14)",
+        "vision_output/camera_unavailable",
+        "none: People are not simulated",
+        "control structure: structure.svg",
+        "all well: 19 causal factors, 24 fault specs",
+    ):
+        assert wanted in answer.out
+    assert (nowhere / "structure.svg").read_text().startswith("<svg ")
+
+
+def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
+    """`--json` is one document with the same parts, and no problem."""
+    answer = cli("--root", CLONE, "stpa", "--json")
+    assert answer.json["problems"] == []
+    assert answer.json["hazards"]["H3"]["leads_to"] == ["A1", "A3"]
+    assert answer.json["context_tables"]["steer"]["contexts"][0]["condition"] == "v_ego < 0.3"
+    assert answer.json["unsafe_control_actions"]["UCA7"]["category"] == "provided"
+    assert answer.json["causal_factors"]["CF1"]["faults"] == ["radar/chaff"]
+    assert answer.json["control_structure"]["links"]["gas"]["from"] == "acc"
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Path:
+    """A copy of the library that ships; its target is the clone's."""
+    library = tmp_path / "fault_library"
+    shutil.copytree(CLONE / "fault_library", library)
+    (tmp_path / "target").symlink_to(CLONE / "target")
+    return library
+
+
+def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> None:
+    """A spec that no causal factor asks for is told with its file; the exit code is 1."""
+    factors = library / "stpa" / "causal_factors.yaml"
+    factors.write_text(factors.read_text().replace(", vision_weather/lens_mud", ""))
+    answer = cli("--root", CLONE, "--library", library, "stpa")
+    assert answer.code == 1
+    assert "lens_mud.yaml:1: fault spec 'vision_weather/lens_mud' stands for no causal factor" in answer.out
+    assert "1 problem(s)" in answer.out
+
+
+def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) -> None:
+    """What cannot be read as an analysis is refused with file and line; the exit code is 2."""
+    factors = library / "stpa" / "causal_factors.yaml"
+    factors.write_text(factors.read_text().replace("[UCA2,", "[UCA22,", 1))
+    answer = cli("--root", CLONE, "--library", library, "stpa")
+    assert answer.code == 2
+    assert "causal_factors.yaml:10: unsafe control action 'UCA22'" in answer.err
+
+
+def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
+    """Without the files the verb says which one is missing; campaigns need none of them."""
+    answer = cli("stpa")
+    assert answer.code == 2
+    assert "control_structure.yaml" in answer.err
+
+
+def test_a_picture_that_cannot_be_written(cli: Cli, nowhere: Path) -> None:
+    """A folder that is not there is told with the file's name."""
+    answer = cli("--root", CLONE, "stpa", "--svg", "no/such/structure.svg")
+    assert answer.code == 2
+    assert "no/such/structure.svg: cannot be written" in answer.err
