@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator import golden, mutant, planfile
+from mutator.check_rules import CheckRun, judge_golden, judge_null, judge_same
 from mutator.engine import Execution, Job, ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
 from mutator.golden import BadOutput, golden_key
@@ -19,6 +20,7 @@ from mutator.mutant import InvalidMutant
 from mutator.provenance import sources, versions
 from mutator.records import Progress
 from mutator.runfolder import RunFolder
+from mutator.sharing import same_in
 from mutator.trigger import always
 from mutator.workspace import Workspace
 
@@ -37,17 +39,6 @@ class CheckResult:
     name: str
     passed: bool
     detail: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """What a check needs to know of a run: how it ended, digest of all it wrote, hazards, trigger seen."""
-
-    problem: str
-    digest: str = ""
-    hazards: tuple[tuple[str, float], ...] = ()
-    triggered: bool = False
-    cpu_s: float = 0.0
 
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
@@ -150,10 +141,10 @@ class _Checks:
                 remedy="go back to them (run.json has the versions), or run into another folder",
             )
 
-    def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], _Run]:
+    def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], CheckRun]:
         """Every run of every check, `workers` at a time."""
         jobs = dict(self._jobs())
-        runs: dict[tuple[str, Any], _Run] = {}
+        runs: dict[tuple[str, Any], CheckRun] = {}
         work = self.folder.work / "checks"
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir(parents=True)
@@ -162,7 +153,7 @@ class _Checks:
         notify(Progress(stage="checks", total=len(jobs)))
         pool = ThreadPoolExecutor(max(1, workers))
         try:
-            futures: dict[Future[_Run], tuple[str, Any]] = {
+            futures: dict[Future[CheckRun], tuple[str, Any]] = {
                 pool.submit(self._run, engine, name, job): name for name, job in jobs.items()
             }
             for future in as_completed(futures):
@@ -201,7 +192,7 @@ class _Checks:
             ),
         )
 
-    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> _Run:
+    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = engine.work / job.name
         try:
             execution = engine.execute(job, scratch)
@@ -212,19 +203,21 @@ class _Checks:
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
 
-    def _look(self, execution: Execution) -> _Run:
+    def _look(self, execution: Execution) -> CheckRun:
         if execution.status is not Status.OK:
             log = execution.log.strip()
             last = f" ({log.splitlines()[-1]})" if log else ""
-            return _Run(problem=f"{execution.status.value}: {execution.detail}{last}")
+            return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
         try:
             record = golden.load_record(self.manifest, execution.out)
             golden.load_trace(self.manifest, execution.out, [c.name for c in self.manifest.compared])
         except BadOutput as err:
-            return _Run(problem=f"{Path(err.where or '').name}: {err.got}")
-        return _Run(
+            return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
+        return CheckRun(
             problem="",
             digest=_digest_of(self.manifest, execution.out),
+            trace=golden.trace_digest(self.manifest, execution.out),
+            alerts=tuple(golden.alerts_of(record, self.manifest.alerts)),
             hazards=tuple(golden.hazards_of(record, self.manifest.hazards)),
             triggered=bool(execution.probe and execution.probe["triggered"]),
             cpu_s=execution.cpu_s,
@@ -235,7 +228,7 @@ class _Checks:
         shutil.rmtree(place, ignore_errors=True)
         out.rename(place)
 
-    def _judge(self, runs: dict[tuple[str, Any], _Run]) -> Iterator[CheckResult]:
+    def _judge(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
         for key in self.keys:
             first, again, null = (runs[name, key] for name in (_GOLDEN, _AGAIN, _NULL))
             detail = judge_golden(first, again)
@@ -243,11 +236,21 @@ class _Checks:
             if not first.problem:
                 detail = judge_null(first, null)
                 yield _result(f"null mutant {golden_key(*key)}", detail, "the same bytes as golden")
+        yield from self._judge_same(runs)
         canary = runs[_CANARY, None]
         problem = canary.problem or (
             "" if self.hazard in dict(canary.hazards) else f"did not reach {self.hazard}"
         )
         yield _result("canary", problem, f"reached {self.hazard}")
+
+    def _judge_same(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
+        """Scenarios that a change makes the same, as the manifest has it, drive to the same bytes."""
+        same: dict[tuple[str, ...], dict[str, CheckRun]] = {}
+        for scenario, changes in self.keys:
+            if scenario in same_in(self.manifest, changes):
+                same.setdefault(changes, {})[scenario] = runs[_GOLDEN, (scenario, changes)]
+        for changes, goldens in same.items():
+            yield _result(f"same {'+'.join((*goldens, *changes))}", judge_same(goldens), "one run for all")
 
     def _anchors(self) -> CheckResult:
         """Each variant of the plan finds its statements (not compiling is a result, told later)."""
@@ -262,27 +265,6 @@ class _Checks:
                 problems.setdefault(str(err), []).append(fault.spec)
         text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
         return _result("anchors", text, f"{len(variants)} variants found their statements")
-
-
-def judge_golden(first: _Run, again: _Run) -> str:
-    """What is wrong with a pair of golden runs; empty if nothing."""
-    if first.problem or again.problem:
-        return first.problem or again.problem
-    if first.digest != again.digest:
-        return "two runs that differ in nothing but PYTHONHASHSEED gave different bytes"
-    if first.hazards:
-        name, time = first.hazards[0]
-        return f"reaches {name} at {time} s without any fault"
-    return ""
-
-
-def judge_null(first: _Run, null: _Run) -> str:
-    """What is wrong with a null mutant beside its golden run; empty if nothing."""
-    if null.problem:
-        return null.problem
-    if null.digest != first.digest:
-        return "the probe alone changes what the target does"
-    return "" if null.triggered else "its trigger never fired: the observation statement is not executed"
 
 
 def _result(name: str, problem: str, found: str) -> CheckResult:

@@ -2,9 +2,10 @@
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 from mutator import planfile
-from mutator.model import Record, Status
+from mutator.model import Experiment, Record, Status
 from mutator.runfolder import RunFolder
 
 
@@ -18,6 +19,14 @@ def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
         else:
             lengths.append(1)
     return tuple(lengths)
+
+
+def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
+    """Experiments of each chunk, when the plan is cut into chunks of at most `size` runs: a run that several
+    experiments share stays whole."""
+    lengths = iter([len(same) for same in runs])
+    counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
+    return tuple(sum(islice(lengths, count)) for count in counts)
 
 
 @dataclass(frozen=True, slots=True)

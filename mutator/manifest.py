@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -80,6 +80,8 @@ class TargetManifest:
     hazards: tuple[str, ...]
     alerts: tuple[str, ...]  # alerts that count in experiments
     film: Film | None = None
+    # change -> scenarios that it makes the same: their traffic, say, is all they differ in, and it is gone
+    same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @cached_property
     def tree(self) -> SourceTree:
@@ -134,10 +136,15 @@ class _ChannelModel(StrictModel):
     tolerance: float = Field(0.0, ge=0.0, allow_inf_nan=False)
 
 
+class _ChangeModel(StrictModel):
+    args: list[str]
+    same_in: list[str] = Field(min_length=2)
+
+
 class _EntryModel(StrictModel):
     module: str
     args: list[str]
-    changes: dict[str, list[str]] = Field(default_factory=dict)
+    changes: dict[str, list[str] | _ChangeModel] = Field(default_factory=dict)
 
 
 class _FilmModel(StrictModel):
@@ -189,6 +196,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         )
     _check_names(model, source)
     _check_events(model, source)
+    changes = model.entry.changes
     return TargetManifest(
         name=model.name,
         path=path,
@@ -198,7 +206,8 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         forbid=tuple(model.forbid),
         entry_module=model.entry.module,
         entry_args=tuple(model.entry.args),
-        changes={name: tuple(args) for name, args in model.entry.changes.items()},
+        changes={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
+        same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, _ChangeModel)},
         step_s=model.step_s,
         armed_after_s=model.armed_after_s,
         trace_file=model.trace_file,

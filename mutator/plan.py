@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator import planfile
 from mutator.campaign import Campaign, load_campaign
-from mutator.chunks import cut
+from mutator.chunks import cut_runs
 from mutator.columns import PLAN_COLUMNS, plan_row
 from mutator.errors import MutatorError
 from mutator.expansion import Expansion
@@ -21,6 +21,7 @@ from mutator.provenance import check_sources, sources, versions
 from mutator.runfolder import HEAD, SCHEMA, RunFolder
 from mutator.sample import pick, pick_in_proportion
 from mutator.shards import Shard
+from mutator.sharing import runs
 from mutator.workspace import Workspace
 
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
@@ -60,6 +61,7 @@ class Cost:
 class Plan:
     """Experiments in the order they are run, and how they are cut into chunks (lengths, in order).
 
+    `runs` is how many runs they take: one that several scenarios have in common is run once.
     `run_cpu_s` is the measured CPU time of one run, if there is one.
     """
 
@@ -70,6 +72,7 @@ class Plan:
     experiments: tuple[Experiment, ...]
     chunks: tuple[int, ...]
     canary: Experiment
+    runs: int
     digest: str  # same campaign, choices, library and scenarios: same digest on every machine
     run_cpu_s: float | None = None
 
@@ -85,7 +88,7 @@ class Plan:
     def cost(self, workers: int = 2) -> Cost:
         """Expected time and disk of all of it."""
         goldens = len(self.goldens())
-        runs = len(self.experiments) + RUNS_PER_GOLDEN * goldens + 1
+        runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
         return Cost(
             cpu_s=cpu_s,
@@ -119,9 +122,10 @@ def make_plan(
     reading = reading or loaded.reading
     _check(choices, loaded)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
-    experiments = _choose(expansion.experiments(), loaded, choices, seed)
+    once = runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed))
+    experiments = tuple(experiment for same in once for experiment in same)
     canary = expansion.canary()
-    chunks = cut([(e.scenario, e.changes) for e in experiments], loaded.chunk)
+    chunks = cut_runs(once, loaded.chunk)
     if shard is not None and Shard.parse(shard).of > len(chunks):
         raise MutatorError(
             f"shard {shard}",
@@ -138,6 +142,7 @@ def make_plan(
         chunks=chunks,
         canary=canary,
         digest=digest([SCHEMA, *content]),
+        runs=len(once),
     )
 
 
@@ -252,6 +257,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dic
         "reading": plan.reading,
         "choices": asdict(plan.choices),
         "experiments": len(plan.experiments),
+        "runs": plan.runs,
         "limits": asdict(plan.campaign.limits),
         "hazards": list(manifest.hazards),
         "compared": [channel.name for channel in manifest.compared],
@@ -288,6 +294,7 @@ def load_plan(out: Path) -> Plan:
         experiments=planfile.read_all(folder.path),
         chunks=tuple(count for _, _, count in head["chunks"]),
         canary=planfile.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
+        runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),
     )

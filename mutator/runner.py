@@ -3,7 +3,7 @@
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from mutator.golden import BadOutput, Trace
 from mutator.manifest import TargetManifest
 from mutator.model import Activation, Experiment, Record, Status
 from mutator.mutant import InvalidMutant, Mutant
+from mutator.sharing import runs
 from mutator.verdict import first_events, judge
 
 
@@ -66,7 +67,16 @@ class Runner:
         self.scenario_file = scenario_file
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
-        """Each experiment with its record; what cannot be built has its record without being run."""
+        """Each experiment with its record; what cannot be built has its record without being run, and what
+        is the same run as another has that one's."""
+        shared = {same[0].id: same for same in runs(self.manifest, experiments)}
+        for finished in self._run([same[0] for same in shared.values()]):
+            yield finished
+            for other in shared[finished.experiment.id][1:]:
+                record = replace(finished.record, experiment_id=other.id)
+                yield replace(finished, experiment=other, record=record, cpu_s=0.0, wall_s=0.0)
+
+    def _run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
         refused: deque[Finished] = deque()
         started: dict[str, tuple[Experiment, Mutant]] = {}
 

@@ -73,7 +73,9 @@ def plan(
             for (m, f, how), n in sorted(groups.items())
         ]
         facts = {"run": str(folder.path), "digest": made.digest, "seed": made.seed, "reading": made.reading}
-        terminal.emit(facts | {"experiments": len(made.experiments), "groups": faults, "cost": cost})
+        terminal.emit(
+            facts | {"experiments": len(made.experiments), "runs": made.runs, "groups": faults, "cost": cost}
+        )
     rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in sorted(groups.items())]
     terminal.table(
         ["fault type", "method", "experiments"],
@@ -81,6 +83,8 @@ def plan(
         right=(2,),
         total=True,
     )
+    if shared := len(made.experiments) - made.runs:
+        terminal.say(f"{made.runs} runs: {shared} are the same run as one in another scenario, and share it")
     terminal.say(f"expected: {_cost_line(cost)}")
     terminal.say(f"plan: {short_path(folder.path / 'plan.csv')} (digest {made.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), "-n", str(workers)]

@@ -1,0 +1,50 @@
+"""What must hold of the runs before a campaign."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckRun:
+    """What a check needs to know of a run: how it ended, digests of all it wrote and of its trace alone,
+    hazards, alerts, trigger seen."""
+
+    problem: str
+    digest: str = ""
+    trace: str = ""
+    hazards: tuple[tuple[str, float], ...] = ()
+    alerts: tuple[tuple[str, float], ...] = ()
+    triggered: bool = False
+    cpu_s: float = 0.0
+
+
+def judge_golden(first: CheckRun, again: CheckRun) -> str:
+    """What is wrong with a pair of golden runs; empty if nothing."""
+    if first.problem or again.problem:
+        return first.problem or again.problem
+    if first.digest != again.digest:
+        return "two runs that differ in nothing but PYTHONHASHSEED gave different bytes"
+    if first.hazards:
+        name, time = first.hazards[0]
+        return f"reaches {name} at {time} s without any fault"
+    return ""
+
+
+def judge_null(first: CheckRun, null: CheckRun) -> str:
+    """What is wrong with a null mutant beside its golden run; empty if nothing."""
+    if null.problem:
+        return null.problem
+    if null.digest != first.digest:
+        return "the probe alone changes what the target does"
+    return "" if null.triggered else "its trigger never fired: the observation statement is not executed"
+
+
+def judge_same(goldens: Mapping[str, CheckRun]) -> str:
+    """What is wrong with golden runs, by scenario, that the manifest says are one; empty if nothing."""
+    (first, reference), *others = goldens.items()
+    for name, run in others:
+        if run.problem or reference.problem:
+            return run.problem or reference.problem
+        if (run.trace, run.alerts) != (reference.trace, reference.alerts):
+            return f"{name} is not what {first} is, although the manifest says so (same_in)"
+    return ""

@@ -1,0 +1,105 @@
+"""What several scenarios have in common is run once, counted in each, and proved before."""
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator import campaign_run
+from mutator.checks import run_checks
+from mutator.engine import ReferenceEngine
+from mutator.errors import CheckFailed
+from mutator.plan import freeze, load_plan, make_plan
+from mutator.runfolder import RunFolder
+from mutator.workspace import Workspace
+
+CopyToycar = Callable[[Path], Workspace]
+ALONE = "alone: [--alone]"
+SHARED = "alone: {args: [--alone], same_in: [A, C]}"
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def two_scenarios(toy: Workspace, changes: str) -> Workspace:
+    """The small campaign on A and C, which differ in the other car alone, with faults that need it gone."""
+    scenarios = toy.library / "scenarios"
+    (scenarios / "C.yaml").write_text((scenarios / "A.yaml").read_text().replace("0.8", "0.1"))
+    edit(toy.library / "targets" / "toycar.yaml", ALONE, changes)
+    campaign = toy.campaign("small")
+    edit(campaign, "scenarios: [A]", "scenarios: [A, C]")
+    edit(campaign, "  - {spec: sensor/lane/shifted, values: 1}\n", "")
+    return toy
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Path, Path]:
+    """The campaign run with shared runs, and with every experiment run by itself."""
+    made = []
+    for name, changes in (("shared", SHARED), ("apart", ALONE)):
+        folder = tmp_path_factory.mktemp(name)
+        toy = two_scenarios(copy_toycar(folder), changes)
+        assert campaign_run.run(toy, "small", folder / "run").exit_code == 0
+        made.append(folder / "run")
+    return made[0], made[1]
+
+
+def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
+    """Results with shared runs are those of running everything, byte for byte; each scenario has its row."""
+    shared, apart = runs
+    for name in ("results.csv", "results.parquet"):
+        assert (shared / name).read_bytes() == (apart / name).read_bytes()
+    with (shared / "results.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["variant"] == "nearer"]
+    assert len(rows) == 8
+    assert sum(row["scenario"] == "C" for row in rows) == 4
+
+
+def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
+    """Two guided runs are shared by two scenarios each; random ones have times of their own."""
+    shared, apart = (load_plan(run) for run in runs)
+    assert (len(shared.experiments), shared.runs) == (16, 14)
+    assert (len(apart.experiments), apart.runs) == (16, 16)
+    assert shared.cost().cpu_s / shared.run_cpu_s < apart.cost().cpu_s / apart.run_cpu_s  # type: ignore[operator]
+    assert RunFolder.open(runs[0]).head["runs"] == 14
+    assert {e.id for e in shared.experiments} == {e.id for e in apart.experiments}
+
+
+def test_they_are_run_once(
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, runs: tuple[Path, Path]
+) -> None:
+    """No more runs are driven than the plan says, the checks' apart."""
+    driven: list[str] = []
+    execute = ReferenceEngine.execute
+
+    def counted(self: ReferenceEngine, job, scratch):  # type: ignore[no-untyped-def]
+        driven.append(job.name)
+        return execute(self, job, scratch)
+
+    monkeypatch.setattr(ReferenceEngine, "execute", counted)
+    two_scenarios(toy, SHARED)
+    summary = campaign_run.run(toy, "small", tmp_path / "run")
+    assert summary.done == 16
+    ids = {e.id for e in load_plan(tmp_path / "run").experiments}
+    assert sum(name in ids for name in driven) == 14
+    assert (tmp_path / "run" / "results.csv").read_bytes() == (runs[0] / "results.csv").read_bytes()
+
+
+def test_the_checks_prove_it(runs: tuple[Path, Path]) -> None:
+    """The fault-free runs of scenarios that are said to be one are compared, and the check is kept."""
+    checks = json.loads((runs[0] / "checks.json").read_text())["results"]
+    assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
+
+
+def test_what_is_not_the_same_does_not_start(toy: Workspace, tmp_path: Path) -> None:
+    """A manifest that says so of scenarios that differ is refused before anything is run, by their names."""
+    two_scenarios(toy, SHARED)
+    edit(toy.library / "scenarios" / "C.yaml", "speed: 20", "speed: 21")
+    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    with pytest.raises(CheckFailed, match=r"same A\+C\+alone: C is not what A is"):
+        run_checks(toy, folder)
