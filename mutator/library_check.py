@@ -16,6 +16,7 @@ from mutator.mutant import build, injection_edit, unsplice
 from mutator.params import resolve
 from mutator.spec import READINGS, FaultSpec, Variant
 from mutator.stpa import ContextTable
+from mutator.stpa_checks import check_analysis
 from mutator.trigger import always
 from mutator.workspace import Workspace
 from mutator.yamlio import Keys
@@ -28,8 +29,8 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of library, templates and target, in the order of the files; empty when all is well.
 
     Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
-    that every spec expands in both readings; that every anchor is found in the target exactly once; and that
-    one mutant of every shape compiles and un-splices.
+    that every spec expands in both readings; that every anchor is found in the target exactly once; that one
+    mutant of every shape compiles and un-splices; and that a hazard analysis, if there is one, has no gap.
     """
     found = _Found()
     manifest = found.tried(lambda: workspace.manifest(target))
@@ -45,7 +46,10 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
         for spec in specs:
             found.problems += check_spec(spec, models, manifest) if spec else ()
     if not found.problems:
-        found.tried(workspace.specs)
+        checked = found.tried(workspace.specs)
+        analysis = found.tried(workspace.analysis)
+        if analysis and checked and manifest:
+            found.problems += check_analysis(analysis, checked, manifest)
     return found.problems
 
 
@@ -106,9 +110,9 @@ def _unknown_hazards(
             for action, verdicts in row.actions.items():
                 for hazard in (verdicts.provided, verdicts.not_provided):
                     if hazard is not None and hazard not in known:
-                        yield MutatorError(
+                        yield table.source.error(
+                            ("contexts", row.id, "actions", action),
                             f"hazard '{hazard}' of {action} in {row.id}",
-                            where=table.path,
                             expected=f"one of {', '.join(known)}, or null",
                         )
 

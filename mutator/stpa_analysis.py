@@ -179,6 +179,7 @@ def _check_structure(structure: StructureModel, source: Source) -> None:
             if model.observed is not None:
                 at = ("components", name, "process_model", variable, "observed")
                 _known(source, at, "variable", model.observed, VARIABLES)
+    _check_grid(structure, source)
     for name, link in structure.links.items():
         if name in structure.components:
             raise source.error(("links", name), f"link '{name}'", expected="a name no component has")
@@ -189,6 +190,22 @@ def _check_structure(structure: StructureModel, source: Source) -> None:
         _known(source, keys, "link", action.link, structure.links)
         if structure.components[structure.links[action.link].from_].kind is not Kind.CONTROLLER:
             raise source.error(keys, f"link '{action.link}'", expected="a link that comes from a controller")
+
+
+def _check_grid(structure: StructureModel, source: Source) -> None:
+    """Every component has fields of its own in the drawing's grid."""
+    taken: dict[tuple[int, int], str] = {}
+    for name, component in structure.components.items():
+        row, column, width = component.drawn
+        fields = [(row, column + i) for i in range(width)]
+        other = next((taken[field] for field in fields if field in taken), None)
+        if other or not fields or min(row, column) < 0:
+            raise source.error(
+                ("components", name, "drawn"),
+                f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
+                expected="row and column from 0, a width from 1, and fields of its own",
+            )
+        taken.update(dict.fromkeys(fields, name))
 
 
 def _tables(

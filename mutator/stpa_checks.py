@@ -9,6 +9,7 @@ from mutator.shape_errors import suggestion
 from mutator.spec import FaultSpec
 from mutator.stpa import ContextRow
 from mutator.stpa_analysis import Analysis, Category, FactorModel, UnsafeActionModel
+from mutator.trigger import VARIABLES
 from mutator.yamlio import Keys
 
 Specs = dict[str, FaultSpec]
@@ -27,6 +28,7 @@ def check_analysis(
     return [
         *_hazards(analysis),
         *_unobserved(analysis, manifest),
+        *_unmodelled(analysis),
         *_categories(analysis),
         *_contradictions(analysis),
         *_unjudged(analysis),
@@ -62,6 +64,21 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
                 f"channel '{action.channel}'",
                 expected=f"one that the target compares: {', '.join(channels)}",
             )
+
+
+def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
+    """Contexts that ask for a variable which no controller has in its process model."""
+    models = [component.process_model for component in analysis.structure.components.values()]
+    observed = {variable.observed for model in models for variable in model.values()}
+    for table in analysis.tables.values():
+        for row in table.rows:
+            names = {node.id for node in ast.walk(ast.parse(row.condition)) if isinstance(node, ast.Name)}
+            for name in sorted(names & set(VARIABLES) - observed):
+                yield table.source.error(
+                    ("contexts", row.id, "when"),
+                    f"context '{row.id}' asks for '{name}', which no process model has",
+                    remedy=f"add it to a component of {analysis.structure_source.path.name}",
+                )
 
 
 def _categories(analysis: Analysis) -> Iterator[MutatorError]:

@@ -10,6 +10,7 @@ from mutator.manifest import TargetManifest, load_manifest
 from mutator.shape_errors import suggestion
 from mutator.spec import FaultSpec, load_spec
 from mutator.stpa import ContextTable, HazardList, load_context_table, load_hazards
+from mutator.stpa_analysis import Analysis, load_analysis
 
 _LIBRARY = "fault_library"
 _TEMPLATES = "templates"
@@ -108,6 +109,11 @@ class Workspace:
     def hazards(self) -> HazardList:
         """Accidents and hazards of fault_library/stpa/hazards.yaml."""
         return load_hazards(self.library / "stpa" / "hazards.yaml")
+
+    def analysis(self) -> Analysis | None:
+        """The hazard analysis of fault_library/stpa/; None where there is no control structure in it."""
+        folder = self.library / "stpa"
+        return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def _names(self, folder: str) -> tuple[str, ...]:
         base = self.library / folder

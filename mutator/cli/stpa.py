@@ -42,13 +42,19 @@ def stpa(
 
     Exit code 1 if it has a gap or a contradiction; each is told with its file and line.
     """
-    from mutator.stpa_analysis import load_analysis
     from mutator.stpa_checks import check_analysis
     from mutator.stpa_drawing import draw
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    analysis = load_analysis(workspace.library / "stpa")
+    analysis = workspace.analysis()
+    if analysis is None:
+        raise MutatorError(
+            "no control_structure.yaml",
+            where=workspace.library / "stpa",
+            expected="a hazard analysis",
+            remedy="write one, as docs/explanation/hazard-analysis.md says; campaigns need none",
+        )
     target = workspace.manifest(target_name(workspace, manifest))
     problems = check_analysis(analysis, workspace.specs(), target)
     if svg:

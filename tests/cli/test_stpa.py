@@ -73,7 +73,36 @@ def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
     """Without the files the verb says which one is missing; campaigns need none of them."""
     answer = cli("stpa")
     assert answer.code == 2
-    assert "control_structure.yaml" in answer.err
+    assert "no control_structure.yaml" in answer.err
+    assert cli("check").code == 0
+
+
+def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path) -> None:
+    """`check` tells the gaps of the hazard analysis among the other problems of the library."""
+    factors = library / "stpa" / "causal_factors.yaml"
+    factors.write_text(factors.read_text().replace("[vision_input/blur]", "[vision_input/blurr]"))
+    answer = cli("--root", CLONE, "--library", library, "check")
+    assert answer.code == 1
+    assert "fault spec 'vision_input/blurr'" in answer.out
+    assert "blur.yaml:1: fault spec 'vision_input/blur' stands for no causal factor" in answer.out
+
+
+@pytest.mark.parametrize(
+    ("new", "said"),
+    [
+        ("when: hwt > 3", "near_far.yaml:6: no context holds at 2.0 < hwt < 3.0"),
+        ("when: hwt >= near_s", "near_far.yaml:13: context 'far' overlaps 'near' at hwt = 2.0"),
+        ("when: gap > near_s", "near_far.yaml:13: unknown name 'gap'"),
+    ],
+)
+def test_no_campaign_on_a_wrong_table(cli: Cli, root: Path, new: str, said: str) -> None:
+    """A campaign on contexts that are uncovered, overlap or ask for the unknown is not even planned."""
+    table = root / "fault_library" / "stpa" / "contexts" / "near_far.yaml"
+    table.write_text(table.read_text().replace("when: hwt > near_s", new))
+    answer = cli("plan", "toy", "--out", "plan")
+    assert answer.code == 2
+    assert said in answer.err
+    assert not Path("plan").exists()
 
 
 def test_a_picture_that_cannot_be_written(cli: Cli, nowhere: Path) -> None:

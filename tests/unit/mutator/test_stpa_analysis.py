@@ -89,6 +89,8 @@ def test_places_of_both_readings_count(clone: Workspace) -> None:
             "context 'W2'; expected those of 'W1'",
         ),
         (STRUCTURE, "observed: rs", "observed: ttc", "variable 'ttc'; expected one of t, d_rel"),
+        (STRUCTURE, "drawn: [1, 1, 2]", "drawn: [1, 0, 2]", "'acc' drawn at [1, 0, 2], where 'alerts' is"),
+        (STRUCTURE, "drawn: [1, 1, 2]", "drawn: [1, 1, 0]", "a width from 1"),
         (STRUCTURE, "to: powertrain", "to: powertrian", "did you mean 'powertrain'"),
         (STRUCTURE, "accelerate: {link: gas", "accelerate: {link: gass", "link 'gass'"),
         (
@@ -128,6 +130,7 @@ def test_what_does_not_fit_together_is_refused(
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
+        (STRUCTURE, "observed: rs", "observed: null", "context 'C1' asks for 'rs'"),
         (STRUCTURE, "channel: gas", "channel: throttle", "channel 'throttle'"),
         (
             STRUCTURE,
