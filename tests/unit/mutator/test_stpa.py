@@ -1,5 +1,6 @@
 """Context tables and hazards."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -86,3 +87,31 @@ def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
     path = tmp_path / "wide.yaml"
     path.write_text(text.replace("safe_hwt_s: 2.0", "safe_hwt_s: 3"))
     assert load_context_table(path).rows[1].condition == "hwt <= 3.0 and rs > 0.0"
+
+
+def test_the_table_in_the_docs_can_be_used(clone: Workspace, tmp_path: Path) -> None:
+    """The table that the docs show loads, and its rows are proved to cover everything once."""
+    page = clone.library.parent / "docs" / "how-to" / "change-the-hazard-analysis.md"
+    (text, *_) = re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)
+    (tmp_path / "closing.yaml").write_text(text)
+    table = load_context_table(tmp_path / "closing.yaml")
+    assert [row.id for row in table.rows] == ["slow", "fast_near", "fast_far"]
+    assert table.coverage.cells == 9 and table.coverage.beyond is None
+
+
+def test_rows_judge_the_same_actions(toy: Workspace) -> None:
+    """A row that leaves out a control action is told at its line."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    head, _, tail = path.read_text().rpartition("accelerate:")
+    path.write_text(f"{head}brake:{tail}")
+    with pytest.raises(MutatorError, match=r"pedals.yaml:13: the actions brake in context 'far'"):
+        load_context_table(path)
+
+
+def test_what_cannot_be_proved_is_accepted_and_said(toy: Workspace) -> None:
+    """Conditions that compare two variables make a table of which nothing is proved."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    path.write_text(path.read_text().replace("hwt <= safe_hwt_s", "v_ego <= v_lead"))
+    table = load_context_table(path)
+    assert table.coverage.cells == 0
+    assert table.coverage.beyond == "'v_ego' with 'v_lead' is no comparison of one variable with a constant"

@@ -1,6 +1,7 @@
 """The picture of the control structure."""
 
 from itertools import combinations, pairwise
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -9,6 +10,8 @@ from mutator.stpa_analysis import Analysis, load_analysis
 from mutator.stpa_drawing import FAULT, draw, faulty_places, short
 from mutator.stpa_layout import APART, Box, Layout, Point, lay_out
 from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +71,11 @@ def test_places_of_faults_stand_out(analysis: Analysis) -> None:
     assert len(lines) == len(faulty_places(analysis)) + 1  # and the legend's
     words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
+
+
+def test_the_picture_in_the_docs_is_this_one(analysis: Analysis) -> None:
+    """After a change of the analysis: `mutator stpa --svg docs/explanation/hazard-analysis.svg`."""
+    assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
 
 
 def test_names_in_short() -> None:
