@@ -8,6 +8,7 @@ import pandas as pd
 from mutator.errors import MutatorError
 from mutator.golden import golden_key, load_trace
 from mutator.jsonio import write_atomic
+from mutator.records import read_records
 from mutator.runfolder import RunFolder
 from mutator.statistics import compare_tables, paper_tables, time_tables
 from mutator.statistics.compare import GUIDED, RANDOM
@@ -15,6 +16,7 @@ from mutator.statistics.frame import load
 from mutator.statistics.paper import Paper, has_paper, load_paper
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.tally import by_kind, by_scenario
+from mutator.statistics.times import Alerts
 from mutator.workspace import Workspace
 
 FOLDER = "tables"
@@ -38,12 +40,15 @@ def run_sheets(folder: RunFolder) -> tuple[Sheet, ...]:
         paper = None
     if not paper and not {GUIDED, RANDOM} <= set(frame["method"]):
         return ()
-    return sheets(frame, paper, _ends(folder, workspace) if workspace else None)
+    alerts = {name: record.alerts for name, record in read_records(folder.path).items()}
+    return sheets(frame, paper, alerts, _ends(folder, workspace) if workspace else None)
 
 
-def sheets(frame: pd.DataFrame, paper: Paper | None, ends: Mapping[str, float] | None) -> tuple[Sheet, ...]:
-    """The tables of a frame. `ends`: s of simulation at which a run of each scenario ends, if known; without
-    them there is no table of censored times."""
+def sheets(
+    frame: pd.DataFrame, paper: Paper | None, alerts: Alerts, ends: Mapping[str, float] | None
+) -> tuple[Sheet, ...]:
+    """The tables of a frame. `alerts` of each run are needed to tell which came before a hazard, `ends` (s of
+    simulation at which a run of each scenario ends) for censored times; without them these are left out."""
     scenarios, kinds = by_scenario(frame), by_kind(frame)
     methods = sorted({method for method, _ in scenarios})
     made = [paper_tables.summary_sheet(method, scenarios, paper) for method in methods]
@@ -57,7 +62,9 @@ def sheets(frame: pd.DataFrame, paper: Paper | None, ends: Mapping[str, float] |
     made.append(time_tables.propagation_sheet(frame, paper))
     if ends is not None:
         made.append(time_tables.reaction_sheet(frame, ends, paper.driver_reaction_s if paper else _DRIVER_S))
-    made += [time_tables.alerts_sheet(frame), time_tables.orders_sheet(frame)]
+    if alerts.keys() >= set(frame["experiment_id"]):
+        made.append(time_tables.alerts_sheet(frame, alerts))
+    made.append(time_tables.orders_sheet(frame))
     return tuple(sheet for sheet in made if sheet.lines)
 
 

@@ -66,17 +66,18 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
     )
 
 
-def alerts_sheet(frame: pd.DataFrame) -> Sheet:
-    """Which alert came first before which hazard."""
+def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
+    """Which alerts came before which hazard."""
     lines: list[tuple[Cell, ...]] = []
     for method, group in frame.groupby("method"):
-        counts = times.first_alert_before(group)
-        lines += [(str(method), hazard, alert, n) for (hazard, alert), n in counts.items()]
+        shares = times.alerts_before(group, alerts)
+        lines += [(str(method), hazard, alert, share) for (hazard, alert), share in shares.items()]
     return Sheet(
         name="alerts_before_hazards",
         title="Alerts before hazards",
-        note="How often a hazard came, by the run's first alert if that came before the hazard.",
-        heads=("method", "hazard", "first alert before it", "N"),
+        note="Of the runs with a hazard, those in which an alert came before it, with 95 % Wilson intervals. A "
+        "run with several alerts is in several lines; `any` and `none` are of all alerts.",
+        heads=("method", "hazard", "alert", "came before it"),
         lines=tuple(lines),
     )
 

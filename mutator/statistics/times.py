@@ -5,6 +5,7 @@ the run. Kaplan-Meier uses these runs up to their end; a mean of the others alon
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,6 +14,8 @@ import pandas as pd
 
 from mutator.statistics.frame import hazard_names
 from mutator.statistics.share import CONFIDENCE, Share, share
+
+Alerts = Mapping[str, tuple[tuple[str, float], ...]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,17 +119,22 @@ def _median_interval(curve: object) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def first_alert_before(frame: pd.DataFrame) -> dict[tuple[str, str], int]:
-    """By (hazard, alert): how often a hazard came, and which alert was the run's first, if it came before;
-    `none` if there was none by then."""
-    counts: dict[tuple[str, str], int] = {}
+def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:
+    """By (hazard, alert): in how many of the runs with this hazard the alert came before it; `any` and
+    `none` of all alerts.
+
+    `alerts`: by experiment id, the name and first time of each alert of a run, s. A run may have several.
+    """
+    shares: dict[tuple[str, str], Share] = {}
     for hazard in hazard_names(frame):
-        came = frame[frame[f"t_{hazard.lower()}"].notna()]
-        before = came["t_alert"] < came[f"t_{hazard.lower()}"]
-        alerts = came["alerts"].str.split(";").str[0].where(before, "none")
-        for alert, count in sorted(alerts.value_counts().items(), key=lambda item: str(item[0])):
-            counts[hazard, str(alert)] = int(count)
-    return counts
+        times = frame.set_index("experiment_id")[f"t_{hazard.lower()}"].dropna()
+        before = [{name for name, t in alerts[str(run)] if t < end} for run, end in times.items()]
+        counts = Counter(name for names in before for name in names)
+        warned = sum(bool(names) for names in before)
+        if before:
+            told = {**dict(sorted(counts.items())), "any": warned, "none": len(before) - warned}
+            shares |= {(hazard, name): share(count, len(before)) for name, count in told.items()}
+    return shares
 
 
 def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:

@@ -78,17 +78,23 @@ def test_a_reaction_of_just_the_drivers_time_is_not_longer() -> None:
     assert times.reaction(results(run(10.0, 11.8)), ENDS, DRIVER_S).in_time.count == 0
 
 
-def test_the_first_alert_before_each_hazard() -> None:
+def test_the_alerts_before_each_hazard() -> None:
     """Each hazard of a run counts by itself: an alert between two hazards warned of the second alone."""
-    frame = results(
-        run(8.0, 9.0, alerts="steerSaturated;fcw"),
-        run(9.0, 10.0, alerts="fcw", t_h3=8.0),
-        run("", "", t_h3=8.0),
-    )
-    assert times.first_alert_before(frame) == {
-        ("H1", "fcw"): 1,
-        ("H1", "steerSaturated"): 1,
-        ("H3", "none"): 2,
+    frame = results(run(8.0, 9.0), run(9.0, 10.0, t_h3=8.0), run("", "", t_h3=8.0), run("", 9.0))
+    alerts = {
+        "0": (("steer_saturated", 8.0), ("fcw", 8.5)),
+        "1": (("fcw", 9.0), ("steer_saturated", 10.0)),  # the latter came with the hazard, not before it
+        "2": (),
+        "3": (),
+    }
+    found = times.alerts_before(frame, alerts)
+    assert {key: (share.count, share.of) for key, share in found.items()} == {
+        ("H1", "fcw"): (2, 3),
+        ("H1", "steer_saturated"): (1, 3),
+        ("H1", "any"): (2, 3),
+        ("H1", "none"): (1, 3),
+        ("H3", "any"): (0, 2),
+        ("H3", "none"): (2, 2),
     }
 
 
@@ -104,10 +110,17 @@ def test_the_sheets_are_by_method_and_scenario() -> None:
     sheets = (
         propagation_sheet(frame, None),
         reaction_sheet(frame, ENDS, DRIVER_S),
-        alerts_sheet(frame),
+        alerts_sheet(frame, {"0": (("fcw", 8.0),), "1": (("fcw", 8.0),), "2": ()}),
         orders_sheet(frame),
     )
     assert all(len(line) == len(sheet.heads) for sheet in sheets for line in sheet.lines)
     groups = [line[:2] for line in sheets[1].lines]
     assert groups == [("guided", s) for s in ("S1", "S2", "total")] + [("random", s) for s in ("S1", "total")]
-    assert sheets[2].lines == (("guided", "H1", "fcw", 1), ("random", "H1", "none", 1))
+    told = [(*line[:3], str(line[3]).split(";")[0]) for line in sheets[2].lines]
+    assert told == [
+        ("guided", "H1", "fcw", "100.0 % (1/1"),
+        ("guided", "H1", "any", "100.0 % (1/1"),
+        ("guided", "H1", "none", "0.0 % (0/1"),
+        ("random", "H1", "any", "0.0 % (0/1"),
+        ("random", "H1", "none", "100.0 % (1/1"),
+    ]
