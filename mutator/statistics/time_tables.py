@@ -75,8 +75,8 @@ def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
     return Sheet(
         name="alerts_before_hazards",
         title="Alerts before hazards",
-        note="Of the runs with a hazard, those in which an alert came before it, with 95 % Wilson intervals. A "
-        "run with several alerts is in several lines; `any` and `none` are of all alerts.",
+        note="Of the runs with a hazard, those in which an alert came before it, with 95 % Wilson intervals. "
+        "A run with several alerts is in several lines; `any` and `none` are of all alerts.",
         heads=("method", "hazard", "alert", "came before it"),
         lines=tuple(lines),
     )
