@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator import golden, mutant, planfile
+from mutator import check_cache, golden, mutant, planfile
 from mutator.check_rules import CheckRun, judge_golden, judge_null, judge_same
 from mutator.engine import Execution, Job, ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
@@ -50,7 +50,8 @@ def measured_cpu_s(folder: RunFolder) -> float | None:
 def run_checks(
     workspace: Workspace, folder: RunFolder, *, workers: int = 1, notify: Notify | None = None
 ) -> tuple[CheckResult, ...]:
-    """Run the checks unless they are known to pass for these very sources; results stay in checks.json.
+    """Run the checks unless they are known to pass for these very sources, in this folder or in another one
+    of this machine; results stay in checks.json.
 
     Also leaves the golden runs in the folder. CheckFailed (after all ran) when any fails.
     """
@@ -68,6 +69,7 @@ def run_checks(
             where=folder.path / FILE,
             remedy="mend target, templates or canary; the campaign does not start before all pass",
         )
+    check_cache.store(check_cache.entry(checks.digest), folder.path, FILE)
     return results
 
 
@@ -88,18 +90,35 @@ class _Checks:
         )
         self.hazard: str = head["canary_hazard"]
         now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
+        self.variants = {fault.spec: fault for fault in planfile.read_faults(folder.path).values()}
+        places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
         content = [now, versions(), head["goldens"], self.seed, self.canary.id, self.hazard, head["limits"]]
-        self.digest = digest(content)
+        self.digest = digest([*content, places])
 
     def known(self) -> tuple[CheckResult, ...] | None:
-        """Results of an earlier time, if all passed and the golden runs are still there as they were."""
-        before = self._before()
-        if before is None or before["digest"] != self.digest:
+        """Results of an earlier time, here or in another folder, if all passed and the golden runs are still
+        as they were; they are then here."""
+        if (results := self._passed(self._before(), self.folder.path)) is not None:
+            return results
+        place = check_cache.entry(self.digest)
+        try:
+            found = read_json(place / FILE, SCHEMA)
+            results = self._passed(found, place)
+        except (MutatorError, KeyError, TypeError, AttributeError):
+            return None  # none is there, or a damaged one
+        if results is not None:
+            self._check_same_as_before(found["goldens"])
+            with full_disk_told(self.folder.path):
+                check_cache.copy(place, self.folder.path, FILE)
+        return results
+
+    def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
+        if said is None or said["digest"] != self.digest:
             return None
-        for key, expected in before["goldens"].items():
-            if _digest_of(self.manifest, self.folder.path / "golden" / key) != expected:
-                return None
-        results = tuple(CheckResult(**result) for result in before["results"])
+        keys = [golden_key(*key) for key in self.keys]
+        if any(_digest_of(self.manifest, place / "golden" / key) != said["goldens"][key] for key in keys):
+            return None
+        results = tuple(CheckResult(**result) for result in said["results"])
         return results if all(result.passed for result in results) else None
 
     def run(self, workers: int, notify: Notify) -> Iterator[CheckResult]:
@@ -254,9 +273,8 @@ class _Checks:
 
     def _anchors(self) -> CheckResult:
         """Each variant of the plan finds its statements (not compiling is a result, told later)."""
-        variants = {fault.spec: fault for fault in planfile.read_faults(self.folder.path).values()}
         problems: dict[str, list[str]] = {}
-        for fault in variants.values():
+        for fault in self.variants.values():
             try:
                 mutant.build(self.manifest, self.models, fault, always())
             except InvalidMutant:
@@ -264,7 +282,7 @@ class _Checks:
             except MutatorError as err:
                 problems.setdefault(str(err), []).append(fault.spec)
         text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
-        return _result("anchors", text, f"{len(variants)} variants found their statements")
+        return _result("anchors", text, f"{len(self.variants)} variants found their statements")
 
 
 def _result(name: str, problem: str, found: str) -> CheckResult:
