@@ -86,7 +86,7 @@ def plot_run(
     for axis, channel in zip(axes, channels, strict=True):
         _panel(axis, channel, (golden[time], golden[channel.name]), (faulty[time], faulty[channel.name]))
     _decorate(figure, axes, title, tuple(marks))
-    _save(figure, paths)
+    save(figure, paths)
 
 
 def _figure(rows: int) -> tuple["Figure", list["Axes"]]:
@@ -134,7 +134,8 @@ def _decorate(figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mar
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
 
 
-def _save(figure: "Figure", paths: Sequence[Path]) -> None:
+def save(figure: "Figure", paths: Sequence[Path]) -> None:
+    """Write a figure into each of `paths` (.svg or .png by suffix), the same bytes each time."""
     import matplotlib
 
     # A salt and no date: the same run draws the same SVG.

@@ -1,4 +1,4 @@
-"""The report of a run: REPORT.md, and one HTML page that needs nothing but itself, its patches and plots.
+"""The report of a run: REPORT.md, and one HTML page that needs nothing but its figures, patches and plots.
 
 Written from results.csv and the run folder, so it can be made again at any time, the same each time; the
 published numbers that statistics stand beside come from the library.
@@ -17,6 +17,7 @@ from mutator.runfolder import RunFolder
 from mutator.tables import Count, Row
 
 if TYPE_CHECKING:
+    from mutator.figures.figures import Drawing
     from mutator.statistics.sheet import Sheet
 
 FOLDER = "report"
@@ -60,14 +61,17 @@ class Content:
     outcomes: dict[str, int]
     tables: list[Table]
     statistics: "tuple[Sheet, ...]"  # written as files of their own, too
+    figures: "tuple[Drawing, ...]"  # written as files that the report shows
     failed: list[Row]  # runs that did not end well, harness errors first
     experiments: list[Line]
 
 
 def write(run: Path) -> Report:
     """Write the report of a run folder whose results.csv is up to date."""
+    from mutator.figures import figures
     from mutator.report_page import markdown, page
     from mutator.statistics import sheets
+    from mutator.statistics.frame import load
 
     folder = RunFolder.open(run)
     rows = tables.read_results(run / "results.csv")
@@ -75,14 +79,21 @@ def write(run: Path) -> Report:
     out.mkdir(exist_ok=True)
     statistics = sheets.run_sheets(folder)
     sheets.write(statistics, out)
-    content = _content(folder, rows, statistics)
+    drawings = figures.drawings(load(run / "results.csv"))
+    figures.write(drawings, out)
+    content = _content(folder, rows, statistics, drawings)
     report = Report(markdown=out / "REPORT.md", page=out / "index.html", rows=len(rows))
     write_atomic(report.markdown, markdown(content).encode())
     write_atomic(report.page, page(content).encode())
     return report
 
 
-def _content(folder: RunFolder, rows: Sequence[Row], statistics: "tuple[Sheet, ...]") -> Content:
+def _content(
+    folder: RunFolder,
+    rows: Sequence[Row],
+    statistics: "tuple[Sheet, ...]",
+    drawings: "tuple[Drawing, ...]",
+) -> Content:
     failed = [r for r in rows if r.status is not Status.OK]
     return Content(
         name=str(folder.head["campaign"]),
@@ -90,6 +101,7 @@ def _content(folder: RunFolder, rows: Sequence[Row], statistics: "tuple[Sheet, .
         outcomes=tables.outcome_counts(rows),
         tables=_tables(rows),
         statistics=statistics,
+        figures=drawings,
         failed=sorted(
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),

@@ -21,6 +21,10 @@ def markdown(content: "Content") -> str:
     for table in content.tables:
         parts += [f"## {table.title}", markdown_table(table.heads, table.lines)]
     parts += [sheet.markdown().rstrip() for sheet in content.statistics]
+    if content.figures:
+        parts.append("## Figures")
+    for drawing in content.figures:
+        parts += [f"### {drawing.title}", drawing.note, f"![{drawing.title}]({drawing.link('svg')})"]
     if content.failed:
         parts += ["## Runs that did not end well", _failed_text(content)]
     parts += [
@@ -84,7 +88,8 @@ PAGE = """\
 <style>
 :root { color-scheme: light dark; --line: #8886; --shade: #8881; }
 body { font: 15px/1.45 system-ui, sans-serif; margin: 1.5rem auto; max-width: 78rem; padding: 0 1rem; }
-h1, h2 { line-height: 1.2; }
+h1, h2, h3 { line-height: 1.2; }
+img { max-width: 100%; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
@@ -123,6 +128,14 @@ code { font-size: .9em; }
 {% endfor %}
 </table></div>
 {% endfor %}
+{% if content.figures %}
+<h2>Figures</h2>
+{% for drawing in content.figures %}
+<h3>{{ drawing.title }}</h3>
+<p>{{ drawing.note }}</p>
+<a href="{{ drawing.link("png") }}"><img src="{{ drawing.link("svg") }}" alt="{{ drawing.title }}"></a>
+{% endfor %}
+{% endif %}
 {% if content.failed %}
 <h2>Runs that did not end well</h2>
 <div class="scroll"><table>

@@ -68,7 +68,7 @@ def run(tmp_path: Path) -> Path:
 class Page(HTMLParser):
     """Text and links of a page; fails on tags that are not closed in order."""
 
-    VOID = ("meta", "link", "br")
+    VOID = ("meta", "link", "br", "img")
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -147,3 +147,15 @@ def test_no_report_without_a_run(tmp_path: Path) -> None:
     """A folder that is no run folder is the user's error."""
     with pytest.raises(MutatorError, match="no run folder"):
         report.write(tmp_path)
+
+
+def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
+    """Two fault types and two scenarios: three figures, in the Markdown and the page, all of them there."""
+    with (run / "results.csv").open("a", newline="") as file:
+        other = OK | {"experiment_id": "3" * 16, "fault_type": "jamming", "scenario": "S2"}
+        csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="").writerow(other)
+    written = report.write(run)
+    shown = [link for link in Page(written.page.read_text()).links if link.startswith("figures/")]
+    assert len(shown) == 6
+    assert all((run / "report" / link).is_file() for link in shown)
+    assert written.markdown.read_text().count("](figures/") == 3

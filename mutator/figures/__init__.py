@@ -1,0 +1,1 @@
+"""What the results of a campaign look like: figures drawn from a frame of results."""

@@ -1,0 +1,85 @@
+"""The figures of a run: chosen by what there is to compare, written as SVG and PNG."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FOLDER = "figures"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """One figure. `name` is its files', `note` says what is shown."""
+
+    name: str
+    title: str
+    note: str
+    figure: "Figure"
+
+    def link(self, suffix: str) -> str:
+        """Where the report finds it; `suffix` is svg or png."""
+        return f"{FOLDER}/{self.name}.{suffix}"
+
+
+def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
+    """The figures of a frame of results; none of what has nothing to be compared with."""
+    kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
+    made = []
+    if kinds > 1:
+        made.append(_hazards(frame))
+    if scenarios > 1:
+        made.append(_propagation(frame))
+    if kinds > 1 and scenarios > 1:
+        made.append(_heat_map(frame))
+    return tuple(made)
+
+
+def write(made: Sequence[Drawing], out: Path) -> None:
+    """Write each figure into `out`/figures as <name>.svg and <name>.png."""
+    if not made:  # no matplotlib for nothing: it takes a second to load
+        return
+    from mutator.plots import save
+
+    for drawing in made:
+        save(drawing.figure, [out / drawing.link(suffix) for suffix in ("svg", "png")])
+
+
+def _hazards(frame: pd.DataFrame) -> Drawing:
+    from mutator.figures.hazards import draw
+
+    return Drawing(
+        name="hazards_by_fault_type",
+        title="Hazards by fault type",
+        note="Left: runs with a hazard, of all injected. Right: their share of the activated faults; a fault "
+        "type without a mark was never activated.",
+        figure=draw(frame),
+    )
+
+
+def _propagation(frame: pd.DataFrame) -> Drawing:
+    from mutator.figures.propagation import draw
+
+    return Drawing(
+        name="propagation_by_scenario",
+        title="Propagation times by scenario",
+        note="From event to event, in the runs that had both (their number stands above). Alert to hazard: "
+        "where the alert came first. Runs that ended before the second event are not shown.",
+        figure=draw(frame),
+    )
+
+
+def _heat_map(frame: pd.DataFrame) -> Drawing:
+    from mutator.figures.heat_map import draw
+
+    return Drawing(
+        name="fault_type_by_scenario",
+        title="Fault type and scenario",
+        note="Runs with a hazard / activated faults. An empty cell was never activated.",
+        figure=draw(frame),
+    )

@@ -1,0 +1,109 @@
+"""Hazards by fault type: how many and which, and of what share of the activated faults."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from mutator.figures import style
+from mutator.statistics.frame import hazard_names
+from mutator.statistics.share import share
+from mutator.statistics.tally import Tally, by_kind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SEVERAL = "several"
+
+
+def hazard_sets(frame: pd.DataFrame) -> pd.Series:
+    """The hazard of each run with just one, `several` of one with more, empty of one without."""
+    names = hazard_names(frame)
+    had = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
+    found = [
+        SEVERAL if row.sum() > 1 else next((n for n, h in zip(names, row, strict=True) if h), "")
+        for row in had
+    ]
+    return pd.Series(found, index=frame.index, dtype=str)
+
+
+def draw(frame: pd.DataFrame) -> "Figure":
+    """A panel of counts for each method, and one of hazards per activated fault with 95 % intervals."""
+    tallies = by_kind(frame)
+    methods = sorted({method for method, _ in tallies})
+    hazards = frame.groupby("kind")["is_hazard"].sum()
+    kinds = sorted(hazards.index, key=lambda kind: (-hazards[kind], kind))
+    figure, axes = style.blank(1.5 + 0.33 * len(kinds), 1, len(methods) + 1, sharey=True)
+    most = max(1, *(tallies[key].hazards for key in tallies))
+    for axis, method in zip(axes, methods, strict=False):
+        _counts(axis, frame[frame["method"] == method], kinds)
+        axis.set_title(f"{method}: runs with a hazard", fontsize=style.TEXT, loc="left")
+        axis.set_xlim(0, 1.3 * most)
+    axes[0].set_yticks(range(len(kinds)), kinds)
+    axes[0].set_ylim(len(kinds) - 0.4, -0.6)
+    _coverage(axes[-1], tallies, methods, kinds)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=6, fontsize=style.SMALL, frameon=False)
+    handles, labels = axes[-1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower right", ncols=4, fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+def _counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
+    """Bars of hazards, cut by which ones; at their ends the count and how many were injected."""
+    names = hazard_names(frame)
+    counts = pd.crosstab(frame["kind"], hazard_sets(frame)).reindex(kinds, fill_value=0)
+    injected = frame["kind"].value_counts().reindex(kinds, fill_value=0)
+    left = [0] * len(kinds)
+    for i, name in enumerate((*names, SEVERAL)):
+        colour = (
+            style.SEVERAL_COLOUR if name == SEVERAL else style.HAZARD_COLOURS[i % len(style.HAZARD_COLOURS)]
+        )
+        width = counts[name].tolist() if name in counts else [0] * len(kinds)
+        label = "more than one" if name == SEVERAL else f"{name} alone"
+        axis.barh(
+            range(len(kinds)), width, 0.7, left, color=colour, edgecolor=style.INK, linewidth=0.5, label=label
+        )
+        left = [a + b for a, b in zip(left, width, strict=True)]
+    for i, (count, of) in enumerate(zip(left, injected, strict=True)):
+        axis.annotate(
+            f"{count} of {of}",
+            (count, i),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=style.SMALL,
+        )
+    axis.locator_params(axis="x", integer=True)
+    axis.set_xlabel("runs", fontsize=style.TEXT)
+
+
+def _coverage(
+    axis: "Axes", tallies: dict[tuple[str, str], Tally], methods: Sequence[str], kinds: Sequence[str]
+) -> None:
+    for m, method in enumerate(methods):
+        colour, marker = style.look(m)
+        height = 0.18 * (2 * m - len(methods) + 1)
+        told = [(i, tallies[method, kind]) for i, kind in enumerate(kinds) if (method, kind) in tallies]
+        shares = [(i + height, share(t.hazards, t.activated)) for i, t in told if t.activated]
+        rates = [100 * s.rate for _, s in shares]
+        ends = [
+            [max(0.0, 100 * (s.rate - s.low)) for _, s in shares],
+            [max(0.0, 100 * (s.high - s.rate)) for _, s in shares],
+        ]
+        axis.errorbar(
+            rates,
+            [y for y, _ in shares],
+            xerr=ends,
+            fmt=marker,
+            color=colour,
+            markersize=4,
+            elinewidth=1.2,
+            label=method,
+        )
+    axis.set_title("hazards per activated fault", fontsize=style.TEXT, loc="left")
+    axis.set_xlim(-3, 103)
+    axis.set_xlabel("% (95 % Wilson interval)", fontsize=style.TEXT)
+    axis.grid(visible=True, linewidth=0.4, alpha=0.5)
+    axis.set_axisbelow(True)

@@ -1,0 +1,55 @@
+"""Fault type x scenario: where the hazards are."""
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from mutator.figures import style
+from mutator.statistics.tally import tally
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+
+COLOURS = "cividis"  # even in lightness, the same to colour-blind readers
+DARK_BELOW = 50.0  # %: text is white on a cell that is darker than this, else black
+
+
+def draw(frame: pd.DataFrame) -> "Figure":
+    """A panel for each method: hazards per activated fault as colour, both counts as text."""
+    kinds, scenarios = sorted(frame["kind"].unique()), sorted(frame["scenario"].unique())
+    methods = sorted(frame["method"].unique())
+    figure, axes = style.blank(1.3 + 0.36 * len(kinds), 1, len(methods), sharey=True)
+    for axis, method in zip(axes, methods, strict=True):
+        image = _panel(axis, frame[frame["method"] == method], kinds, scenarios)
+        axis.set_title(str(method), fontsize=style.TEXT, loc="left")
+    axes[0].set_yticks(range(len(kinds)), kinds)
+    bar = figure.colorbar(image, ax=axes, fraction=0.03, pad=0.02)
+    bar.set_label("hazards per activated fault, %", fontsize=style.TEXT)
+    bar.ax.tick_params(labelsize=style.SMALL)
+    return figure
+
+
+def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[str]) -> "AxesImage":
+    """Cells where nothing was activated stay empty but for their text."""
+    import numpy as np
+
+    groups = {(str(k), str(s)): tally(group) for (k, s), group in frame.groupby(["kind", "scenario"])}
+    rates = np.full((len(kinds), len(scenarios)), np.nan)
+    for (kind, scenario), found in groups.items():
+        place = kinds.index(kind), scenarios.index(scenario)
+        if found.activated:
+            rates[place] = 100 * found.hazards / found.activated
+        axis.text(
+            place[1],
+            place[0],
+            f"{found.hazards}/{found.activated}",
+            ha="center",
+            va="center",
+            fontsize=style.SMALL,
+            color="white" if rates[place] < DARK_BELOW else "black",
+        )
+    axis.set_xticks(range(len(scenarios)), scenarios)
+    axis.spines[:].set_visible(False)
+    return axis.imshow(rates, cmap=COLOURS, vmin=0, vmax=100, aspect="auto")

@@ -1,0 +1,63 @@
+"""Propagation times by scenario: how long a fault takes from event to event."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from mutator.figures import style
+from mutator.statistics.times import Spread, propagation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def draw(frame: pd.DataFrame) -> "Figure":
+    """A panel for each step of a fault's way: quartiles, median, mean and number of runs."""
+    methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
+    spreads = {(m, s): propagation(group) for (m, s), group in frame.groupby(["method", "scenario"])}
+    steps = list(next(iter(spreads.values())))
+    figure, axes = style.blank(6.2, 2, 2)
+    for axis, step in zip(axes, steps, strict=True):
+        for m, method in enumerate(methods):
+            offset = 0.36 * (m - (len(methods) - 1) / 2)
+            told = [(i + offset, spreads.get((method, s))) for i, s in enumerate(scenarios)]
+            _method(axis, [(x, spread[step]) for x, spread in told if spread], m, str(method))
+        axis.set_title(step, fontsize=style.TEXT, loc="left")
+        axis.set_xticks(range(len(scenarios)), scenarios)
+        axis.set_xlim(-0.6, len(scenarios) - 0.4)
+        axis.set_ylabel("s", fontsize=style.TEXT)
+        top = axis.dataLim.y1 if axis.has_data() else 1.0
+        axis.set_ylim(0, 1.2 * max(top, 0.01))
+        axis.grid(visible=True, axis="y", linewidth=0.4, alpha=0.5)
+        axis.set_axisbelow(True)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=style.SMALL, frameon=False)
+    return figure
+
+
+def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], m: int, method: str) -> None:
+    """A bar from quartile to quartile, a line at the median, a marker at the mean, the number above."""
+    colour, marker = style.look(m)
+    known = [(x, spread) for x, spread in spreads if spread.n]
+    xs = [x for x, _ in known]
+    lower = [s.lower for _, s in known]
+    upper = [s.upper for _, s in known]
+    height = [b - a for a, b in zip(lower, upper, strict=True)]
+    axis.bar(
+        xs, height, 0.28, lower, color=colour, alpha=0.35, edgecolor=colour, label=f"{method}: quartiles"
+    )
+    medians = [s.median for _, s in known]
+    axis.plot(xs, medians, "_", color=colour, markersize=17, markeredgewidth=2.2, label=f"{method}: median")
+    means = [s.mean for _, s in known]
+    axis.plot(xs, means, marker, color=style.INK, markersize=4, label=f"{method}: mean", linestyle="none")
+    for x, s in known:
+        axis.annotate(
+            str(s.n),
+            (x, max(s.upper, s.mean)),
+            xytext=(0, 4),
+            textcoords="offset points",
+            ha="center",
+            fontsize=style.SMALL,
+        )

@@ -1,0 +1,37 @@
+"""How the figures of a report look alike: colours, sizes, the empty page they are drawn on.
+
+Colours are those of Okabe and Ito, told apart by colour-blind readers; methods differ in their markers, too.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 11.0  # inches
+TEXT, SMALL = 9, 8  # points
+INK = "#222222"
+HAZARD_COLOURS = ("#d55e00", "#f0e442", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
+SEVERAL_COLOUR = "#444444"
+# guided, random, and whatever another method is called: colour, marker
+METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7", "D"))
+
+
+def look(i: int) -> tuple[str, str]:
+    """Colour and marker of the i-th method."""
+    return METHOD_LOOKS[i % len(METHOD_LOOKS)]
+
+
+def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tuple["Figure", list["Axes"]]:
+    """A figure of `height` inches with its axes, row after row."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = list(figure.subplots(rows, columns, squeeze=False, sharey=sharey).flat)
+    for axis in axes:
+        axis.tick_params(labelsize=TEXT, length=0)
+        axis.spines[["top", "right"]].set_visible(False)
+    return figure, axes

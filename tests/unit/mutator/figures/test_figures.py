@@ -1,0 +1,95 @@
+"""The figures of a run's results."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from mutator.figures import hazards, heat_map, propagation
+from mutator.figures.figures import drawings, write
+
+from ..statistics.results_frame import results
+
+RUN = {"t_activation": 5.0, "t_manifest": 5.5, "t_alert": 6.0}
+H1, H2 = {"t_h1": 9.0}, {"t_h2": 8.0}
+BLUR = {"module": "vision_input", "fault_type": "blur"}
+
+
+@pytest.fixture
+def frame() -> pd.DataFrame:
+    """Chaff: H1, H1 with H2, none, not activated; blur in S2: never activated when guided, H2 at random."""
+    return results(
+        RUN | H1,
+        RUN | H1 | H2,
+        RUN,
+        {},
+        BLUR | {"scenario": "S2"},
+        RUN | H2 | BLUR | {"scenario": "S2", "method": "random"},
+    )
+
+
+def texts(file: Path) -> list[str]:
+    return ["".join(e.itertext()) for e in ET.parse(file).getroot().iter("{http://www.w3.org/2000/svg}text")]
+
+
+def test_a_run_has_one_hazard_several_or_none(frame: pd.DataFrame) -> None:
+    """The sets by which a bar is cut: every run is in one of them."""
+    assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
+
+
+def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
+    """Bars are as long as the counts, labelled with the injected; a type never activated has no rate."""
+    figure = hazards.draw(frame)
+    guided, _, rates = figure.axes
+    widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
+    assert widths == {"H1 alone": [1, 0], "H2 alone": [0, 0], "H3 alone": [0, 0], "more than one": [1, 0]}
+    assert [text.get_text() for text in guided.texts] == ["2 of 4", "0 of 1"]
+    drawn = {c.get_label(): list(c.lines[0].get_xdata()) for c in rates.containers}
+    assert drawn == {"guided": [pytest.approx(200 / 3)], "random": [100]}
+
+
+def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.DataFrame) -> None:
+    """Colour is hazards per activated fault; where there is none the cell has no colour."""
+    guided = heat_map.draw(frame).axes[0]
+    assert sorted(text.get_text() for text in guided.texts) == ["0/0", "2/3"]
+    cells = guided.images[0].get_array()
+    assert cells[0, 0] == pytest.approx(200 / 3)
+    assert cells.mask.tolist() == [[False, True], [True, True]]
+
+
+def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None:
+    """Each panel has a bar where there is such a run, with their number; the mean is where it belongs."""
+    panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
+    assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
+    assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
+    means = {line.get_label(): list(line.get_ydata()) for line in panels["alert to hazard"].lines}
+    assert means["guided: mean"] == [2.5]
+    assert means["random: mean"] == [2.0]
+
+
+def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> None:
+    """SVG and PNG of a figure, the same bytes when drawn again; names are text in the SVG."""
+    contents = []
+    for _ in range(2):
+        write(drawings(frame)[:1], tmp_path)
+        contents.append({file.name: file.read_bytes() for file in (tmp_path / "figures").iterdir()})
+    assert contents[0] == contents[1]
+    assert len(contents[0]) == 2
+    assert "vision_input/blur" in texts(tmp_path / "figures" / "hazards_by_fault_type.svg")
+
+
+def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> None:
+    """One fault type has no figure of fault types, one scenario none of scenarios, no results none."""
+    chaff, blur = frame[frame["kind"] == "radar/chaff"], frame[frame["scenario"] == "S2"]
+    assert drawings(chaff) == drawings(blur) == drawings(frame[:0]) == ()
+    one_scenario = frame.assign(scenario="S1")
+    assert [drawing.name for drawing in drawings(one_scenario)] == ["hazards_by_fault_type"]
+    assert [d.name for d in drawings(frame.assign(kind="a/b"))] == ["propagation_by_scenario"]
+
+
+def test_runs_without_any_hazard_or_time_are_drawn(frame: pd.DataFrame, tmp_path: Path) -> None:
+    """A campaign in which nothing happened has its figures, too."""
+    nothing = results({}, BLUR | {"scenario": "S2"})
+    write(drawings(nothing), tmp_path)
+    assert len(list((tmp_path / "figures").iterdir())) == 6
