@@ -28,7 +28,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.ids import digest
 from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
-from mutator.model import Status
+from mutator.model import Record, Status
 from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
 from mutator.provenance import check_sources, sources
 from mutator.records import Progress, Tail, label, read_records
@@ -102,6 +102,7 @@ class Session:
         self.interrupted = False
         self._began = time.monotonic()
         self._done_before = 0
+        self._records: dict[str, Record] | None = None
 
     def prepare(self) -> None:
         """Find what is left to run; if anything is, pass the checks and lay out the pristine tree."""
@@ -113,6 +114,7 @@ class Session:
             manifest = self.workspace.manifest(self.folder.head["target"])
             prepare_base(manifest, self.folder.base)
         self.pending = left
+        self._records = None if left else records
 
     def worker_name(self, name: str) -> str:
         """Name of a worker's files, used by no session before this one."""
@@ -133,12 +135,12 @@ class Session:
     def finish(self) -> Summary:
         """Build the table from what there is now, and say what the run has come to."""
         self.notify(Progress(stage="results"))
-        records = read_records(self.folder.path)
+        records = read_records(self.folder.path) if self._records is None else self._records
         wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
         done = len(records) - len(wrong)
         built = None
         try:
-            built = results.build(self.folder.path)
+            built = results.ensure(self.folder.path)
         except DiskFull as err:  # the records are there, the table can be made any time
             self.problem = self.problem or str(err)
         return Summary(

@@ -17,6 +17,7 @@ from mutator.verdict import reaction_time
 if TYPE_CHECKING:
     import pyarrow as pa  # type: ignore[import-untyped]
 
+_DERIVED = ("results.csv", "results.parquet", "timings.parquet")
 _EXTRA = ("variant", "aim", "condition", "detail")
 _HAZARDS = ("H1", "H2", "H3")
 _FLAGS = ("activated", "manifested")
@@ -67,6 +68,18 @@ def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
 
 def _time(value: float | None) -> float | None:
     return None if value is None else round(value, _TIME_DIGITS)
+
+
+def ensure(run: Path) -> Path:
+    """results.csv of a run folder: as it is when all derived files are newer than all they are made from,
+    else built."""
+    derived = [run / name for name in _DERIVED]
+    if all(path.is_file() for path in derived):
+        made_from = [run / "run.json", *run.glob("records/*.jsonl"), *run.glob("timings/*.jsonl")]
+        oldest = min(path.stat().st_mtime_ns for path in derived)
+        if all(path.stat().st_mtime_ns < oldest for path in made_from):
+            return derived[0]
+    return build(run)
 
 
 def build(run: Path) -> Path:

@@ -1,6 +1,7 @@
 """The results table: its columns, its cells, its bytes."""
 
 import csv
+import os
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -164,3 +165,21 @@ def test_tables_are_the_same_bytes_each_time(folder: RunFolder) -> None:
     two.rename(two.with_name("0002-x.jsonl"))
     results.build(folder.path)
     assert [table.read_bytes() for table in tables] == before
+
+
+@pytest.mark.parametrize("changed", ["records/0001-main.jsonl", "run.json", "results.parquet", None])
+def test_tables_are_built_when_they_are_old_or_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str | None
+) -> None:
+    """Derived files newer than what they are made from stay as they are; else they are built."""
+    monkeypatch.setattr(results, "build", lambda run: run / "built")
+    (tmp_path / "records").mkdir()
+    names = ("run.json", "records/0001-main.jsonl", "results.csv", "results.parquet", "timings.parquet")
+    for second, name in enumerate(names, start=1):
+        (tmp_path / name).write_text("")
+        os.utime(tmp_path / name, (second, second))
+    if changed == "results.parquet":
+        (tmp_path / changed).unlink()
+    elif changed is not None:
+        os.utime(tmp_path / changed, (3, 3))
+    assert results.ensure(tmp_path) == tmp_path / ("built" if changed else "results.csv")
