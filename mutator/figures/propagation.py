@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
+from mutator.model import Method
 from mutator.statistics.times import Spread, propagation
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
         for m, method in enumerate(methods):
             offset = 0.36 * (m - (len(methods) - 1) / 2)
             told = [(i + offset, spreads.get((method, s))) for i, s in enumerate(scenarios)]
-            _method(axis, [(x, spread[step]) for x, spread in told if spread], m, str(method))
+            _method(axis, [(x, spread[step]) for x, spread in told if spread], str(method))
         axis.set_title(step, fontsize=style.TEXT, loc="left")
         axis.set_xticks(range(len(scenarios)), scenarios)
         axis.set_xlim(-0.6, len(scenarios) - 0.4)
@@ -37,9 +38,9 @@ def draw(frame: pd.DataFrame) -> "Figure":
     return figure
 
 
-def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], m: int, method: str) -> None:
+def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) -> None:
     """A bar from quartile to quartile, a line at the median, a marker at the mean, the number above."""
-    colour, marker = style.look(m)
+    colour, marker = style.METHOD_LOOKS[Method(method)]
     known = [(x, spread) for x, spread in spreads if spread.n]
     xs = [x for x, _ in known]
     lower = [s.lower for _, s in known]

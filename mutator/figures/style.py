@@ -5,6 +5,8 @@ Colours are those of Okabe and Ito, told apart by colour-blind readers; methods 
 
 from typing import TYPE_CHECKING
 
+from mutator.model import Method
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -14,13 +16,8 @@ TEXT, SMALL = 9, 8  # points
 INK = "#222222"
 HAZARD_COLOURS = ("#d55e00", "#f0e442", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
 SEVERAL_COLOUR = "#444444"
-# guided, random, and whatever another method is called: colour, marker
-METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7", "D"))
-
-
-def look(i: int) -> tuple[str, str]:
-    """Colour and marker of the i-th method."""
-    return METHOD_LOOKS[i % len(METHOD_LOOKS)]
+# colour and marker: a method looks the same in every report, also where it is alone
+METHOD_LOOKS = {Method.GUIDED: ("#0072b2", "o"), Method.RANDOM: ("#d55e00", "s")}
 
 
 def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tuple["Figure", list["Axes"]]:
