@@ -29,7 +29,7 @@ class Progress:
     done: int = 0
     total: int = 0
     outcomes: Counter[str] = field(default_factory=Counter)
-    elapsed_s: float = 0.0
+    per_s: float | None = None  # experiments a second since this command began
     remaining_s: float | None = None
 
 
@@ -174,14 +174,14 @@ class Tail:
         """Where the run is now; the remaining time comes from the rate since this Tail was made."""
         self._read()
         done, elapsed = len(self._labels), time.monotonic() - self._began
-        gained = done - self._before
+        per_s = (done - self._before) / elapsed if done > self._before else None
         return Progress(
             stage="experiments",
             done=done,
             total=self._total,
             outcomes=Counter(self._labels.values()),
-            elapsed_s=elapsed,
-            remaining_s=(self._total - done) * elapsed / gained if gained else None,
+            per_s=per_s,
+            remaining_s=(self._total - done) / per_s if per_s else None,
         )
 
     def _read(self) -> None:

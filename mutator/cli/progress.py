@@ -40,12 +40,13 @@ def _live(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
         TextColumn("{task.description}"),
         BarColumn(bar_width=24),
         TextColumn("{task.fields[count]}"),
+        TextColumn("{task.fields[rate]}"),
         TextColumn("{task.fields[outcomes]}"),
         TimeElapsedColumn(),
         TextColumn("{task.fields[remaining]}"),
     )
     with Bars(*columns, console=terminal.err, transient=True) as bars:
-        task = bars.add_task("starting", total=None, count="", outcomes="", remaining="")
+        task = bars.add_task("starting", total=None, count="", rate="", outcomes="", remaining="")
 
         def notify(progress: "Progress") -> None:
             bars.update(
@@ -54,6 +55,7 @@ def _live(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
                 completed=progress.done,
                 total=progress.total or 1,  # a stage without a count has an empty bar
                 count=count(progress),
+                rate=rate(progress),
                 outcomes=endings(progress.outcomes) or progress.detail,
                 remaining=remaining(progress),
             )
@@ -75,13 +77,23 @@ class _Lines:
             return
         self.stage, self.next_s = progress.stage, now + LINE_EVERY_S
         parts = [f"{STAGES.get(progress.stage, progress.stage)} {count(progress)}".rstrip()]
-        parts += [part for part in (endings(progress.outcomes), remaining(progress)) if part]
+        told = (rate(progress), endings(progress.outcomes), remaining(progress))
+        parts += [part for part in told if part]
         self.terminal.note(", ".join(parts))
 
 
 def count(progress: "Progress") -> str:
     """`12/60`, where there is something to count."""
     return f"{progress.done}/{progress.total}" if progress.total else ""
+
+
+def rate(progress: "Progress") -> str:
+    """`1.5 a second` or, where it takes longer, `24.0 a minute`: how fast it goes, when that is known."""
+    if progress.per_s is None:
+        return ""
+    if progress.per_s < 1.0:
+        return f"{60 * progress.per_s:.1f} a minute"
+    return f"{progress.per_s:.1f} a second"
 
 
 def endings(outcomes: Counter[str]) -> str:

@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -63,16 +64,17 @@ def notify_all(notify: Callable[[Progress], None]) -> None:
     """A campaign's progress from begin to end."""
     notify(Progress(stage="checks", done=1, total=7))
     counts = Counter(hazard=2, sdc=1)
-    notify(Progress(stage="experiments", done=3, total=60, outcomes=counts, remaining_s=200.0))
-    notify(Progress(stage="experiments", done=4, total=60, outcomes=counts, remaining_s=195.0))
+    run = Progress(stage="experiments", total=60, outcomes=counts)
+    notify(replace(run, done=3, per_s=0.28, remaining_s=200.0))
+    notify(replace(run, done=4, per_s=1.52, remaining_s=195.0))
 
 
 def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
-    """The bar shows how many are done, the outcomes so far, and the remaining time."""
+    """The bar shows how many are done, how fast, the outcomes so far, and the remaining time."""
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     err = ANSI.sub("", capsys.readouterr().err)
-    for wanted in ("experiments", "4/60", "hazard 2, sdc 1", "3 min 15 s left"):
+    for wanted in ("experiments", "4/60", "1.5 a second", "hazard 2, sdc 1", "3 min 15 s left"):
         assert wanted in err
 
 
@@ -82,7 +84,7 @@ def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
         notify_all(notify)
     assert capsys.readouterr().err.splitlines() == [
         "checks before the campaign 1/7",
-        "experiments 3/60, hazard 2, sdc 1, 3 min 20 s left",
+        "experiments 3/60, 16.8 a minute, hazard 2, sdc 1, 3 min 20 s left",
     ]
 
 

@@ -157,7 +157,7 @@ def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> No
     """Progress counts outcomes of complete lines as they come, each experiment once."""
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
     tail = Tail(tmp_path, total=4)
-    assert (tail.poll().done, tail.poll().remaining_s) == (1, None)
+    assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)
     writer = LineWriter(tmp_path / "records" / "0002-gw0.jsonl", HEAD)
     writer.append(asdict(record("b" * 16, status=Status.HARNESS_ERROR, outcome=None)))
     assert tail.poll().outcomes == {"masked": 1, "harness_error": 1}
@@ -167,5 +167,5 @@ def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> No
     progress = tail.poll()
     assert (progress.done, progress.total) == (2, 4)
     assert progress.outcomes == {"masked": 1, "hazard": 1}
-    assert progress.remaining_s is not None
-    assert progress.remaining_s > 0
+    assert progress.per_s is not None
+    assert progress.remaining_s == 2 / progress.per_s > 0
