@@ -30,8 +30,11 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 
     Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
     that every spec expands in both readings; that every anchor is found in the target exactly once; that one
-    mutant of every shape compiles and un-splices; and that a hazard analysis, if there is one, has no gap.
+    mutant of every shape compiles and un-splices; that published numbers, if any are cited, agree with one
+    another and with the library; and that a hazard analysis, if there is one, has no gap.
     """
+    from mutator.statistics.paper_checks import check_paper  # pandas takes long to import
+
     found = _Found()
     manifest = found.tried(lambda: workspace.manifest(target))
     models = found.tried(workspace.fault_models)
@@ -45,6 +48,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     if manifest and models and found.tried(lambda: build(manifest, models, None, always())):
         for spec in specs:
             found.problems += check_spec(spec, models, manifest) if spec else ()
+    found.problems += check_paper(workspace)
     if not found.problems:
         checked = found.tried(workspace.specs)
         analysis = found.tried(workspace.analysis)

@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator.statistics.tally import Tally
 from mutator.yamlio import Source, StrictModel, read
 
-_FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
+FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,9 +68,9 @@ class _Times(StrictModel):
 
 def load_paper(references: Path) -> Paper:
     """The cited numbers in a folder; MutatorError with file and line for counts that cannot be."""
-    summary, summary_source = read(references / _FILES[0], _Summary, "paper_summary/1")
-    coverage, coverage_source = read(references / _FILES[1], _Coverage, "paper_coverage/1")
-    times, _ = read(references / _FILES[2], _Times, "paper_times/1")
+    summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
+    coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
+    times, _ = read(references / FILES[2], _Times, "paper_times/1")
     by_scenario = {}
     for i, row in enumerate(summary.rows):
         tally = Tally(**row.model_dump(exclude={"method", "scenario"}))
@@ -97,7 +97,7 @@ def load_paper(references: Path) -> Paper:
 
 def has_paper(references: Path) -> bool:
     """Whether the folder cites published numbers."""
-    return all((references / name).is_file() for name in _FILES)
+    return all((references / name).is_file() for name in FILES)
 
 
 def _check(tally: Tally, source: Source, row: int) -> None:
