@@ -102,8 +102,8 @@ def _figure(rows: int) -> tuple["Figure", list["Axes"]]:
 
 def _panel(axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any]) -> None:
     """One channel: golden broad beneath, faulty narrow above, so that equal lines show in both colours."""
-    axis.plot(*map(_finite, golden), color=GOLDEN_COLOUR, linewidth=2.4, alpha=0.55, label="golden")
-    axis.plot(*map(_finite, faulty), color=FAULTY_COLOUR, linewidth=1.1, label="faulty")
+    axis.plot(*map(finite, golden), color=GOLDEN_COLOUR, linewidth=2.4, alpha=0.55, label="golden")
+    axis.plot(*map(finite, faulty), color=FAULTY_COLOUR, linewidth=1.1, label="faulty")
     unit = f"\n[{channel.unit}]" if channel.unit not in ("", "-") else ""
     axis.set_ylabel(channel.name + unit, fontsize=8)
     axis.tick_params(labelsize=8)
@@ -146,7 +146,7 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
             figure.savefig(path, dpi=110, metadata=no_date)
 
 
-def _finite(values: Any) -> Any:
+def finite(values: Any) -> Any:
     """Infinities (time headway at standstill) become gaps; everything else stays."""
     array = np.asarray(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

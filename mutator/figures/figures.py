@@ -15,12 +15,16 @@ FOLDER = "figures"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """One figure. `name` is its files', `note` says what is shown."""
+    """One figure. `name` is its files', `note` says what is shown, or why there is none.
+
+    `codes` are lines to be copied, each with what it is.
+    """
 
     name: str
     title: str
     note: str
-    figure: "Figure"
+    figure: "Figure | None"
+    codes: tuple[tuple[str, str], ...] = ()
 
     def link(self, suffix: str) -> str:
         """Where the report finds it; `suffix` is svg or png."""
@@ -42,12 +46,15 @@ def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
 
 def write(made: Sequence[Drawing], out: Path) -> None:
     """Write each figure into `out`/figures as <name>.svg and <name>.png."""
-    if not made:  # no matplotlib for nothing: it takes a second to load
-        return
     from mutator.plots import save
 
     for drawing in made:
-        save(drawing.figure, [out / drawing.link(suffix) for suffix in ("svg", "png")])
+        paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
+        if drawing.figure is not None:
+            save(drawing.figure, paths)
+        else:  # what an earlier report drew is not of these results
+            for path in paths:
+                path.unlink(missing_ok=True)
 
 
 def _hazards(frame: pd.DataFrame) -> Drawing:

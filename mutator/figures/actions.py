@@ -1,0 +1,173 @@
+"""What an unsafe control action looks like in the traces of a fault-free and a faulty run.
+
+Each `Wanted` has a query that finds the runs in which it may be, and a `Look` that says whether two traces do
+show it, and in which steps.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mutator.golden import Trace
+from mutator.manifest import TargetManifest
+from mutator.model import Record
+
+Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
+
+APPLIED = 0.01  # of full gas or brake: less is none
+WRONG_S = 0.5  # of gas or brake at a wrong time: less is a flicker
+BRAKE_S = 0.1  # of braking that is too short: less is no braking
+SHORT = 0.5  # of the fault-free run's braking time: more is not too short
+RELEASED_S = 1.0  # after the alert: by then gas and brake must be gone
+MISSED_S = 0.1  # of gas, and of braking, that the fault-free run still gives
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """Both runs over the steps that they share.
+
+    `t`: s of simulation, one per step of `step_s`; `golden` and `faulty` have as many values. `start` and
+    `end` bound what is looked at: the fault's activation, and the hazard or the end of the run.
+    """
+
+    t: np.ndarray
+    golden: Trace
+    faulty: Trace
+    step_s: float
+    start: float
+    end: float
+    alert: float | None  # first after the activation
+
+    @classmethod
+    def of(
+        cls, golden: Trace, faulty: Trace, record: Record, manifest: TargetManifest, hazard: str | None
+    ) -> "Pair":
+        """The runs of an experiment whose fault was activated, looked at until `hazard` or the end."""
+        time = manifest.time_channel
+        steps = min(len(golden[time]), len(faulty[time]))
+        t = faulty[time][:steps]
+        assert record.activation is not None  # the query asks for it
+        return cls(
+            t=t,
+            golden={name: values[:steps] for name, values in golden.items()},
+            faulty={name: values[:steps] for name, values in faulty.items()},
+            step_s=manifest.step_s,
+            start=record.activation.first,
+            end=dict(record.hazards)[hazard] if hazard else float(t[-1]),
+            alert=record.alerts[0][1] if record.alerts else None,
+        )
+
+    def applied(self, channel: str) -> tuple[Steps, Steps]:
+        """Steps between `start` and `end` in which golden, and faulty, apply gas or brake."""
+        within = (self.t >= self.start) & (self.t <= self.end)
+        return within & (self.golden[channel] > APPLIED), within & (self.faulty[channel] > APPLIED)
+
+    def seconds(self, steps: Steps) -> float:
+        """How long that many steps last."""
+        return float(steps.sum() * self.step_s)
+
+
+Look = Callable[[Pair], Steps | None]  # the steps that show it; None: they do not show it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """A figure that needs the traces of one experiment."""
+
+    name: str
+    title: str
+    query: str  # over the columns of results.csv: the runs it may be in
+    order: str  # the column they are looked at by, largest first
+    confirmed: str  # what the look finds, in words
+    look: Look
+    actions: tuple[str, ...]  # the channels looked at; their panels are shaded where it is
+    panels: tuple[tuple[str, str], ...]  # (channel, what it is), from the top
+    hazard: str | None  # what the runs lead to; None: they are looked at to their end
+
+
+def brake_too_short(pair: Pair) -> Steps | None:
+    """The steps in which golden brakes and faulty does not, if faulty brakes for half the time at most."""
+    golden, faulty = pair.applied("brake")
+    if not BRAKE_S <= pair.seconds(faulty) <= SHORT * pair.seconds(golden):
+        return None
+    return golden & ~faulty
+
+
+def at_a_wrong_time(channel: str) -> Look:
+    """The steps in which faulty gives gas (or brakes) and golden does not, if they last."""
+
+    def look(pair: Pair) -> Steps | None:
+        golden, faulty = pair.applied(channel)
+        wrong = faulty & ~golden
+        return wrong if pair.seconds(wrong) >= WRONG_S else None
+
+    return look
+
+
+def both_unavailable(pair: Pair) -> Steps | None:
+    """The steps to the end of the run after the last gas or brake of faulty, if that is soon after the alert
+    and golden has use for both."""
+    used = (pair.faulty["gas"] > 0) | (pair.faulty["brake"] > 0)
+    last = pair.t[used].max(initial=pair.start)
+    gone: Steps = pair.t > last
+    missed = [pair.seconds(gone & (pair.golden[name] > APPLIED)) for name in ("gas", "brake")]
+    if pair.alert is None or last > pair.alert + RELEASED_S or min(missed) < MISSED_S:
+        return None
+    return gone
+
+
+_GAS, _BRAKE = ("gas", "gas"), ("brake", "brake")
+_DISTANCE, _SPEED = ("d_rel", "distance"), ("v_ego", "speed")
+_WRONG_DATA = 'module == "radar" and fault_type != "jamming" and status == "ok"'
+WANTED = (
+    Wanted(
+        name="action_brake_too_short",
+        title="Unsafe control action: brake for too short a time",
+        query=f"{_WRONG_DATA} and t_h1 > t_activation",
+        order="max_dev_brake",
+        confirmed=f"between activation and H1 the faulty run brakes, but for at most {SHORT:.0%} of the "
+        "fault-free run's braking time (grey: the fault-free run brakes, the faulty one does not)",
+        look=brake_too_short,
+        actions=("brake",),
+        panels=(_BRAKE, _GAS, _DISTANCE),
+        hazard="H1",
+    ),
+    Wanted(
+        name="action_gas_at_a_wrong_time",
+        title="Unsafe control action: gas at a wrong time",
+        query=f"{_WRONG_DATA} and t_h1 > t_activation",
+        order="max_dev_gas",
+        confirmed=f"between activation and H1 the faulty run gives gas for {WRONG_S} s or more while the "
+        "fault-free run gives none (grey)",
+        look=at_a_wrong_time("gas"),
+        actions=("gas",),
+        panels=(_GAS, _BRAKE, _DISTANCE),
+        hazard="H1",
+    ),
+    Wanted(
+        name="action_brake_at_a_wrong_time",
+        title="Unsafe control action: brake at a wrong time",
+        query=f"{_WRONG_DATA} and t_h2 > t_activation",
+        order="max_dev_brake",
+        confirmed=f"between activation and H2 the faulty run brakes for {WRONG_S} s or more while the "
+        "fault-free run does not (grey)",
+        look=at_a_wrong_time("brake"),
+        actions=("brake",),
+        panels=(_BRAKE, _GAS, _SPEED),
+        hazard="H2",
+    ),
+    Wanted(
+        name="action_unavailable_under_jamming",
+        title="Gas and brake become unavailable under radar jamming",
+        query='module == "radar" and fault_type == "jamming" and status == "ok" and t_alert >= t_activation '
+        "and max_dev_gas > 0",
+        order="max_dev_brake",
+        confirmed=f"from {RELEASED_S:.0f} s after the first alert at the latest the faulty run gives neither "
+        f"gas nor brake any more (grey), while the fault-free run still gives each for {MISSED_S} s or more",
+        look=both_unavailable,
+        actions=("gas", "brake"),
+        panels=(_GAS, _BRAKE, _SPEED),
+        hazard=None,
+    ),
+)
