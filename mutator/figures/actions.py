@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mutator.golden import Trace
-from mutator.manifest import TargetManifest
 from mutator.model import Record
 
 Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
@@ -41,10 +40,12 @@ class Pair:
 
     @classmethod
     def of(
-        cls, golden: Trace, faulty: Trace, record: Record, manifest: TargetManifest, hazard: str | None
+        cls, golden: Trace, faulty: Trace, record: Record, time: str, step_s: float, hazard: str | None
     ) -> "Pair":
-        """The runs of an experiment whose fault was activated, looked at until `hazard` or the end."""
-        time = manifest.time_channel
+        """The runs of an experiment whose fault was activated, looked at until `hazard` or the end.
+
+        `time` is the name of the channel of times.
+        """
         steps = min(len(golden[time]), len(faulty[time]))
         t = faulty[time][:steps]
         assert record.activation is not None  # the query asks for it
@@ -52,7 +53,7 @@ class Pair:
             t=t,
             golden={name: values[:steps] for name, values in golden.items()},
             faulty={name: values[:steps] for name, values in faulty.items()},
-            step_s=manifest.step_s,
+            step_s=step_s,
             start=record.activation.first,
             end=dict(record.hazards)[hazard] if hazard else float(t[-1]),
             alert=record.alerts[0][1] if record.alerts else None,

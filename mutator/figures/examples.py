@@ -53,21 +53,22 @@ def _drawing(folder: RunFolder, frame: pd.DataFrame, workspace: Workspace | None
     if workspace is None:
         return _none(wanted, "no fault library was found here to drive an experiment again with")
     traces = Traces(workspace, folder)
-    recorded = {channel.name for channel in (*traces.manifest.compared, *traces.manifest.plotted)}
+    manifest = traces.manifest
+    recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
     if missing := [name for name in wanted.actions if name not in recorded]:
         return _none(wanted, f"the target records no {missing[0]}")
     looked_at = found.head(LOOKED_AT).to_dict("records")
     for number, row in enumerate(looked_at, start=1):
         record = traces.record(row["experiment_id"])
         golden, faulty = traces.of(record.experiment_id)
-        pair = Pair.of(golden, faulty, record, traces.manifest, wanted.hazard)
+        pair = Pair.of(golden, faulty, record, manifest.time_channel, manifest.step_s, wanted.hazard)
         steps = wanted.look(pair)
         if steps is not None:
             return Drawing(
                 name=wanted.name,
                 title=wanted.title,
                 note=_note(wanted, row, number, len(found)),
-                figure=draw(pair, steps, wanted, marks_of(record), traces.manifest),
+                figure=draw(pair, steps, wanted, marks_of(record), manifest),
                 codes=(
                     (QUERY, wanted.query),
                     (

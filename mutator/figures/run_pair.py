@@ -77,23 +77,27 @@ def _shade(axis: "Axes", t: np.ndarray, steps: Steps) -> None:
 def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
     """A line through all panels for each mark; the names stand above the first, as low as there is room."""
     free: list[float] = []  # where each level of names ends
-    end = axes[0].get_xlim()[1]
+    end, room = axes[0].get_xlim()[1], LABEL_SHARE * width
     for mark in marks:
         for axis in axes:
             axis.axvline(
-                mark.t, color=MARK_COLOURS[mark.kind], linestyle=MARK_LINES[mark.kind], linewidth=1.1
+                mark.t,
+                color=MARK_COLOURS[mark.kind],
+                linestyle=MARK_LINES[mark.kind],
+                linewidth=2.0 if mark.kind is MarkKind.HAZARD else 1.1,
             )
-        begin = min(mark.t, end - LABEL_SHARE * width)  # a name ends where the axis does
+        fits = mark.t + room <= end  # else the name ends at its mark
+        begin = mark.t if fits else mark.t - room
         level = next((i for i, taken in enumerate(free) if taken <= begin), len(free))
-        free[level : level + 1] = [begin + LABEL_SHARE * width]
+        free[level : level + 1] = [begin + room]
         what = f"first alert, {mark.label}" if mark.kind is MarkKind.ALERT else mark.label
         axes[0].annotate(
             f"{what} {mark.t:.2f} s",
-            (mark.t if begin == mark.t else end, 1.0),
+            (mark.t, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 3 + 11 * level),
             textcoords="offset points",
-            ha="left" if begin == mark.t else "right",
+            ha="left" if fits else "right",
             fontsize=style.SMALL,
             color=MARK_COLOURS[mark.kind],
         )
