@@ -1,7 +1,7 @@
 """The report of a run: REPORT.md, and one HTML page that needs nothing but its figures, patches and plots.
 
 Written from results.csv and the run folder, so it can be made again at any time, the same each time; the
-published numbers that statistics stand beside come from the library.
+published numbers and observations that results stand beside come from the library.
 """
 
 import os
@@ -10,15 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator import tables
+from mutator import report_stamp, tables
 from mutator.jsonio import write_atomic
 from mutator.model import Status
 from mutator.runfolder import RunFolder
 from mutator.tables import Count, Row
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from mutator.figures.figures import Drawing
+    from mutator.report_observations import Told
     from mutator.statistics.sheet import Sheet
+    from mutator.workspace import Workspace
 
 FOLDER = "report"
 PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
@@ -58,54 +62,105 @@ class Content:
 
     name: str
     facts: list[tuple[str, str]]
+    planned: str  # how many experiments and runs
     outcomes: dict[str, int]
     tables: list[Table]
+    observations: (
+        "Told | None"  # of the paper; None: the library has none, or none of their fault types is here
+    )
     statistics: "tuple[Sheet, ...]"  # written as files of their own, too
     figures: "tuple[Drawing, ...]"  # written as files that the report shows
     failed: list[Row]  # runs that did not end well, harness errors first
     experiments: list[Line]
 
 
-def write(run: Path) -> Report:
-    """Write the report of a run folder whose results.csv is up to date."""
-    from mutator.figures import figures
+def ensure(run: Path, workspace: "Workspace | None") -> Report:
+    """The report of a run folder: as it is when nothing that it is made from has changed, else written."""
+    folder, out = RunFolder.open(run), run / FOLDER
+    markdown, page = _files(out)
+    stamp = report_stamp.read(out)
+    is_there = markdown.is_file() and page.is_file()
+    if is_there and stamp and stamp["made_from"] == report_stamp.made_from(folder, workspace):
+        return Report(markdown=markdown, page=page, rows=stamp["rows"])
+    return write(run, workspace)
+
+
+def write(run: Path, workspace: "Workspace | None") -> Report:
+    """Write the report of a run folder whose results.csv is up to date.
+
+    What it stands beside comes from the library of `workspace`; without one the results stand alone.
+    """
     from mutator.report_page import markdown, page
+
+    folder = RunFolder.open(run)
+    out = run / FOLDER
+    out.mkdir(exist_ok=True)
+    report_stamp.remove(out)
+    content = _content(folder, out, workspace)
+    text, hypertext = _files(out)
+    write_atomic(text, markdown(content).encode())
+    write_atomic(hypertext, page(content).encode())
+    rows = len(content.experiments)
+    report_stamp.write(out, report_stamp.made_from(folder, workspace), rows)
+    return Report(markdown=text, page=hypertext, rows=rows)
+
+
+def _files(out: Path) -> tuple[Path, Path]:
+    return out / "REPORT.md", out / "index.html"
+
+
+def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Content:
+    """What the report says; its tables and figures are written."""
+    from mutator import report_observations
     from mutator.statistics import sheets
     from mutator.statistics.frame import load
 
-    folder = RunFolder.open(run)
-    rows = tables.read_results(run / "results.csv")
-    out = run / FOLDER
-    out.mkdir(exist_ok=True)
-    statistics = sheets.run_sheets(folder)
+    rows = tables.read_results(folder.path / "results.csv")
+    frame = load(folder.path / "results.csv")
+    statistics = sheets.run_sheets(folder, workspace)
     sheets.write(statistics, out)
-    drawings = figures.drawings(load(run / "results.csv"))
-    figures.write(drawings, out)
-    content = _content(folder, rows, statistics, drawings)
-    report = Report(markdown=out / "REPORT.md", page=out / "index.html", rows=len(rows))
-    write_atomic(report.markdown, markdown(content).encode())
-    write_atomic(report.page, page(content).encode())
-    return report
-
-
-def _content(
-    folder: RunFolder,
-    rows: Sequence[Row],
-    statistics: "tuple[Sheet, ...]",
-    drawings: "tuple[Drawing, ...]",
-) -> Content:
+    observations = report_observations.told(folder, workspace, frame) if workspace else None
+    if observations:
+        report_observations.write(observations, out)
     failed = [r for r in rows if r.status is not Status.OK]
     return Content(
         name=str(folder.head["campaign"]),
         facts=_facts(folder, rows),
+        planned=_planned(folder),
         outcomes=tables.outcome_counts(rows),
         tables=_tables(rows),
+        observations=observations,
         statistics=statistics,
-        figures=drawings,
+        figures=_figures(out, frame),
         failed=sorted(
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),
         experiments=[_line(folder, row) for row in sorted(rows, key=_reading_order)],
+    )
+
+
+def _figures(out: Path, frame: "DataFrame") -> "tuple[Drawing, ...]":
+    """All figures of the report, written."""
+    from mutator.figures import figures
+
+    drawings = figures.drawings(frame)
+    figures.write(drawings, out)
+    return drawings
+
+
+def _planned(folder: RunFolder) -> str:
+    """How many experiments and how many runs there are to do, and why these differ."""
+    experiments, runs = int(folder.head["experiments"]), folder.head.get("runs")
+    told = f"{experiments} experiments are planned"
+    if folder.shard:
+        told += f", {folder.planned} of them for this shard {folder.shard}"
+    if runs is None:  # planned before runs were shared
+        return f"{told}."
+    if runs == experiments:
+        return f"{told}; each is a run of its own."
+    return (
+        f"{told}; all of them take {runs} runs, for an experiment that is the same run in several scenarios "
+        "(without a lead, as one that aims at H2 is driven) is run once and counted in each."
     )
 
 

@@ -17,7 +17,11 @@ actuator output then differed from the fault-free run. *Hazard, no alert*: no co
 
 def markdown(content: "Content") -> str:
     """The report as Markdown."""
-    parts = [f"# {content.name}", _outcome_text(content), NOTES.replace("\n", " ")]
+    parts = [f"# {content.name}", f"{_outcome_text(content)} {content.planned}"]
+    if content.observations:
+        parts += ["## The paper's observations", content.observations.coverage, content.observations.verdicts]
+        parts.append("Their claims, rules, numbers and queries are in [observations.md](observations.md).")
+    parts += [NOTES.replace("\n", " ")]
     for table in content.tables:
         parts += [f"## {table.title}", markdown_table(table.heads, table.lines)]
     parts += [sheet.markdown().rstrip() for sheet in content.statistics]
@@ -99,6 +103,9 @@ th { background: var(--shade); }
 .hazard { color: #c62828; font-weight: 600; }
 .harness_error, .invalid_mutant { background: #c62828; color: #fff; }
 .crashed, .timeout { color: #8e24aa; font-weight: 600; }
+.verdict { border: 1px solid var(--line); border-radius: 1rem; font-size: .75em; padding: .1rem .6rem; }
+.group td { color: #888; border-bottom-style: dotted; }
+pre { overflow-x: auto; background: var(--shade); padding: .6rem; font-size: .85em; }
 code { font-size: .9em; }
 .chips span { display: inline-block; margin: 0 .5rem .3rem 0; padding: .1rem .6rem;
   border: 1px solid var(--line); border-radius: 1rem; }
@@ -108,6 +115,33 @@ code { font-size: .9em; }
 <p class="chips">{% for name, n in content.outcomes.items() %}
 <span class="{{ name }}">{{ n }} {{ name }}</span>
 {% endfor %}</p>
+<p>{{ content.planned }}</p>
+{% if content.observations %}
+<h2>The paper's observations</h2>
+<p>{{ content.observations.coverage }}</p>
+{% for one in content.observations.observations %}
+<h3>{{ one.number }}. {{ one.title }} <span class="verdict">{{ one.verdict.value }}</span></h3>
+<div class="scroll"><table>
+<tr>{% for head in content.observations.heads %}<th>{{ head }}</th>{% endfor %}</tr>
+{% for line in content.observations.lines(one) %}
+<tr{% if not line[0] %} class="group"{% endif %}>{% for cell in line %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}
+</table></div>
+<details><summary>Queries</summary>
+<pre>{{ content.observations.session }}
+
+{% for claim in one.claims %}
+# {{ claim.number }} {{ claim.claim.says }}
+{% for answer in claim.answers %}
+{{ answer.query }}
+{% else %}
+# {{ claim.why }}
+{% endfor %}
+{% endfor %}
+</pre></details>
+{% endfor %}
+<p>{{ content.observations.rules }}</p>
+{% endif %}
 <p>{{ notes }}</p>
 {% for table in content.tables %}
 <h2>{{ table.title }}</h2>

@@ -16,6 +16,7 @@ from mutator.errors import MutatorError
 if TYPE_CHECKING:
     from mutator.campaign_run import Summary
     from mutator.plan import Cost
+    from mutator.workspace import Workspace
 
 CampaignName = Annotated[
     str, typer.Argument(metavar="CAMPAIGN", help="A campaign of the library, or a campaign file.")
@@ -142,16 +143,16 @@ def run(
             )
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
-    _tell(terminal, out, summary)
+    _tell(terminal, out, summary, workspace)
     if summary.exit_code:
         raise typer.Exit(summary.exit_code)
 
 
-def _tell(terminal: Terminal, out: Path, summary: "Summary") -> None:
+def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspace") -> None:
     """The end of a run: table, report, and what is left to do."""
     from mutator import report as reports
 
-    written = reports.write(out) if summary.results else None
+    written = reports.ensure(out, workspace) if summary.results else None
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
         paths = {"run": str(out), "report": str(written.markdown) if written else None}
@@ -225,15 +226,21 @@ def merge(
 REPORT_EXAMPLES = """\b
 Examples:
   mutator report runs/first
+  mutator report /data/paper --root ~/openpilot-faults
 """
 
 
+@with_place
 def report(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")], as_json: Json = False
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")],
+    as_json: Json = False,
+    *,
+    place: Place,
 ) -> None:
     """Write the report of a run and print its path.
 
-    An unfinished run gets a report of what it has so far.
+    An unfinished run gets a report of what it has so far. What was published stands beside the results if
+    a library is found that cites it.
     """
     from mutator import report as reports
     from mutator import results
@@ -242,11 +249,21 @@ def report(
     terminal = Terminal(as_json)
     folder = RunFolder.open(run)
     results.build(folder.path)
-    written = reports.write(folder.path)
+    written = reports.write(folder.path, _library(place))
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
     show_counts(terminal, run)
     terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
+
+
+def _library(place: Place) -> "Workspace | None":
+    """The workspace; None where none is named and none is found: a report can be written anywhere."""
+    try:
+        return place.workspace()
+    except MutatorError:
+        if place != Place():
+            raise
+        return None
 
 
 CLEAN_EXAMPLES = """\b

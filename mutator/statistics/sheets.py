@@ -23,17 +23,13 @@ FOLDER = "tables"
 _DRIVER_S = 1.8  # a driver's reaction to a warning that is seen, where no published numbers say another
 
 
-def run_sheets(folder: RunFolder) -> tuple[Sheet, ...]:
+def run_sheets(folder: RunFolder, workspace: Workspace | None) -> tuple[Sheet, ...]:
     """The tables of a run whose results.csv is up to date.
 
     None when they would say no more than counts do: neither both methods nor published fault types. The
-    published numbers come from the library found from here (`Workspace.find`); without one ours stand alone.
+    published numbers come from the library of `workspace`; without one ours stand alone.
     """
     frame = load(folder.path / "results.csv")
-    try:
-        workspace = Workspace.find()
-    except MutatorError:  # no library here: a report can be written anywhere
-        workspace = None
     references = workspace.library / "references" if workspace else None
     paper = load_paper(references) if references and has_paper(references) else None
     if paper and not {kind for _, kind in paper.coverage} & set(frame["kind"]):
@@ -41,7 +37,7 @@ def run_sheets(folder: RunFolder) -> tuple[Sheet, ...]:
     if not paper and not {GUIDED, RANDOM} <= set(frame["method"]):
         return ()
     alerts = {name: record.alerts for name, record in read_records(folder.path).items()}
-    return sheets(frame, paper, alerts, _ends(folder, workspace) if workspace else None)
+    return sheets(frame, paper, alerts, run_ends(folder, workspace) if workspace else None)
 
 
 def sheets(
@@ -77,7 +73,7 @@ def write(made: Sequence[Sheet], out: Path) -> None:
         write_atomic(folder / f"{sheet.name}.md", sheet.markdown().encode())
 
 
-def _ends(folder: RunFolder, workspace: Workspace) -> dict[str, float] | None:
+def run_ends(folder: RunFolder, workspace: Workspace) -> dict[str, float] | None:
     """When the fault-free runs of each scenario end; None when they cannot be read (any more)."""
     ends: dict[str, float] = {}
     try:

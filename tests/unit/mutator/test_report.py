@@ -10,7 +10,9 @@ import pytest
 from mutator import report
 from mutator.columns import COLUMNS
 from mutator.errors import MutatorError
+from mutator.workspace import Workspace
 
+HERE = Workspace.find(Path(__file__).parents[3])
 HEAD = {
     "schema": "run/1",
     "campaign": "night_<b>drive</b>",
@@ -18,7 +20,10 @@ HEAD = {
     "seed": 7,
     "reading": "as_described",
     "choices": {"seed": None, "limit": 3},
+    "target": "openpilot",
+    "goldens": [],
     "experiments": 3,
+    "runs": 2,
     "sources": {"target": "cd" * 32},
     "provenance": {
         "mutator": "0.1.0",
@@ -91,7 +96,7 @@ class Page(HTMLParser):
 
 def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     """It is listed first among the runs that ended badly, and is in no count of faults."""
-    text = report.write(run).markdown.read_text()
+    text = report.write(run, HERE).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not end well")[1]
     assert failed.index("harness_error") < failed.index("crashed")
@@ -103,7 +108,7 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
 
 def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
     """Every tag is closed, and text from specs and runs cannot become markup."""
-    page = Page(report.write(run).page.read_text())
+    page = Page(report.write(run, HERE).page.read_text())
     assert page.open == []
     assert "night_<b>drive</b>" in page.texts
     assert "the disk | is <gone>" in page.texts
@@ -111,7 +116,7 @@ def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
 
 def test_the_page_links_what_is_there_and_nothing_else(run: Path) -> None:
     """Diff and plot of an experiment are linked when they exist; nothing comes from elsewhere."""
-    written = report.write(run)
+    written = report.write(run, HERE)
     page = Page(written.page.read_text())
     assert len(page.links) == 2
     assert all((written.page.parent / link).is_file() for link in page.links)
@@ -120,7 +125,7 @@ def test_the_page_links_what_is_there_and_nothing_else(run: Path) -> None:
 
 def test_the_report_says_what_it_comes_from(run: Path) -> None:
     """Plan, seed, reading, choices, sources and versions are in both forms."""
-    written = report.write(run)
+    written = report.write(run, HERE)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
             assert fact in text
@@ -128,15 +133,15 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 
 def test_the_report_is_the_same_each_time(run: Path) -> None:
     """Written again from the same results, it is the same file."""
-    written = report.write(run)
+    written = report.write(run, HERE)
     before = written.page.read_bytes(), written.markdown.read_bytes()
-    again = report.write(run)
+    again = report.write(run, HERE)
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
 
 
 def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
     """They are in the Markdown, in the page, and in files of their own."""
-    written = report.write(run)
+    written = report.write(run, HERE)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
     assert all(cell in file.read_text() for file in (written.markdown, written.page, files[0]))
@@ -146,7 +151,7 @@ def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path)
 def test_no_report_without_a_run(tmp_path: Path) -> None:
     """A folder that is no run folder is the user's error."""
     with pytest.raises(MutatorError, match="no run folder"):
-        report.write(tmp_path)
+        report.write(tmp_path, HERE)
 
 
 def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
@@ -154,8 +159,67 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
     with (run / "results.csv").open("a", newline="") as file:
         other = OK | {"experiment_id": "3" * 16, "fault_type": "jamming", "scenario": "S2"}
         csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="").writerow(other)
-    written = report.write(run)
+    written = report.write(run, HERE)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("figures/")]
     assert len(shown) == 6
     assert all((run / "report" / link).is_file() for link in shown)
     assert written.markdown.read_text().count("](figures/") == 3
+
+
+def test_experiments_and_runs_are_told_apart(run: Path) -> None:
+    """Both numbers are there, and why they differ; a plan of before runs were shared has none of runs."""
+    assert (
+        "3 experiments are planned; all of them take 2 runs" in report.write(run, HERE).markdown.read_text()
+    )
+    (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
+    assert "3 experiments are planned.\n" in report.write(run, HERE).markdown.read_text()
+
+
+def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
+    """A claim's query stands in the file and in the page; the table has a line for each query."""
+    written = report.write(run, HERE)
+    file, table = run / "report/observations.md", run / "report/tables/observations.csv"
+    query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
+    assert query in file.read_text()
+    assert query in "".join(Page(written.page.read_text()).texts)
+    assert "(observations.md)" in written.markdown.read_text()
+    with table.open(newline="") as lines:
+        assert query in [line["query"] for line in csv.DictReader(lines)]
+
+
+def test_without_a_library_there_are_no_observations(run: Path) -> None:
+    """A report can be written anywhere; what was published is then not in it."""
+    written = report.write(run, None)
+    assert "observation" not in written.markdown.read_text() + written.page.read_text()
+    assert not (run / "report" / "observations.md").exists()
+
+
+def drawn_again(run: Path, workspace: Workspace | None) -> bool:
+    """Whether `ensure` writes the report instead of leaving it."""
+    page = run / "report" / "index.html"
+    before = page.stat().st_mtime_ns if page.exists() else None
+    report.ensure(run, workspace)
+    return page.stat().st_mtime_ns != before
+
+
+def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
+    """It is written once; again when results, a plot, or the library it stands beside have changed."""
+    assert drawn_again(run, HERE)
+    assert not drawn_again(run, HERE)
+    (run / "plots" / ("2" * 16 + ".svg")).touch()
+    assert drawn_again(run, HERE)
+    results = run / "results.csv"
+    results.write_text(results.read_text().replace("18.25", "18.26"))
+    assert drawn_again(run, HERE)
+    assert drawn_again(run, None)
+    assert not drawn_again(run, None)
+
+
+@pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
+def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
+    """A page or the note of what it was made from may be missing or cut short."""
+    report.write(run, HERE)
+    (run / "report" / damage).unlink()
+    assert drawn_again(run, HERE)
+    (run / "report" / "made_from.json").write_text("{")
+    assert drawn_again(run, HERE)

@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,11 @@ import pytest
 from mutator.runfolder import RunFolder
 from mutator.statistics.sheet import P, Sheet
 from mutator.statistics.sheets import run_sheets, sheets, write
+from mutator.workspace import Workspace
 
 from .results_frame import results
 
-ROOT = Path(__file__).parents[4]
+HERE = Workspace.find(Path(__file__).parents[4])
 GUIDED = {"t_activation": 7.0, "alerts": "fcw", "t_alert": 8.0, "t_h1": 9.0, "h1": 1}
 RANDOM = GUIDED | {"method": "random", "trigger": "random/C2"}
 HEADER = (
@@ -34,10 +34,9 @@ def run(tmp_path: Path) -> RunFolder:
     return RunFolder.open(tmp_path)
 
 
-def test_a_run_of_both_methods_has_all_tables(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_of_both_methods_has_all_tables(run: RunFolder) -> None:
     """Summary and coverage of each method, the comparison, and the times; alerts only with their records."""
-    monkeypatch.chdir(ROOT)
-    names = [sheet.name for sheet in run_sheets(run)]
+    names = [sheet.name for sheet in run_sheets(run, HERE)]
     assert names == [
         *("summary_guided", "summary_random", "coverage_guided", "coverage_random"),
         *("guided_against_random", "guided_against_random_by_fault_type", "matched_pairs"),
@@ -45,25 +44,21 @@ def test_a_run_of_both_methods_has_all_tables(run: RunFolder, monkeypatch: pytes
     ]
 
 
-def test_without_a_library_ours_stand_alone(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where no library is found there is nothing of the paper, and no end of runs to censor at."""
-    for name in [name for name in os.environ if name.startswith("MUTATOR_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.chdir(run.path)
-    made = run_sheets(run)
+def test_without_a_library_ours_stand_alone(run: RunFolder) -> None:
+    """Without one there is nothing of the paper, and no end of runs to censor at."""
+    made = run_sheets(run, None)
     assert "alert_to_hazard" not in [sheet.name for sheet in made]
     assert {line[1] for sheet in made if sheet.name.startswith("coverage") for line in sheet.lines} == {
         "here"
     }
 
 
-def test_no_tables_where_they_say_nothing_more(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_tables_where_they_say_nothing_more(run: RunFolder) -> None:
     """One method and a fault type of one's own: the report's counts say it all."""
-    monkeypatch.chdir(ROOT)
     results_file = run.path / "results.csv"
     lines = results_file.read_text().replace("chaff", "own").splitlines()
     results_file.write_text("\n".join(lines[:2]) + "\n")
-    assert run_sheets(run) == ()
+    assert run_sheets(run, HERE) == ()
 
 
 def test_files_are_the_same_each_time(tmp_path: Path) -> None:

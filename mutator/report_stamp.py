@@ -1,0 +1,47 @@
+"""What a report was made from, so that resuming a complete run does not draw it all again."""
+
+from pathlib import Path
+from typing import Any
+
+import mutator
+from mutator.errors import MutatorError
+from mutator.ids import digest
+from mutator.jsonio import read_json, write_json
+from mutator.runfolder import HEAD, RunFolder
+from mutator.workspace import Workspace
+
+SCHEMA = "report/1"
+FILE = "made_from.json"
+
+
+def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
+    """Digest of all that a report depends on: results, run.json, plots that it links, the library's cited
+    numbers, and mutator's own sources."""
+    run = folder.path
+    plots = sorted(path.name for path in (run / "plots").glob("*"))
+    references = _files(workspace.library / "references", "*.yaml") if workspace else None
+    own = [mutator.__version__, _files(Path(mutator.__file__).parent, "**/*.py")]
+    results = [digest((run / name).read_bytes()) for name in (HEAD, "results.csv")]
+    return digest([SCHEMA, own, results, plots, references])
+
+
+def read(out: Path) -> dict[str, Any]:
+    """What the report in `out` says it was made from; empty when there is none, or one cut short."""
+    try:
+        return read_json(out / FILE, SCHEMA)
+    except MutatorError:  # whatever is wrong with it: the report can be written again
+        return {}
+
+
+def write(out: Path, made_from: str, rows: int) -> None:
+    """Say what the report in `out` was made from and of how many experiments it tells; last of its files."""
+    write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "rows": rows})
+
+
+def remove(out: Path) -> None:
+    """Before anything of the report is written: one that is cut short is no report."""
+    (out / FILE).unlink(missing_ok=True)
+
+
+def _files(folder: Path, pattern: str) -> list[tuple[str, str]]:
+    return sorted((p.relative_to(folder).as_posix(), digest(p.read_bytes())) for p in folder.glob(pattern))
