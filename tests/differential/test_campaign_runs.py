@@ -3,10 +3,7 @@
 import os
 import random
 import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,13 +12,9 @@ from mutator import campaign_run
 from mutator.campaign_run import Session
 from mutator.workspace import Workspace
 
-DERIVED = ("results.csv", "results.parquet")
-Bytes = dict[str, bytes]
+from .command import DERIVED, Bytes, Command, pytest_words, results
+
 CopyToycar = Callable[[Path], Workspace]
-
-
-def results(out: Path) -> Bytes:
-    return {name: (out / name).read_bytes() for name in DERIVED}
 
 
 @pytest.fixture(scope="module")
@@ -101,59 +94,6 @@ def test_derived_files_can_be_made_again(toy: Workspace, tmp_path: Path, undistu
     assert results(out) == undisturbed
 
 
-class Command:
-    """A campaign command in a process of its own, and all processes that come of it."""
-
-    def __init__(self, toy: Workspace, out: Path, *words: str) -> None:
-        self.out = out
-        self.mark = f"MUTATOR_TEST={os.urandom(8).hex()}"
-        name, _, value = self.mark.partition("=")
-        places = {"MUTATOR_LIBRARY": str(toy.library), "MUTATOR_TEMPLATES": str(toy.templates), name: value}
-        self.process = subprocess.Popen(
-            [sys.executable, *words],
-            env=os.environ | places,
-            cwd=toy.library.parent,
-            start_new_session=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-
-    def wait_for_records(self, count: int) -> None:
-        """Until that many experiments have a record."""
-        deadline = time.monotonic() + 120.0
-        while sum(p.read_bytes().count(b"\n") - 1 for p in (self.out / "records").glob("*.jsonl")) < count:
-            assert self.process.poll() is None, self.process.communicate()[0]
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-
-    def others(self) -> Iterator[str]:
-        """Command lines of living processes that carry the mark or work in the run folder."""
-        for folder in Path("/proc").glob("[0-9]*"):
-            try:
-                if int(folder.name) in (os.getpid(), self.process.pid):
-                    continue
-                line = (folder / "cmdline").read_bytes()
-                if self.mark.encode() in (folder / "environ").read_bytes() or str(self.out).encode() in line:
-                    yield line.replace(b"\0", b" ").decode()
-            except OSError:
-                continue
-
-    def end(self) -> str:
-        """Wait for its end and for the end of everything it started; returns what it printed."""
-        printed = self.process.communicate(timeout=120)[0]
-        deadline = time.monotonic() + 10.0
-        while left := list(self.others()):
-            assert time.monotonic() < deadline, left
-            time.sleep(0.05)
-        return printed
-
-
-def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
-    plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
-    return [*plain, "--campaign", str(campaign), "--campaign-out", str(out), "-n", str(workers)]
-
-
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda s: s.name)
 def test_killed_and_resumed(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
@@ -179,8 +119,7 @@ def test_killed_during_the_checks(toy: Workspace, tmp_path: Path, undisturbed: B
     """Killed before its first experiment, the command begins anew and gives the same bytes."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
-    while not (out / "work" / "checks").is_dir():
-        time.sleep(0.01)
+    command.wait_for(out / "work" / "checks")
     command.process.kill()
     command.end()
     assert campaign_run.run(toy, "small", out).exit_code == 0

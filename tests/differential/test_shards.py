@@ -159,3 +159,27 @@ def test_a_shard_that_cannot_be(toy: Workspace, shard: str) -> None:
     """A share that is none, or more shares than chunks, is refused before anything runs."""
     with pytest.raises(MutatorError, match=f"shard '?{shard}"):
         make_plan(toy, "small", shard=shard)
+
+
+@pytest.mark.slow
+def test_shards_of_the_controller_that_ships(tmp_path: Path) -> None:
+    """On the real target too: one worker, two, and three shards merged come to the same bytes."""
+    clone = Workspace.find(root=Path(__file__).parents[2])
+
+    def ran(name: str, workers: int, shard: str | None = None) -> Path:
+        choices = Choices(limit=40, shard=shard)
+        summary = campaign_run.run(
+            clone, "paper_reference", tmp_path / name, workers=workers, choices=choices
+        )
+        assert summary.exit_code == 0
+        return tmp_path / name
+
+    one, two = ran("one", 1), ran("two", 2)
+    shards = [ran(f"shard{k}", 2, f"{k}/3") for k in (1, 2, 3)]
+    merge(shards, tmp_path / "merged")
+    assert len((one / "results.csv").read_text().splitlines()) == 1 + 40
+    assert sum(RunFolder.open(shard).planned for shard in shards) == 40
+    for name in DERIVED:
+        whole = (one / name).read_bytes()
+        assert (two / name).read_bytes() == whole
+        assert (tmp_path / "merged" / name).read_bytes() == whole

@@ -1,0 +1,88 @@
+"""A campaign command in a process of its own, to be struck by signals and looked at from outside."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from mutator.workspace import Workspace
+
+DERIVED = ("results.csv", "results.parquet")
+Bytes = dict[str, bytes]
+
+
+def results(out: Path) -> Bytes:
+    """The results table of a run folder, as bytes."""
+    return {name: (out / name).read_bytes() for name in DERIVED}
+
+
+def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
+    """A campaign as a user of pytest starts it."""
+    plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
+    return [*plain, "--campaign", str(campaign), "--campaign-out", str(out), "-n", str(workers)]
+
+
+class Command:
+    """The command `python WORDS`, and all processes that come of it."""
+
+    def __init__(self, workspace: Workspace, out: Path, *words: str, **environment: str) -> None:
+        self.out = out
+        self.mark = f"MUTATOR_TEST={os.urandom(8).hex()}"
+        name, _, value = self.mark.partition("=")
+        places = {"MUTATOR_LIBRARY": str(workspace.library), "MUTATOR_TEMPLATES": str(workspace.templates)}
+        self.process = subprocess.Popen(
+            [sys.executable, *words],
+            env=os.environ | places | environment | {name: value},
+            cwd=workspace.library.parent,
+            start_new_session=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def wait_for_records(self, count: int) -> None:
+        """Until that many experiments have a record."""
+        files = self.out / "records"
+        self._wait(lambda: sum(p.read_bytes().count(b"\n") - 1 for p in files.glob("*.jsonl")) >= count)
+
+    def wait_for(self, path: Path) -> None:
+        """Until there is something at this path."""
+        self._wait(path.exists)
+
+    def _wait(self, reached: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + 120.0
+        while not reached():
+            assert self.process.poll() is None, self.process.communicate()[0]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+    def others(self) -> Iterator[tuple[int, str]]:
+        """Living processes, with their command lines, that carry the mark or work in the run folder."""
+        out = str(self.out).encode()
+        for folder in Path("/proc").glob("[0-9]*"):
+            try:
+                pid = int(folder.name)
+                if pid in (os.getpid(), self.process.pid):
+                    continue
+                line = (folder / "cmdline").read_bytes()
+                told = (line, (folder / "environ").read_bytes(), os.fsencode((folder / "cwd").readlink()))
+                if any(self.mark.encode() in text or out in text for text in told):
+                    yield pid, line.replace(b"\0", b" ").decode()
+            except OSError:
+                continue
+
+    def workers(self) -> list[int]:
+        """Its xdist workers that live."""
+        registered = {path.name for path in (self.out / "workers").glob("[0-9]*")}
+        return sorted(pid for pid, _ in self.others() if str(pid) in registered)
+
+    def end(self) -> str:
+        """Wait for its end and for the end of everything it started; returns what it printed."""
+        printed = self.process.communicate(timeout=600)[0]
+        deadline = time.monotonic() + 10.0
+        while left := list(self.others()):
+            assert time.monotonic() < deadline, left
+            time.sleep(0.05)
+        return printed
