@@ -131,7 +131,7 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
         tables=_tables(rows),
         observations=observations,
         statistics=statistics,
-        figures=_figures(out, frame),
+        figures=_figures(folder, frame, workspace, whole=bool(observations) and len(rows) == folder.planned),
         failed=sorted(
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),
@@ -139,12 +139,17 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
     )
 
 
-def _figures(out: Path, frame: "DataFrame") -> "tuple[Drawing, ...]":
-    """All figures of the report, written."""
-    from mutator.figures import figures
+def _figures(
+    folder: RunFolder, frame: "DataFrame", workspace: "Workspace | None", *, whole: bool
+) -> "tuple[Drawing, ...]":
+    """All figures of the report, written; those of single experiments only of a `whole` run of published
+    faults, for experiments may have to be driven again."""
+    from mutator.figures import examples, figures
 
     drawings = figures.drawings(frame)
-    figures.write(drawings, out)
+    if whole:
+        drawings += examples.drawings(folder, frame, workspace)
+    figures.write(drawings, folder.path / FOLDER)
     return drawings
 
 

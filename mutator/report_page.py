@@ -28,7 +28,10 @@ def markdown(content: "Content") -> str:
     if content.figures:
         parts.append("## Figures")
     for drawing in content.figures:
-        parts += [f"### {drawing.title}", drawing.note, f"![{drawing.title}]({drawing.link('svg')})"]
+        parts += [f"### {drawing.title}", drawing.note]
+        parts += [f"{what}: `{code}`" for what, code in drawing.codes]
+        if drawing.figure is not None:
+            parts.append(f"![{drawing.title}]({drawing.link('svg')})")
     if content.failed:
         parts += ["## Runs that did not end well", _failed_text(content)]
     parts += [
@@ -166,8 +169,13 @@ code { font-size: .9em; }
 <h2>Figures</h2>
 {% for drawing in content.figures %}
 <h3>{{ drawing.title }}</h3>
-<p>{{ drawing.note }}</p>
+<p>{{ drawing.note }}
+{% for what, code in drawing.codes %}
+<br>{{ what }}: <code>{{ code }}</code>
+{% endfor %}</p>
+{% if drawing.figure %}
 <a href="{{ drawing.link("png") }}"><img src="{{ drawing.link("svg") }}" alt="{{ drawing.title }}"></a>
+{% endif %}
 {% endfor %}
 {% endif %}
 {% if content.failed %}

@@ -63,7 +63,7 @@ def run(tmp_path: Path) -> Path:
         table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
         table.writeheader()
         for i, line in enumerate((OK, BAD, CRASHED)):
-            table.writerow({"experiment_id": f"{i}" * 16} | line)
+            table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
     for file in ("patches/00/" + "0" * 16 + ".patch", "plots/" + "0" * 16 + ".svg"):
         (tmp_path / file).parent.mkdir(parents=True)
         (tmp_path / file).touch()
@@ -96,7 +96,7 @@ class Page(HTMLParser):
 
 def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     """It is listed first among the runs that ended badly, and is in no count of faults."""
-    text = report.write(run, HERE).markdown.read_text()
+    text = report.write(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not end well")[1]
     assert failed.index("harness_error") < failed.index("crashed")
@@ -108,7 +108,7 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
 
 def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
     """Every tag is closed, and text from specs and runs cannot become markup."""
-    page = Page(report.write(run, HERE).page.read_text())
+    page = Page(report.write(run, None).page.read_text())
     assert page.open == []
     assert "night_<b>drive</b>" in page.texts
     assert "the disk | is <gone>" in page.texts
@@ -116,7 +116,7 @@ def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
 
 def test_the_page_links_what_is_there_and_nothing_else(run: Path) -> None:
     """Diff and plot of an experiment are linked when they exist; nothing comes from elsewhere."""
-    written = report.write(run, HERE)
+    written = report.write(run, None)
     page = Page(written.page.read_text())
     assert len(page.links) == 2
     assert all((written.page.parent / link).is_file() for link in page.links)
@@ -125,7 +125,7 @@ def test_the_page_links_what_is_there_and_nothing_else(run: Path) -> None:
 
 def test_the_report_says_what_it_comes_from(run: Path) -> None:
     """Plan, seed, reading, choices, sources and versions are in both forms."""
-    written = report.write(run, HERE)
+    written = report.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
             assert fact in text
@@ -133,9 +133,9 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 
 def test_the_report_is_the_same_each_time(run: Path) -> None:
     """Written again from the same results, it is the same file."""
-    written = report.write(run, HERE)
+    written = report.write(run, None)
     before = written.page.read_bytes(), written.markdown.read_bytes()
-    again = report.write(run, HERE)
+    again = report.write(run, None)
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
 
 
@@ -151,15 +151,15 @@ def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path)
 def test_no_report_without_a_run(tmp_path: Path) -> None:
     """A folder that is no run folder is the user's error."""
     with pytest.raises(MutatorError, match="no run folder"):
-        report.write(tmp_path, HERE)
+        report.write(tmp_path, None)
 
 
 def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
     """Two fault types and two scenarios: three figures, in the Markdown and the page, all of them there."""
     with (run / "results.csv").open("a", newline="") as file:
-        other = OK | {"experiment_id": "3" * 16, "fault_type": "jamming", "scenario": "S2"}
+        other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
         csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="").writerow(other)
-    written = report.write(run, HERE)
+    written = report.write(run, None)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("figures/")]
     assert len(shown) == 6
     assert all((run / "report" / link).is_file() for link in shown)
@@ -169,10 +169,10 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
 def test_experiments_and_runs_are_told_apart(run: Path) -> None:
     """Both numbers are there, and why they differ; a plan of before runs were shared has none of runs."""
     assert (
-        "3 experiments are planned; all of them take 2 runs" in report.write(run, HERE).markdown.read_text()
+        "3 experiments are planned; all of them take 2 runs" in report.write(run, None).markdown.read_text()
     )
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
-    assert "3 experiments are planned.\n" in report.write(run, HERE).markdown.read_text()
+    assert "3 experiments are planned.\n" in report.write(run, None).markdown.read_text()
 
 
 def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
@@ -204,22 +204,29 @@ def drawn_again(run: Path, workspace: Workspace | None) -> bool:
 
 def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
     """It is written once; again when results, a plot, or the library it stands beside have changed."""
-    assert drawn_again(run, HERE)
-    assert not drawn_again(run, HERE)
+    assert drawn_again(run, None)
+    assert not drawn_again(run, None)
     (run / "plots" / ("2" * 16 + ".svg")).touch()
-    assert drawn_again(run, HERE)
+    assert drawn_again(run, None)
     results = run / "results.csv"
     results.write_text(results.read_text().replace("18.25", "18.26"))
     assert drawn_again(run, HERE)
-    assert drawn_again(run, None)
-    assert not drawn_again(run, None)
 
 
 @pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
 def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
     """A page or the note of what it was made from may be missing or cut short."""
-    report.write(run, HERE)
+    report.write(run, None)
     (run / "report" / damage).unlink()
-    assert drawn_again(run, HERE)
+    assert drawn_again(run, None)
     (run / "report" / "made_from.json").write_text("{")
-    assert drawn_again(run, HERE)
+    assert drawn_again(run, None)
+
+
+def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
+    """A hazard whose experiment is in no plan has no trace: both forms say so, none shows a picture."""
+    written = report.write(run, HERE)
+    for text in (written.markdown.read_text(), " ".join(Page(written.page.read_text()).texts)):
+        assert "No figure: the traces it needs cannot be had" in text
+        assert "t_h1 > t_activation" in text
+    assert "action_" not in written.markdown.read_text() + written.page.read_text()
