@@ -152,7 +152,8 @@ def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspa
     """The end of a run: table, report, and what is left to do."""
     from mutator import report as reports
 
-    written = reports.ensure(out, workspace) if summary.results else None
+    with terminal.wait("writing the report"):  # it may drive a few experiments again
+        written = reports.ensure(out, workspace) if summary.results else None
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
         paths = {"run": str(out), "report": str(written.markdown) if written else None}
@@ -249,7 +250,8 @@ def report(
     terminal = Terminal(as_json)
     folder = RunFolder.open(run)
     results.build(folder.path)
-    written = reports.write(folder.path, _library(place))
+    with terminal.wait("writing the report"):  # it may drive a few experiments again
+        written = reports.write(folder.path, _library(place))
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
     show_counts(terminal, run)

@@ -84,7 +84,7 @@ def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
                 mark.t,
                 color=MARK_COLOURS[mark.kind],
                 linestyle=MARK_LINES[mark.kind],
-                linewidth=2.0 if mark.kind is MarkKind.HAZARD else 1.1,
+                linewidth=1.8 if mark.kind is MarkKind.HAZARD else 1.1,
             )
         fits = mark.t + room <= end  # else the name ends at its mark
         begin = mark.t if fits else mark.t - room

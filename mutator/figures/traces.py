@@ -36,7 +36,9 @@ class Traces:
         return {experiment.id: experiment for experiment in planfile.read_all(self.folder.path)}
 
     def record(self, experiment_id: str) -> Record:
-        """What the campaign found out of an experiment that has run."""
+        """What the campaign found out of an experiment; MutatorError when only its results are there."""
+        if experiment_id not in self._records:
+            raise MutatorError(f"there is no record of {experiment_id} any more", where=self.folder.path)
         return self._records[experiment_id]
 
     def of(self, experiment_id: str) -> tuple[Trace, Trace]:
