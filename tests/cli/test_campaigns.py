@@ -176,6 +176,15 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
     assert "report/REPORT.md" in answer.out
 
 
+def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
+    """A report is written where no library is found; one that is named must be there."""
+    assert cli("report", run).code == 0
+    assert cli("report", run, "--root", root).code == 0
+    answer = cli("report", run, "--root", nowhere / "none")
+    assert answer.code == 2
+    assert "fault_library" in answer.err
+
+
 def test_the_page_needs_nothing_from_elsewhere(cli: Cli, run: Path) -> None:
     """The page is well-formed, loads nothing over the net, and its links lead to files of the run."""
     page = Path(cli("report", run, "--json").json["page"])
