@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib import metadata
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -177,7 +178,9 @@ def session(
             plan = make_plan(workspace, campaign, **asdict(choices))
             folder = freeze_owned(plan, out, workspace)
         shutil.rmtree(folder.work, ignore_errors=True)
-        for path in folder.path.iterdir():
+        # not everywhere: there may be thousands of patches
+        written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))
+        for path in chain(*written):
             if is_half_written(path.name):
                 path.unlink()
         try:

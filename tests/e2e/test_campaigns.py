@@ -113,6 +113,17 @@ def test_a_run_leaves_what_it_should(toy: Workspace, tmp_path: Path) -> None:
         assert (out / "patches" / name[:2] / f"{name}.patch").read_text().startswith("diff --git a/")
 
 
+def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path) -> None:
+    """The next command deletes it wherever the harness writes, and touches nothing else."""
+    left = [finished / place for place in (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7")]
+    mine = finished / "report" / "tables" / ".notes"
+    (finished / "report" / "tables").mkdir(parents=True)
+    for path in (*left, mine):
+        path.touch()
+    assert campaign_run.run(toy, "small", finished).ran == 0
+    assert [path.exists() for path in (*left, mine)] == [False, False, False, True]
+
+
 @pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
 def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
     """A kept patch applies to the target and gives, byte for byte, the files of the mutant that ran."""
