@@ -96,12 +96,13 @@ def write(run: Path, workspace: "Workspace | None") -> Report:
     out = run / FOLDER
     out.mkdir(exist_ok=True)
     report_stamp.remove(out)
+    made_from = report_stamp.made_from(folder, workspace)
     content = _content(folder, out, workspace)
     text, hypertext = _files(out)
     write_atomic(text, markdown(content).encode())
     write_atomic(hypertext, page(content).encode())
     rows = len(content.experiments)
-    report_stamp.write(out, report_stamp.made_from(folder, workspace), rows)
+    report_stamp.write(out, made_from, rows)
     return Report(markdown=text, page=hypertext, rows=rows)
 
 
