@@ -1,9 +1,11 @@
 """Reads a DBC file into bit layouts that packing and parsing can use without looking anything up.
 
 A message is handled as one big-endian integer of its whole payload, so a signal is a shift and a
-mask. That holds for Motorola signals, the only kind the car uses; others are refused.
+mask. That holds for Motorola signals, the only kind the car uses; others are refused. Only messages and
+signals are read, a page of text: a general DBC library would take longer to import than a run takes to drive.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -11,10 +13,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-import cantools
-
 COUNTER = "COUNTER"
 CHECKSUM = "CHECKSUM"
+
+_MESSAGE = re.compile(r"BO_ (?P<address>\d+) (?P<name>\w+) ?: (?P<size>\d+) \w+")
+_SIGNAL = re.compile(
+    r"SG_ (?P<name>\w+) : (?P<start>\d+)\|(?P<length>\d+)@0(?P<sign>[+-]) "
+    r"\((?P<factor>[^,]+),(?P<offset>[^)]+)\) \[[^]]*\] \"[^\"]*\" .+"
+)
 
 
 class Field(NamedTuple):
@@ -42,37 +48,63 @@ class Message:
 
 @cache
 def load(path: Path) -> Mapping[str, Message]:
-    """All messages of a DBC file by name. Cached per process; the result is immutable."""
-    database = cantools.database.load_file(path)
-    return MappingProxyType({message.name: _compile(message) for message in database.messages})
+    """All messages of a DBC file by name. Cached per process; the result is immutable.
+
+    ValueError, naming the line, for a message or signal that is not laid out as the car's are.
+    """
+    layouts: list[tuple[re.Match[str], dict[str, Field]]] = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        where, text = f"{path}:{number}", line.strip()
+        if text.startswith("BO_ "):
+            layouts.append((_match(_MESSAGE, text, where, "BO_ ADDRESS NAME: SIZE SENDER"), {}))
+        elif text.startswith("SG_ "):
+            signal = _match(_SIGNAL, text, where, "a plain big-endian signal of a message")
+            head, fields = layouts[-1]
+            fields[signal["name"]] = _field(signal, int(head["size"]), where)
+    return MappingProxyType({head["name"]: _message(head, fields) for head, fields in layouts})
 
 
-def _compile(message) -> Message:
-    fields = {signal.name: _field(message, signal) for signal in message.signals}
-    counter, checksum = fields.get(COUNTER), fields.get(CHECKSUM)
+def _match(pattern: re.Pattern[str], text: str, where: str, expected: str) -> re.Match[str]:
+    match = pattern.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{where}: {text!r}, expected {expected}")
+    return match
+
+
+def _message(head: re.Match[str], fields: dict[str, Field]) -> Message:
+    name, counter, checksum = head["name"], fields.get(COUNTER), fields.get(CHECKSUM)
     if checksum is not None and (checksum.shift, checksum.mask) != (0, 0xF):
-        raise ValueError(f"{message.name}: the checksum must be the low half of the last byte")
+        raise ValueError(f"{name}: the checksum must be the low half of the last byte")
     if counter is not None and counter.mask != 0x3:
-        raise ValueError(f"{message.name}: the counter must have two bits")
+        raise ValueError(f"{name}: the counter must have two bits")
     return Message(
-        name=message.name,
-        address=message.frame_id,
-        size=message.length,
+        name=name,
+        address=int(head["address"]),
+        size=int(head["size"]),
         fields=MappingProxyType(fields),
         has_checksum=checksum is not None,
         counter_shift=None if counter is None else counter.shift,
     )
 
 
-def _field(message, signal) -> Field:
-    if signal.byte_order != "big_endian":
-        raise ValueError(f"{message.name}.{signal.name}: only big-endian signals are supported")
-    first = 8 * (signal.start // 8) + 7 - signal.start % 8  # counted from the payload's first bit
+def _field(signal: re.Match[str], size: int, where: str) -> Field:
+    start, length = int(signal["start"]), int(signal["length"])
+    first = 8 * (start // 8) + 7 - start % 8  # counted from the payload's first bit
+    shift = 8 * size - first - length
+    if shift < 0:
+        raise ValueError(f"{where}: {signal['name']} ends beyond the message's {size} bytes")
     return Field(
-        name=signal.name,
-        shift=8 * message.length - first - signal.length,
-        mask=(1 << signal.length) - 1,
-        sign_bit=1 << (signal.length - 1) if signal.is_signed else 0,
-        factor=signal.scale,
-        offset=signal.offset,
+        name=signal["name"],
+        shift=shift,
+        mask=(1 << length) - 1,
+        sign_bit=1 << (length - 1) if signal["sign"] == "-" else 0,
+        factor=_number(signal["factor"]),
+        offset=_number(signal["offset"]),
     )
+
+
+def _number(text: str) -> float:
+    try:
+        return int(text)
+    except ValueError:
+        return float(text)

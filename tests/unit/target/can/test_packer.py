@@ -74,9 +74,34 @@ def test_signed_values_stay_in_range(value, raw):
     assert encode(load(CAR_DBC)["STEERING_SENSORS"].fields["STEER_ANGLE"], value) == raw
 
 
-def test_little_endian_signals_are_refused(tmp_path):
+@pytest.mark.parametrize("path", [CAR_DBC, RADAR_DBC], ids=lambda path: path.name)
+def test_layouts_are_those_cantools_reads(path):
+    """Addresses, sizes and the place, sign and scale of every signal are read as cantools reads them."""
+    reference = {message.name: message for message in load_reference(path).messages}
+    assert list(load(path)) == list(reference)
+    for name, message in load(path).items():
+        other = reference[name]
+        assert (message.address, message.size) == (other.frame_id, other.length)
+        assert set(message.fields) == {signal.name for signal in other.signals}
+        for signal in other.signals:
+            field = message.fields[signal.name]
+            assert field.mask.bit_length() == signal.length
+            assert (field.sign_bit != 0) == signal.is_signed
+            for ours, theirs in ((field.factor, signal.scale), (field.offset, signal.offset)):
+                assert (ours, type(ours)) == (theirs, type(theirs))
+
+
+@pytest.mark.parametrize(
+    ("signal", "complaint"),
+    [
+        ('SG_ S : 0|8@1+ (1,0) [0|255] "" A', "big-endian"),
+        ('SG_ S m0 : 7|8@0+ (1,0) [0|255] "" A', "plain"),
+        ('SG_ S : 63|9@0+ (1,0) [0|511] "" A', "beyond the message's 8 bytes"),
+    ],
+)
+def test_other_layouts_are_refused(tmp_path, signal, complaint):
     """A DBC with a signal this codec cannot lay out is refused when it is read, not misread later."""
     dbc = tmp_path / "other.dbc"
-    dbc.write_text('VERSION ""\nBU_: A\nBO_ 1 M: 8 A\n SG_ S : 0|8@1+ (1,0) [0|255] "" A\n')
-    with pytest.raises(ValueError, match="big-endian"):
+    dbc.write_text(f'VERSION ""\nBU_: A\nBO_ 1 M: 8 A\n {signal}\n')
+    with pytest.raises(ValueError, match=rf"other\.dbc:4.*{complaint}"):
         load(dbc)
