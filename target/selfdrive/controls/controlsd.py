@@ -156,5 +156,5 @@ class Controlsd:
             alerts=self._alerts.active,
             alert_text1=self._alerts.text1,
             alert_text2=self._alerts.text2,
-            events=tuple(event.name for event in events),
+            events=tuple([event.name for event in events]),
         )

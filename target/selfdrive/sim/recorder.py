@@ -12,6 +12,8 @@ from selfdrive.sim.truth import GroundTruth
 COUNTED_ALERTS = ("steer_saturated", "fcw", "can_error", "radar_error", "model_error")
 PLAN_SOURCES = ("cruise", "mpc1", "mpc2")
 LONG_STATES = ("off", "pid", "stopping", "starting")
+_PLAN_SOURCE = {name: float(code) for code, name in enumerate(PLAN_SOURCES)}
+_LONG_STATE = {name: float(code) for code, name in enumerate(LONG_STATES)}
 
 # Ground truth and actuators, then what the controller perceives and wants. SI units, radians.
 CHANNELS = (
@@ -56,7 +58,7 @@ class Recorder:
                 *(lead.status, lead.d_rel, lead.v_rel, lead.v_lead_k, lead.a_lead_k),
                 *(state.v_ego, state.a_ego, state.v_cruise, state.v_pid),
                 *(plan.v_target, plan.a_target, state.angle_desired),
-                *(PLAN_SOURCES.index(plan.source), LONG_STATES.index(state.long_state)),
+                *(_PLAN_SOURCE[plan.source], _LONG_STATE[state.long_state]),
                 *(state.enabled, self._alert_bits),
             )
         )

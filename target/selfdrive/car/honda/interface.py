@@ -6,6 +6,7 @@ wrong_car_mode, brake_hold, park_brake, pedal_pressed, button_enable, button_can
 """
 
 from collections.abc import Sequence
+from operator import attrgetter
 
 from selfdrive.car.honda.carcontroller import CarController
 from selfdrive.car.honda.carstate import CarStateReader
@@ -37,6 +38,7 @@ _CONDITIONS = (
     ("brake_hold", Event("brake_hold", (NO_ENTRY, USER_DISABLE))),
     ("park_brake", Event("park_brake", (NO_ENTRY, USER_DISABLE))),
 )
+_conditions_of = attrgetter(*(name for name, _ in _CONDITIONS))
 _CAN_ERROR = Event("can_error", (NO_ENTRY, IMMEDIATE_DISABLE))
 _WRONG_GEAR = Event("wrong_gear", (NO_ENTRY, SOFT_DISABLE))
 _REVERSE_GEAR = Event("reverse_gear", (NO_ENTRY, IMMEDIATE_DISABLE))
@@ -102,7 +104,9 @@ class CarInterface:
         return self._controller.update(control, self._car, frame)
 
     def _events(self, car: CarState, previous: CarState) -> list[Event]:
-        events = [event for name, event in _CONDITIONS if getattr(car, name)]
+        events = []
+        if any(_conditions_of(car)):
+            events = [event for name, event in _CONDITIONS if getattr(car, name)]
         if self._invalid_cycles >= CAN_ERROR_CYCLES:
             events.append(_CAN_ERROR)
         if car.gear != "drive":

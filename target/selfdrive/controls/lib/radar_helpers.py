@@ -1,6 +1,6 @@
 """Radar tracks, and what belongs together among them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import dist, pi
 
 from selfdrive.common.interp import clip, interp
@@ -91,12 +91,12 @@ class Cluster:
 
     def __init__(self, tracks: Sequence[Track]) -> None:
         self._tracks = tracks
-        self.d_rel = self._mean(t.d_rel for t in tracks)
-        self.v_rel = self._mean(t.v_rel for t in tracks)
-        self.d_path = self._mean(t.d_path for t in tracks)
-        self.v_lat = self._mean(t.v_lat for t in tracks)
+        self.d_rel = self._mean([t.d_rel for t in tracks])
+        self.v_rel = self._mean([t.v_rel for t in tracks])
+        self.d_path = self._mean([t.d_path for t in tracks])
+        self.v_lat = self._mean([t.v_lat for t in tracks])
 
-    def _mean(self, values: Iterable[float]) -> float:
+    def _mean(self, values: Sequence[float]) -> float:
         return sum(values) / len(self._tracks)
 
     def is_lead(self, v_ego: float) -> bool:
@@ -119,14 +119,14 @@ class Cluster:
         return LeadData(
             status=True,
             d_rel=self.d_rel - radar_offset,
-            y_rel=mean(t.y_rel for t in tracks),
+            y_rel=mean([t.y_rel for t in tracks]),
             v_rel=self.v_rel,
-            a_rel=mean(t.a_rel for t in tracks),
-            v_lead=mean(t.v_lead for t in tracks),
+            a_rel=mean([t.a_rel for t in tracks]),
+            v_lead=mean([t.v_lead for t in tracks]),
             d_path=self.d_path,
             v_lat=self.v_lat,
-            v_lead_k=mean(t.filter.value for t in tracks),
-            a_lead_k=mean(t.filter.rate for t in tracks),
+            v_lead_k=mean([t.filter.value for t in tracks]),
+            a_lead_k=mean([t.filter.rate for t in tracks]),
             fcw=max(t.fusions for t in tracks) >= FUSIONS_FOR_FCW,
         )
 
