@@ -131,9 +131,7 @@ def main() -> None:
     print(f"  build {first_build:.3f} s in a fresh process, {build:.3f} s again")
     print(f"  run   {loop:.3f} s, {1000 * loop / scenario.steps:.4f} ms a step")
     goal = GOAL * scenario.steps / STEPS_OF_GOAL
-    print(
-        f"  {loop / goal:.2f} of the goal of {goal:.2f} s for the run; {first_build + loop:.3f} s with the build"
-    )
+    print(f"  {loop / goal:.2f} of the run's goal of {goal:.2f} s; {first_build + loop:.3f} s with the build")
     print_parts(scenario)
     sys.exit(1 if loop > goal else 0)
 
