@@ -74,6 +74,15 @@ def test_signed_values_stay_in_range(value, raw):
     assert encode(load(CAR_DBC)["STEERING_SENSORS"].fields["STEER_ANGLE"], value) == raw
 
 
+def test_a_packer_forgets_its_last_values():
+    """Frames do not depend on what was packed before: the same values and counter, the same bytes."""
+    used = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",))
+    for kph in (50.0, 50.0, 51.0, 50.0):
+        for counter in (0, 1, 5, 4):
+            fresh = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",))
+            assert used.pack((kph,), counter) == fresh.pack((kph,), counter)
+
+
 @pytest.mark.parametrize("path", [CAR_DBC, RADAR_DBC], ids=lambda path: path.name)
 def test_layouts_are_those_cantools_reads(path):
     """Addresses, sizes and the place, sign and scale of every signal are read as cantools reads them."""
