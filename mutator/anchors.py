@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import libcst as cst
 from libcst.metadata import CodeRange, MetadataWrapper, PositionProvider
@@ -17,6 +18,9 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.shape_errors import suggestion
 from mutator.statements import Function, Statement, collect
+
+if TYPE_CHECKING:
+    from mutator.molds import Mold, Shape
 
 TAG = re.compile(rb"[ \t]*# fi:([0-9a-z]+)(?: guard:(\d+))?(?=\r?\n?\Z)")
 _LONE_CR = re.compile(rb"\r(?!\n)")
@@ -42,7 +46,7 @@ class Site:
 
 @dataclass(frozen=True)
 class ParsedFile:
-    """A Python file of the target: its lines, its functions, and where an import may go."""
+    """A Python file of the target: its lines, its functions, where an import may go, its molds so far."""
 
     path: str
     data: bytes
@@ -53,6 +57,7 @@ class ParsedFile:
     import_line: int
     functions: Mapping[str, tuple[Function, ...]]
     where: Path
+    molds: dict["Shape", "Mold"] = field(default_factory=dict, repr=False, compare=False)
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve(self, location: FaultLocation) -> Site:

@@ -1,18 +1,21 @@
 """From a fault and a trigger to changed files: built, compiled, diffed, identified."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
 from mutator import patch, splice
 from mutator.anchors import ParsedFile
 from mutator.errors import MutatorError
-from mutator.fault_models import FaultModels, SnippetKind
+from mutator.fault_models import PROBE_TEMPLATE, FaultModels, SnippetKind
 from mutator.ids import content_id
 from mutator.manifest import TargetManifest
 from mutator.model import Fault, Hold, Injection, Trigger
+from mutator.molds import Change, Mold, lines_of, proven, shape_of
 from mutator.paths import check_location
 from mutator.render import render, snippet
+from mutator.skeletons import compiles, skeleton
 from mutator.trigger import check_condition, to_code
 
 _OBSERVE_TAG = "observe"
@@ -47,6 +50,19 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     `fault.hold` goes before `trigger.hold`. MutatorError when an anchor is not found or ambiguous (candidates
     are listed), InvalidMutant when the result does not compile.
     """
+    return _build(manifest, models, fault, trigger, _BY_SHAPE)
+
+
+def build_directly(
+    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
+) -> Mutant:
+    """The mutant with each file spliced, compared and compiled anew: what `build` gives must equal it."""
+    return _build(manifest, models, fault, trigger, _DIRECT)
+
+
+def _build(
+    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, way: "_Way"
+) -> Mutant:
     injections = fault.injections if fault else ()
     names = tuple(injection_id(i, injection) for i, injection in enumerate(injections))
     hold = fault.hold if fault and fault.hold else trigger.hold
@@ -58,13 +74,13 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
         file = manifest.tree.parsed(injection.location.path)
         _add(edits, file.path, injection_edit(file, models, injection, name))
     probe = _probe(manifest, models, mutant_id, trigger, hold, names)
-    files = {manifest.probe_path: probe}
-    patches = {manifest.probe_path: patch.new_file(manifest.probe_path, probe.splitlines(keepends=True))}
+    way.compile(probe, (mutant_id, *names), models.folder / PROBE_TEMPLATE)
+    files = {manifest.probe_path: probe.encode()}
+    patches = {manifest.probe_path: patch.new_file(manifest.probe_path, probe)}
     for path, file_edits in edits.items():
         file = manifest.tree.parsed(path)
-        pieces = splice.apply(file, [splice.probe_import(file, manifest.package), *file_edits])
-        files[path] = _checked(file, splice.joined(pieces))
-        patches[path] = patch.changed_file(path, pieces)
+        change = way.change(file, [splice.probe_import(file, manifest.package), *file_edits], names)
+        files[path], patches[path] = change.data, change.patch
     return Mutant(
         id=mutant_id,
         files=dict(sorted(files.items())),
@@ -119,7 +135,7 @@ def _probe(
     trigger: Trigger,
     hold: Hold,
     names: tuple[str, ...],
-) -> bytes:
+) -> str:
     if manifest.probe_path in manifest.tree.files:
         raise MutatorError(
             f"the target has a file {manifest.probe_path}",
@@ -137,26 +153,11 @@ def _probe(
         "armed_after_s": float(trigger.armed_after_s),
         "injections": names,
     }
-    text = render(models.probe, values, models.folder / "_fi.py.j2").encode()
-    _compile(text, models.folder / "_fi.py.j2")
-    return text
+    return render(models.probe, values, models.folder / PROBE_TEMPLATE)
 
 
-def _checked(file: ParsedFile, data: bytes) -> bytes:
-    """The mutated bytes, once they compile and un-splice to the original."""
-    _compile(data, file.where)
-    if unsplice(data) != file.data:
-        raise InvalidMutant(
-            "the mutated file does not un-splice to the original",
-            where=file.where,
-            remedy="anchor at another statement",
-        )
-    return data
-
-
-@lru_cache(maxsize=64)
 def _compile(data: bytes, where: Path) -> None:
-    """InvalidMutant unless `data` compiles. Mutants share files (the observed one), hence the memory."""
+    """InvalidMutant unless `data` compiles."""
     try:
         compile(data, str(where), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError) as error:
@@ -167,6 +168,54 @@ def _compile(data: bytes, where: Path) -> None:
             where=where,
             remedy="correct the template, or anchor at another statement",
         ) from None
+
+
+def _compile_probe(text: str, ids: Sequence[str], where: Path) -> None:
+    _compile(text.encode(), where)
+
+
+def _compile_probe_by_shape(text: str, ids: Sequence[str], where: Path) -> None:
+    if not compiles(skeleton(text, ids).encode()):
+        _compile(text.encode(), where)
+
+
+def _change(file: ParsedFile, edits: Sequence[splice.Edit], ids: Sequence[str]) -> Change:
+    """The file with the edits made: it compiles, and un-splices to the original."""
+    pieces = splice.apply(file, edits)
+    data = splice.joined(pieces)
+    _compile(data, file.where)
+    if unsplice(data) != file.data:
+        raise InvalidMutant(
+            "the mutated file does not un-splice to the original",
+            where=file.where,
+            remedy="anchor at another statement",
+        )
+    return Change(data=data, patch=patch.changed_file(file.path, pieces))
+
+
+def _change_by_shape(file: ParsedFile, edits: Sequence[splice.Edit], ids: Sequence[str]) -> Change:
+    """The same from the mold of the shape; the first of a shape is made directly and leaves its mold."""
+    shape = shape_of(file, edits, ids)
+    mold = file.molds.get(shape)
+    if mold is not None:
+        return mold.filled(lines_of(edits))
+    change = _change(file, edits, ids)
+    mold = Mold.of(change)
+    if proven(file, mold, shape):
+        file.molds[shape] = mold
+    return change
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Way:
+    """How probes are compiled and files changed; the ids are those in the injected lines."""
+
+    compile: Callable[[str, Sequence[str], Path], None]
+    change: Callable[[ParsedFile, Sequence[splice.Edit], Sequence[str]], Change]
+
+
+_DIRECT = _Way(compile=_compile_probe, change=_change)
+_BY_SHAPE = _Way(compile=_compile_probe_by_shape, change=_change_by_shape)
 
 
 def unsplice(data: bytes) -> bytes:

@@ -29,12 +29,13 @@ def changed_file(path: str, pieces: Iterable[Piece]) -> str:
     return f"diff --git a/{path} b/{path}\n--- a/{_name(path)}\n+++ b/{_name(path)}\n{hunks}"
 
 
-def new_file(path: str, lines: Sequence[bytes]) -> str:
-    """The patch that makes a file."""
-    body = "".join(_line("+", line) for line in lines)
+def new_file(path: str, text: str) -> str:
+    """The patch that makes a file of this text, whose lines end with LF."""
+    lines, end = text.removesuffix("\n"), "" if text.endswith("\n") else _NO_NEWLINE
+    body = "+" + lines.replace("\n", "\n+")
     return (
         f"diff --git a/{path} b/{path}\nnew file mode 100644\n--- /dev/null\n+++ b/{_name(path)}\n"
-        f"@@ -0,0 +1,{len(lines)} @@\n{body}"
+        f"@@ -0,0 +1,{lines.count(chr(10)) + 1} @@\n{body}\n{end}"
     )
 
 

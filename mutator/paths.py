@@ -1,5 +1,6 @@
 """Paths that come from data: relative, never out of their folder, never where faults are forbidden."""
 
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,13 @@ if TYPE_CHECKING:
     from mutator.manifest import TargetManifest
 
 
+@lru_cache(maxsize=1024)
 def inside(root: Path, path: str) -> str:
-    """`path` as a clean relative path below `root`; MutatorError (without place) if it leads elsewhere."""
+    """`path` as a clean relative path below `root`; MutatorError (without place) if it leads elsewhere.
+
+    Remembered, as each injection of each mutant asks; links that change later matter not, since what is read
+    of a target is read once.
+    """
     pure = PurePosixPath(path)
     if not path or pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path:
         raise _outside(path)

@@ -22,6 +22,7 @@ from mutator.errors import MutatorError
 from mutator.fault_models import NAMES, FaultModel, SnippetKind
 from mutator.locations import dotted_name
 from mutator.model import Value
+from mutator.skeletons import skeleton
 
 
 def literal(value: object) -> str:
@@ -77,9 +78,10 @@ def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[st
         if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
             raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
     text = render(model.template, {"fi": fi, **names}, model.template_path)
-    lines = tuple(text.removesuffix("\n").split("\n"))
-    _check_lines(lines, model)
-    return lines
+    text = text.removesuffix("\n")
+    if not _are_lines(skeleton(text, (fi,)), model.kind):
+        _check_lines(text, model.kind, model.template_path)
+    return tuple(text.split("\n"))
 
 
 def render(template: str, names: Mapping[str, object], where: Path) -> str:
@@ -115,10 +117,20 @@ def _line_in(error: BaseException) -> int | None:
     return line
 
 
-def _check_lines(lines: tuple[str, ...], model: FaultModel) -> None:
+@lru_cache(maxsize=1024)
+def _are_lines(text: str, kind: SnippetKind) -> bool:
+    """Whether a skeleton passes `_check_lines`, and so every text that has it."""
+    try:
+        _check_lines(text, kind, Path())
+    except MutatorError:
+        return False
+    return True
+
+
+def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
     """Every line must end a statement or open a block: only then can each carry its tag."""
-    text = "\n".join(lines) + "\n"
-    whole = text + "    pass\n" if model.kind is SnippetKind.GUARD else text
+    text += "\n"
+    whole = text + "    pass\n" if kind is SnippetKind.GUARD else text
     try:
         ast.parse(whole)
         ends = [
@@ -127,20 +139,21 @@ def _check_lines(lines: tuple[str, ...], model: FaultModel) -> None:
             if token.type == tokenize.NEWLINE
         ]
     except (SyntaxError, tokenize.TokenError) as error:
-        if isinstance(error, tokenize.TokenError) or model.kind is not SnippetKind.GUARD:
+        if isinstance(error, tokenize.TokenError) or kind is not SnippetKind.GUARD:
             problem = error.args[0]
         else:
             problem = f"{error.msg} (a guard's last line must open a block)"
         raise MutatorError(
             f"the template does not give Python: {problem}: {text!r}",
-            where=model.template_path,
+            where=where,
             remedy="correct the template",
         ) from None
+    lines = text.split("\n")[:-1]
     uneven = any((len(x) - len(x.lstrip(" "))) % 4 or "\t" in x for x in lines)
     if uneven or ends != list(range(1, len(lines) + 1)):
         raise MutatorError(
             f"the template gives {text!r}",
-            where=model.template_path,
+            where=where,
             expected="one statement a line, 4 spaces a level, no blank lines, no comments, no tabs",
             remedy="correct the template",
         )

@@ -21,7 +21,7 @@ class SourceTree:
     root: Path
     files: Mapping[str, bytes]
     digest: str
-    _digests: Mapping[str, str] = field(repr=False)
+    _entries: Mapping[str, str] = field(repr=False)  # what the digest is made of
     _parsed: dict[str, "ParsedFile"] = field(default_factory=dict, repr=False, compare=False)
 
     def parsed(self, path: str) -> "ParsedFile":
@@ -41,12 +41,17 @@ class SourceTree:
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
         """Digest of the tree with `changed` put in."""
-        return _digest({**self._digests, **{path: ids.digest(data) for path, data in changed.items()}})
+        return _digest({**self._entries, **_entries(changed)})
 
 
-def _digest(digests: Mapping[str, str]) -> str:
-    """Digest of a tree from those of its files."""
-    return ids.digest([[path, digest] for path, digest in sorted(digests.items())])
+def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
+    """What each file puts into its tree's digest: its path and its own, as canonical text."""
+    return {path: ids.canonical([path, ids.digest(data)]) for path, data in files.items()}
+
+
+def _digest(entries: Mapping[str, str]) -> str:
+    """Digest of a tree: of the canonical text of its sorted [path, digest], put together from its parts."""
+    return ids.digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
 def read_tree(root: Path, globs: Iterable[str]) -> SourceTree:
@@ -62,8 +67,8 @@ def read_tree(root: Path, globs: Iterable[str]) -> SourceTree:
             and matches(name, patterns)
         ):
             files[name] = path.read_bytes()
-    digests = {name: ids.digest(data) for name, data in files.items()}
-    return SourceTree(root=root, files=files, digest=_digest(digests), _digests=digests)
+    entries = _entries(files)
+    return SourceTree(root=root, files=files, digest=_digest(entries), _entries=entries)
 
 
 def matches(path: str, globs: Iterable[str]) -> bool:

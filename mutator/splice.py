@@ -106,14 +106,19 @@ def _lines(file: ParsedFile, indent: bytes, code: Sequence[str], tag: str) -> tu
     return tuple(result)
 
 
+def in_order(edits: Iterable[Edit]) -> list[Edit]:
+    """Edits from the top of the file to its end; those at one boundary keep their order within a rank."""
+    return sorted(edits, key=lambda e: (e.index, e.rank))
+
+
 def apply(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
     """The file's lines with the edits made, as pieces; `joined` gives the bytes.
 
-    Edits at one boundary keep their order within a rank. MutatorError when two guards want one statement.
+    MutatorError when two guards want one statement.
     """
     pieces: list[Piece] = []
     done = 0
-    for edit in sorted(edits, key=lambda e: (e.index, e.rank)):
+    for edit in in_order(edits):
         if edit.index < done:
             raise MutatorError(
                 "two guards around one statement, or an injection inside a guarded one",

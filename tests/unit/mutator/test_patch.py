@@ -69,4 +69,4 @@ def test_hunks_are_joined_when_close() -> None:
 
 def test_names_with_spaces() -> None:
     """A file name with a space ends in a tab, as patch wants it."""
-    assert "+++ b/a file.py\t\n" in patch.new_file("a file.py", [b"x = 1\n"])
+    assert "+++ b/a file.py\t\n" in patch.new_file("a file.py", "x = 1\n")

@@ -1,0 +1,126 @@
+"""Mutants from molds are those of the direct way, byte for byte, for the faults of the paper and others."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mutator.errors import MutatorError
+from mutator.expand import expand
+from mutator.fault_models import FaultModels, ParamSchema, SnippetKind
+from mutator.manifest import TargetManifest
+from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
+from mutator.mutant import Mutant, build, build_directly
+from mutator.plan import make_plan
+from mutator.spec import READINGS
+from mutator.trigger import VARIABLES
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).parents[2]
+NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 35.0, 1e22, 5e-324, math.nan, math.inf])
+CONDITIONS = st.one_of(
+    st.floats(-1e3, 1e9).map(lambda t: f"t >= {t!r}"),
+    st.tuples(st.sampled_from(VARIABLES), st.floats(-1e9, 1e9)).map(
+        lambda p: f"{p[0]} <= {p[1]!r} and rs > 0.0"
+    ),
+    st.sampled_from(["True", "not hwt / 2.0 > 1.0", "abs(d_rel) < max(v_ego, 3)"]),
+)
+
+
+@cache
+def paper() -> tuple[TargetManifest, FaultModels]:
+    workspace = Workspace.find(root=ROOT)
+    return workspace.manifest("openpilot"), workspace.fault_models()
+
+
+@cache
+def faults() -> list[Fault]:
+    """Every fault of the library, in both readings."""
+    manifest, models = paper()
+    specs = Workspace.find(root=ROOT).specs()
+    return [
+        f for r in READINGS for spec in specs for f in expand(spec, 1, r, models=models, manifest=manifest)
+    ]
+
+
+@st.composite
+def triggers(draw: st.DrawFn) -> Trigger:
+    return Trigger(
+        name=draw(st.sampled_from(["a", "random/C1"])),
+        condition=draw(CONDITIONS),
+        hold=draw(st.sampled_from(Hold)),
+        hold_s=draw(st.floats(0.0, 1e6)),
+        armed_after_s=draw(st.floats(0.0, 1e6)),
+    )
+
+
+@st.composite
+def varied(draw: st.DrawFn) -> Fault:
+    """A fault of the library with other numbers in it, any that there are."""
+    fault = draw(st.sampled_from(faults()))
+    injections = []
+    for injection in fault.injections:
+        params = [
+            (name, draw(NUMBERS) if isinstance(value, float) else value) for name, value in injection.params
+        ]
+        injections.append(replace(injection, params=tuple(params)))
+    return replace(fault, injections=tuple(injections))
+
+
+@st.composite
+def others(draw: st.DrawFn) -> Fault:
+    """A fault of any model of the templates, where the library has one."""
+    manifest, models = paper()
+    model = models.get(draw(st.sampled_from(sorted(models.models))))
+    fault = draw(st.sampled_from(faults()))
+    location = draw(st.sampled_from(fault.injections)).location
+    if model.kind is SnippetKind.GUARD:
+        kind = AnchorKind(location.anchor.kind.replace("after_", "before_"))
+        location = replace(location, anchor=replace(location.anchor, kind=kind))
+    names = sorted(manifest.tree.parsed(location.path).resolve(location).names)
+    params = tuple((p.name, draw(values(p, names))) for p in model.params)
+    return replace(fault, injections=(Injection(location=location, model=model.name, params=params),))
+
+
+def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
+    found: st.SearchStrategy[Value] = {
+        "variable": st.sampled_from(names),
+        "import": st.just("selfdrive.sim.effects.Rain"),
+        "number": NUMBERS,
+        "integer": st.integers(0, 63),
+        "boolean": st.booleans(),
+        "seed": st.integers(0, 2**53),
+    }[param.type]
+    return found | st.none() if param.optional else found
+
+
+def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, str]:
+    """The mutant, or what it is refused with."""
+    try:
+        return way(*paper(), fault, trigger)
+    except MutatorError as error:
+        return type(error), str(error)
+
+
+@settings(max_examples=50, deadline=None)
+@given(varied() | others(), triggers())
+def test_molds_give_what_the_direct_way_gives(fault: Fault, trigger: Trigger) -> None:
+    """Files, patch, ids and digest are the same whatever numbers, models and triggers are; errors too."""
+    made(build, fault, trigger)  # leaves a mold, if it is the first of its shape
+    assert made(build, fault, trigger) == made(build_directly, fault, trigger)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reading", READINGS)
+def test_the_whole_library(reading: str) -> None:
+    """Every mutant of the paper's campaign is the one that the direct way makes."""
+    plan = make_plan(Workspace.find(root=ROOT), "paper", reading=reading)
+    pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
+    assert len(pairs) > 6000
+    for experiment in pairs.values():
+        key = experiment.fault, experiment.trigger
+        assert build(*paper(), *key) == build_directly(*paper(), *key)
