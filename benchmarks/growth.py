@@ -1,0 +1,166 @@
+"""How cost and memory grow with the campaign: plans of 1,000 to 50,000 experiments, and a table of 100,000.
+
+`python benchmarks/growth.py [--json FILE]`. Each size has a process of its own, as the most memory that a
+process ever had is what is asked: it plans and freezes, or does what a worker does before and after each run
+(reads its chunk, builds the mutant, appends the record). Times are CPU. Exit code 1 where a goal is missed.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, replace
+from pathlib import Path
+from time import process_time
+
+from mutator import planfile, results
+from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.mutant import build
+from mutator.plan import Plan, freeze, make_plan
+from mutator.records import SCHEMA, LineWriter
+from mutator.runfolder import RunFolder
+from mutator.statistics.frame import load
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[1]
+SIZES = (1_000, 5_000, 20_000, 50_000)
+TABLE, LOAD_GOAL_S = 100_000, 2.0
+CHUNK = 20
+MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
+
+
+def plan_of(workspace: Workspace, size: int) -> Plan:
+    """The paper's campaign, in so many scenarios as are needed, cut to size."""
+    text = workspace.campaign("paper").read_text()
+    names = workspace.scenario_names()
+    scenarios = names[: -(-size // 2256)]  # a scenario has 282 faults, 4 contexts and 2 methods
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "paper.yaml"
+        path.write_text(text.replace("[S1, S2, S3, S4, S5]", f"[{', '.join(scenarios)}]"))
+        plan = make_plan(workspace, path)
+    count = min(size, len(plan.experiments))
+    chunks = tuple(min(CHUNK, count - first) for first in range(0, count, CHUNK))
+    return replace(plan, experiments=plan.experiments[:count], chunks=chunks)
+
+
+def record(experiment: Experiment, number: int) -> Record:
+    """A made-up record, such that all columns are filled in some rows and empty in others."""
+    active, hazard = number % 5 > 0, number % 10 > 6
+    return Record(
+        experiment_id=experiment.id,
+        status=Status.OK,
+        outcome=Outcome.HAZARD if hazard else Outcome.SDC if active else Outcome.NOT_ACTIVATED,
+        detail="",
+        tree="f" * 64,
+        activation=Activation(first=2.0 + number % 997 / 100, last=30.0, count=number) if active else None,
+        t_manifest=2.05 + number % 997 / 100 if active else None,
+        max_dev=(("gas", number / 7), ("brake", number / 11), ("steer_torque", number / 13)),
+        hazards=(("H1", 20.0 + number % 997 / 100),) if hazard else (),
+        alerts=(("fcw", 19.0 + number % 997 / 100),) if hazard else (),
+        trace_digest="f" * 64,
+    )
+
+
+def most_mb() -> float:
+    """The most memory that this process ever had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def planning(size: int, out: Path) -> dict[str, float]:
+    """Plan and freeze."""
+    workspace = Workspace.find(root=ROOT)
+    began = process_time()
+    plan = plan_of(workspace, size)
+    planned = process_time()
+    freeze(plan, out, workspace)
+    frozen = process_time()
+    return {"plan_s": planned - began, "freeze_s": frozen - planned, "memory_mb": most_mb()}
+
+
+def working(size: int, out: Path) -> dict[str, float]:
+    """What a worker does around its runs, for the whole of a frozen plan of `size`."""
+    workspace = Workspace.find(root=ROOT)
+    folder = RunFolder.open(out)
+    manifest, models = workspace.manifest(folder.head["target"]), workspace.fault_models()
+    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]})
+    began = process_time()
+    faults = planfile.read_faults(out)
+    number = 0
+    for chunk in folder.head["chunks"]:
+        for experiment in planfile.read_chunk(out, chunk, faults):
+            build(manifest, models, experiment.fault, experiment.trigger)
+            lines.append(asdict(record(experiment, number)))
+            number += 1
+    lines.close()
+    return {"work_ms": (process_time() - began) / number * 1e3, "memory_mb": most_mb()}
+
+
+def table(size: int, out: Path) -> dict[str, float]:
+    """The results of so many experiments: tables made from the records, results read."""
+    workspace = Workspace.find(root=ROOT)
+    plan = make_plan(workspace, "paper")
+    more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
+    experiments = tuple(next(more) for _ in range(size))
+    freeze(replace(plan, experiments=experiments, chunks=(size,)), out, workspace)
+    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    for number, experiment in enumerate(experiments):
+        lines.append(asdict(record(experiment, number)))
+    lines.close()
+    began = process_time()
+    path = results.build(out)
+    built = process_time()
+    times = []
+    for _ in range(3):
+        start = process_time()
+        if len(load(path)) != size:
+            raise SystemExit("the table is not complete")
+        times.append(process_time() - start)
+    return {"build_s": built - began, "load_s": min(times)}
+
+
+def apart(work: str, size: int, out: Path) -> dict[str, float]:
+    """A piece of work in a process of its own."""
+    command = [sys.executable, __file__, "--work", work, str(size), str(out)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return dict(json.loads(done.stdout))
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES))
+    parser.add_argument("--json", type=Path, help="file for the figures")
+    parser.add_argument("--work", nargs=3, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.work:
+        name, size, out = options.work
+        works = {"planning": planning, "working": working, "table": table}
+        print(json.dumps(works[name](int(size), Path(out))))
+        return
+    figures: dict[str, dict[str, float]] = {}
+    print(
+        f"{'experiments':>12}{'plan ms':>10}{'freeze ms':>10}{'MB':>8}{'worker ms':>11}{'MB':>8}   (ms each)"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        for size in options.sizes:
+            out = Path(folder) / str(size)
+            plan, work = apart("planning", size, out), apart("working", size, out)
+            each = [plan[key] / size * 1e3 for key in ("plan_s", "freeze_s")]
+            print(
+                f"{size:12}{each[0]:10.3f}{each[1]:10.3f}{plan['memory_mb']:8.0f}"
+                f"{work['work_ms']:11.3f}{work['memory_mb']:8.0f}",
+                flush=True,
+            )
+            figures[str(size)] = plan | {f"worker_{key}": value for key, value in work.items()}
+        figures["table"] = apart("table", TABLE, Path(folder) / "table")
+    print("table of {}: built in {build_s:.1f} s, read in {load_s:.2f} s".format(TABLE, **figures["table"]))
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+    first, last = (figures[str(size)]["worker_memory_mb"] for size in (options.sizes[0], options.sizes[-1]))
+    sys.exit(1 if figures["table"]["load_s"] > LOAD_GOAL_S or last - first > MORE_MEMORY_MB else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""Mutants per second: from molds, the direct way, and the direct way with each file parsed by LibCST again.
+
+`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. First every experiment of the paper's
+campaign has its mutant built, diff, compile check and digests included; then all ways build the same sample
+in turn, round by round. CPU time of this process. Exit code 1 where the campaign's mutants miss their goal.
+"""
+
+import argparse
+import json
+import random
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+from mutator.anchors import parse_file
+from mutator.model import Experiment
+from mutator.mutant import build, build_directly
+from mutator.plan import make_plan
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[1]
+GOAL = 500.0  # mutants a second on one core
+
+
+def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) -> float:
+    """Experiments a second of CPU."""
+    start = process_time()
+    for experiment in experiments:
+        make(experiment)
+    return len(experiments) / (process_time() - start)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sample", type=int, default=200)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--json", type=Path, help="file for the figures")
+    options = parser.parse_args()
+    workspace = Workspace.find(root=ROOT)
+    plan = make_plan(workspace, "paper")
+    manifest, models = workspace.manifest(plan.campaign.target), workspace.fault_models()
+
+    def molded(experiment: Experiment) -> None:
+        build(manifest, models, experiment.fault, experiment.trigger)
+
+    def direct(experiment: Experiment) -> None:
+        build_directly(manifest, models, experiment.fault, experiment.trigger)
+
+    def parsed(experiment: Experiment) -> None:
+        changed = {manifest.observation.location, *(i.location for i in experiment.fault.injections)}
+        for path in {location.path for location in changed}:
+            parse_file(path, manifest.tree.files[path], manifest.root)
+        direct(experiment)
+
+    whole = rate(molded, list(plan.experiments))
+    print(f"the paper's {len(plan.experiments)}: {whole:.0f} a second (goal {GOAL:.0f})")
+    sample = random.Random(1).sample(plan.experiments, options.sample)
+    ways = {"molds": molded, "direct": direct, "direct, parsed": parsed}
+    rates: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(options.rounds):
+        for name, make in ways.items():
+            rates[name].append(rate(make, sample[: 20 if make is parsed else None]))
+    for name, values in rates.items():
+        ratios = [mold / value for mold, value in zip(rates["molds"], values, strict=True)]
+        print(f"  {name:16}{median(values):8.1f} a second, molds {median(ratios):7.2f} times as many")
+    if options.json:
+        figures = {"unit": "1/s of CPU", "campaign": whole, "rates": rates}
+        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+    sys.exit(1 if whole < GOAL else 0)
+
+
+if __name__ == "__main__":
+    main()
