@@ -55,7 +55,7 @@ def main() -> int:
             continue
         for amount in (amounts[0], amounts[-1]):
             start = process_time()
-            effect = kind(amount, 1, camera)
+            effect = kind(amount, 1, camera).ready()
             made = 1000.0 * (process_time() - start)
             moments = [Moment(2.0 + 0.05 * k, 50.0 + 1.341 * k, 26.82) for k in range(given.repeat)]
             times = [milliseconds(lambda m=m, e=effect: e.apply(picture, m)) for m in moments]

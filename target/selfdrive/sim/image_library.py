@@ -19,6 +19,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim import image_folder, lead_picture, road_look, road_renderer, road_texture
 from selfdrive.sim.image_folder import ImageFolder
+from selfdrive.sim.picture import Picture
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.vision import Pictures
@@ -45,22 +46,24 @@ class ImageLibrary:
     spacing: float | None
     fps: float | None
 
-    def frame(self, t: float, position: float) -> np.ndarray:
-        """The picture (rows x width, read-only) at time `t` (s), after `position` m."""
-        number = t * self.fps if self.spacing is None else position / self.spacing
-        return self.frames[int(number + 1e-6) % len(self.frames)]
+    def frame(self, t: float, position: float) -> Picture:
+        """The picture at time `t` (s), after `position` m."""
+        passed = t * self.fps if self.spacing is None else position / self.spacing
+        number = int(passed + 1e-6) % len(self.frames)
+        return Picture((self.digest, number), self.frames.shape[1:], lambda *_: self.frames[number])
 
 
 def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
     """The pictures a run asks for, from the cache where they are there. ConfigError where it cannot be."""
     cv2.setNumThreads(1)
-    cache = _cache_folder(pictures.cache)
+    cache = cache_folder(pictures.cache)
     if pictures.frames is not None:
         return _own(ImageFolder(pictures.frames), cache)
     return _rendered(CameraModel(), pictures.marks, seed, cache)
 
 
-def _cache_folder(cache: Path) -> Path:
+def cache_folder(cache: Path) -> Path:
+    """The folder to keep pictures in. Raises ConfigError where it is in a home that nobody knows."""
     try:
         return cache.expanduser()
     except RuntimeError:

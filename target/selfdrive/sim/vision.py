@@ -84,17 +84,20 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
     }
     return Vision(
         camera=camera,
-        detector=_detector(pictures.detector, library),
+        detector=_detector(pictures, library),
         description=description,
         model=library.model,
     )
 
 
-def _detector(name: str, library) -> LaneDetector:
-    if name == PAPER:
-        from selfdrive.visiond.paper_detector import PaperDetector
+def _detector(pictures: Pictures, library) -> LaneDetector:
+    from selfdrive.sim.detection_memory import DetectionMemory
+    from selfdrive.sim.image_library import cache_folder
+    from selfdrive.sim.remembering_detector import RememberingDetector
 
-        return PaperDetector(library.model)
-    from selfdrive.visiond.robust_detector import RobustDetector
-
-    return RobustDetector(library.model)
+    if pictures.detector == PAPER:
+        from selfdrive.visiond.paper_detector import PaperDetector as Detector
+    else:
+        from selfdrive.visiond.robust_detector import RobustDetector as Detector
+    memory = DetectionMemory(cache_folder(pictures.cache))
+    return RememberingDetector(Detector(library.model), (pictures.detector, library.model), memory)

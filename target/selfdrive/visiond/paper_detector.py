@@ -24,6 +24,8 @@ NEED = 2  # marked windows of the four that share a tile
 class PaperDetector:
     """Looks at pictures of one camera; remembers none of them."""
 
+    state: tuple[float, ...] = ()  # nothing is remembered
+
     def __init__(self, model: CameraModel) -> None:
         self._region = RoadRegion(model)
         self._hog = Hog(*self._region.shape)

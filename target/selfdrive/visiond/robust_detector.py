@@ -4,6 +4,8 @@ What it saw last tells where to look next, so that rain, snow or dirt, which giv
 count; a line that is not seen stays where the other one puts it, and both stay for a while when none is.
 """
 
+import numpy as np
+
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.visiond.band_filter import mark_points
@@ -30,9 +32,20 @@ class RobustDetector:
         self._missed = 0  # pictures since a line was seen
         self._probs = (0.0, 0.0)
 
+    @property
+    def state(self) -> tuple[float, ...]:
+        """All that is remembered, as numbers: what is set here is what was read once."""
+        return (self._missed, *self._probs, *(self._pose or ()))
+
+    @state.setter
+    def state(self, numbers: tuple[float, ...]) -> None:
+        missed, left, right, *pose = numbers
+        self._missed, self._probs = int(missed), (left, right)
+        self._pose = Pose(*pose) if pose else None
+
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in the view's picture, which is of the camera's size."""
-        road = self._view.map(view.picture)
+        road = self._view.map(np.asarray(view.picture))
         voters = Voters(self._view, mark_points(road), self._view.rows_with_content(road))
         belief = self._belief()
         pose = fit(elect(voters, belief), voters, belief)

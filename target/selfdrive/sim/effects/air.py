@@ -49,7 +49,7 @@ def airlight(picture: np.ndarray, camera: CameraModel) -> float:
 class Fog(Effect):
     """Even fog of a given visibility."""
 
-    UNIT, LEAST, MOST = "m", 5.0, 20000.0
+    UNIT, LEAST, MOST, MOVING = "m", 5.0, 20000.0, False
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._kept = clearness(extinction(self.amount), self.camera)

@@ -5,13 +5,15 @@ optics hold for them as they stand.
 """
 
 from abc import ABC, abstractmethod
+from dataclasses import astuple
 from math import isfinite
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
+from selfdrive.sim.picture import Picture
 
 WHITE = 255
 
@@ -35,28 +37,38 @@ class Scene(Protocol):
         ...
 
 
+class Moment(NamedTuple):
+    """A scene that stays what it is."""
+
+    t: float
+    position: float
+    v_ego: float
+
+
 class Effect(ABC):
     """One effect at one amount, in `UNIT`, from `LEAST` to `MOST`, for one camera.
 
-    Everything random is drawn from the seed when the effect is made, in a stream of the effect's own: two
-    effects with one seed are independent of each other. Afterwards nothing is kept from picture to
-    picture, so that pictures may be asked for in any order. Raises ConfigError for an amount out of range.
+    Everything random is drawn from the seed, in a stream of the effect's own: two effects with one seed are
+    independent of each other. Nothing is kept from picture to picture, so that pictures may be asked for in
+    any order, or not at all. Raises ConfigError for an amount out of range.
     """
 
     UNIT: ClassVar[str]
     LEAST: ClassVar[float]
     MOST: ClassVar[float]
     WHOLE: ClassVar[bool] = False  # whether the amount counts something
+    MOVING: ClassVar[bool] = True  # False: pictures change alike at any moment
 
     def __init__(self, amount: float, seed: int, camera: CameraModel) -> None:
         self._check(amount, seed)
         self.amount = amount
         self.seed = seed
         self.camera = camera
-        self._prepare(np.random.Generator(np.random.PCG64([seed, *type(self).__name__.encode()])))
+        self._key = type(self).__module__, type(self).__name__, amount, seed, astuple(camera)
+        self._prepared = False
 
-    def apply(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        """The picture, uint8 (rows, width), as this effect shows it at that moment; a new array.
+    def apply(self, picture: np.ndarray | Picture, scene: Scene) -> np.ndarray | Picture:
+        """The picture, uint8 (rows, width), as this effect shows it at that moment; a new one.
 
         Raises ConfigError for a picture of another type or size than the camera's.
         """
@@ -65,7 +77,23 @@ class Effect(ABC):
             got = f"{type(self).__name__}: a picture of {picture.dtype} and shape {picture.shape}"
             expected = f"uint8 and shape {size}, the camera's"
             raise ConfigError(got, expected=expected, remedy="give a grey picture of this camera")
-        return self._affect(picture, scene)
+        moment = Moment(scene.t, scene.position, scene.v_ego) if self.MOVING else None
+        if not isinstance(picture, Picture):
+            return self._seen(picture, moment)
+        if not type(self).__module__.startswith(f"{__package__}."):  # nobody knows what it follows from
+            return self._seen(picture.pixels(), moment)
+        return picture.changed((self._key, moment), lambda *_: self._seen(picture.pixels(), moment))
+
+    def ready(self) -> Self:
+        """Itself, with all made that is the same for all pictures: for those who measure how long it takes."""
+        if not self._prepared:
+            self._prepare(np.random.Generator(np.random.PCG64([self.seed, *type(self).__name__.encode()])))
+            self._prepared = True
+        return self
+
+    def _seen(self, picture: np.ndarray, moment: Moment | None) -> np.ndarray:
+        """The changed picture. Only now what it takes is made: no pictures of this effect may be looked at."""
+        return self.ready()._affect(picture, moment)
 
     @property
     def thickness(self) -> float:
@@ -77,8 +105,8 @@ class Effect(ABC):
         """Make what is the same for all pictures."""
 
     @abstractmethod
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        """The changed picture."""
+    def _affect(self, picture: np.ndarray, scene: Moment | None) -> np.ndarray:
+        """The changed picture; `scene` is given to MOVING effects."""
 
     def _check(self, amount: float, seed: int) -> None:
         name = type(self).__name__

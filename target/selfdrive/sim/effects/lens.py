@@ -16,6 +16,8 @@ BLOB_BLUR = 7.0  # px
 class _OnLens(Effect):
     """Something that covers a share of each pixel, the same in all pictures."""
 
+    MOVING = False
+
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         return cv2.add(cv2.multiply(picture, self._open, scale=1.0 / 255.0), self._dirt)
 

@@ -31,7 +31,7 @@ class SunGlare(Effect):
     Engineering Society's clear sky. Where the sun stands is drawn from the seed.
     """
 
-    UNIT, LEAST, MOST = "times a clear eye", 0.0, 10.0
+    UNIT, LEAST, MOST, MOVING = "times a clear eye", 0.0, 10.0, False
 
     def _prepare(self, random: np.random.Generator) -> None:
         height = random.uniform(*SUN_HEIGHT)

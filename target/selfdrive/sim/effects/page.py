@@ -14,7 +14,7 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim.effects.effect import Effect
+from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.levels import PAPER, PHYSICAL
 from selfdrive.sim.effects.severity import RoadGauge, Severity
 from selfdrive.sim.road_renderer import RoadRenderer
@@ -72,14 +72,6 @@ class Row(NamedTuple):
     severity: Severity
     found: tuple[float, ...]  # share of pictures, for each detector
     picture: np.ndarray  # the last one, in colour, with lines
-
-
-class Moment(NamedTuple):
-    """What effects know of the world."""
-
-    t: float
-    position: float
-    v_ego: float
 
 
 class Studio:

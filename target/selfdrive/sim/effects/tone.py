@@ -10,6 +10,8 @@ from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 class _Tone(Effect):
     """A change of every grey level by itself."""
 
+    MOVING = False
+
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         return cv2.LUT(picture, self._levels)
 
@@ -38,7 +40,7 @@ class Brightness(_Tone):
 class AveragingBlur(Effect):
     """The mean of a square. The paper's kernels: 3, 4, 5, 6."""
 
-    UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
+    UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._kernel = int(self.amount), int(self.amount)
@@ -51,17 +53,21 @@ class _OddKernel(Effect):
     """A blur whose kernel has a middle."""
 
     def _prepare(self, random: np.random.Generator) -> None:
-        if self.amount % 2 != 1:
+        """Nothing is the same for all pictures."""
+
+    def _check(self, amount: float, seed: int) -> None:
+        super()._check(amount, seed)
+        if amount % 2 != 1:
             name, expected = type(self).__name__, f"an odd number of {self.UNIT}"
             raise ConfigError(
-                f"{name}: amount {self.amount:g}", expected=expected, remedy="correct the amount"
+                f"{name}: amount {amount:g}", expected=expected, remedy="correct the amount"
             )
 
 
 class GaussianBlur(_OddKernel):
     """A Gaussian in a square kernel, its width chosen by the kernel's. The paper's kernels: 3, 5, 7."""
 
-    UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
+    UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         return cv2.GaussianBlur(picture, (int(self.amount), int(self.amount)), 0)
@@ -70,7 +76,7 @@ class GaussianBlur(_OddKernel):
 class MedianBlur(_OddKernel):
     """The median of a square. The paper's apertures: 3 and 5."""
 
-    UNIT, LEAST, MOST, WHOLE = "px", 1, 31, True
+    UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         return cv2.medianBlur(picture, int(self.amount))

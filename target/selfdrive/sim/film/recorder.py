@@ -11,6 +11,8 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import writing
 from selfdrive.manager import Manager
@@ -70,7 +72,7 @@ class Film:
         import cv2  # runs without pictures do without
 
         name = f"{self._count:05d}.jpg"
-        data = cv2.imencode(".jpg", view.picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+        data = cv2.imencode(".jpg", np.asarray(view.picture), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
         with self._writing():
             (self._folder / name).write_bytes(data)
         return name

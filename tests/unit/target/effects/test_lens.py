@@ -17,5 +17,5 @@ def test_mud_covers_its_share(coverage, camera, moment):
 
 def test_more_mud_holds_all_of_less(camera, moment):
     """Levels of one seed grow out of the same clods."""
-    less, more = (LensMud(coverage, 0, camera)._open.astype(int) for coverage in (0.1, 0.4))
+    less, more = (LensMud(coverage, 0, camera).ready()._open.astype(int) for coverage in (0.1, 0.4))
     assert (more <= less).all()

@@ -17,8 +17,8 @@ def test_rays_meet_the_horizon(camera):
 
 def test_glare_falls_off_with_the_square_of_the_angle(camera):
     """Twice as far from the sun there is a quarter of the veil; it grows with the scatter."""
-    veil = SunGlare(0.5, 3, camera)._light.astype(float)
-    more = SunGlare(1.0, 3, camera)._light.astype(float)
+    veil = SunGlare(0.5, 3, camera).ready()._light.astype(float)
+    more = SunGlare(1.0, 3, camera).ready()._light.astype(float)
     sky = veil[: int(camera.horizon)]
     row, column = np.unravel_index(sky.argmax(), sky.shape)
     assert abs(column - camera.cx) < 70 and sky[row, column] == 255

@@ -30,7 +30,7 @@ def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_falling_keeps_what_falls(effect, camera, moment):
     """Who leaves the screen enters it again: a layer's levels are always the same ones."""
-    made = effect(3, 0, camera)
+    made = effect(3, 0, camera).ready()
     for tile in made._tiles:
         first, later = tile.moved(0.0, 0.0), tile.moved(-35.0, 412.0)
         assert np.array_equal(np.sort(first, axis=None), np.sort(later, axis=None))
@@ -39,7 +39,7 @@ def test_falling_keeps_what_falls(effect, camera, moment):
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_drops_fall(effect, camera, moment):
     """From picture to picture every layer moves down, near ones faster, by less than half the screen."""
-    made = effect(1, 0, camera)
+    made = effect(1, 0, camera).ready()
     ways = []
     for tile in made._tiles:
 

@@ -16,7 +16,7 @@ def alone(camera, *, size=0.004, speed=0.0, reach=8.0, number=400):
 
 def test_rain_has_marshall_and_palmers_spectrum(camera):
     """There are as many drops in a box as 8000 * exp(-slope * D) says, and small ones are more."""
-    rain = Rain(25.0, 0, camera)
+    rain = Rain(25.0, 0, camera).ready()
     slope = 4.1 * 25.0**-0.21
     sizes_of_all = 1000.0 * rain._particles._size
     for least, most in ((1.0, 2.0), (2.0, 3.0), (3.0, 6.0)):

@@ -8,7 +8,8 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.camera import Camera
 from selfdrive.sim.image_library import SPACING, ImageLibrary
-from selfdrive.sim.picture_camera import HEADING_STEP, OFFSET_STEP, SHIFT_DISTANCE, PictureCamera
+from selfdrive.sim.moved_picture import HEADING_STEP, OFFSET_STEP, SHIFT_DISTANCE
+from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.road import Road
 from selfdrive.sim.road_renderer import RoadRenderer, first_road_row
 from selfdrive.sim.vision import GROUND, SHIFT, Pictures, build_vision

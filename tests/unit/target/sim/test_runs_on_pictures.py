@@ -88,7 +88,7 @@ def test_the_loop_closes_through_the_picture(
     monkeypatch, scenarios, frames, tmp_path, translation, left_over
 ):
     """A controller that knows the lane from pictures alone steers a car from aside into the middle."""
-    monkeypatch.setattr(vision, "_detector", lambda name, library: LineReader(library.model))
+    monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(frames=frames, translation=translation, cache=tmp_path / "cache")
     result = simulate(brought_aside(scenarios, 1000), 0, pictures)
     offset = np.abs(result.trace["lateral_offset"])
@@ -130,7 +130,7 @@ def test_runs_without_pictures_load_nothing_for_them():
 @pytest.mark.parametrize("translation", [GROUND, SHIFT])
 def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, tmp_path_factory, translation):
     """With lines read from the pictures no scenario leaves the lane's middle, or alerts the driver."""
-    monkeypatch.setattr(vision, "_detector", lambda name, library: LineReader(library.model))
+    monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):
         result = simulate(load_scenario(scenarios / f"{name}.yaml"), 0, pictures)

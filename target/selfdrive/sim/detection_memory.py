@@ -1,0 +1,101 @@
+"""What detectors saw in pictures, kept in a file that all runs share.
+
+The file is a table of fixed size. An entry has the digest of all that a detection follows from, a check of
+its own, and numbers. Processes read and write it at the same time without a lock: who finds an entry damaged,
+half written or overwritten by another one does the work again, and writes what every other would write.
+Without such a file, on a full disk for instance, nothing is remembered.
+"""
+
+import os
+import struct
+from collections.abc import Sequence
+from hashlib import blake2b
+from pathlib import Path
+
+FILE = "detections-1.table"
+MOST = 20  # numbers in an entry
+KEY, CHECK = 16, 8  # bytes
+_VALUE = struct.Struct(f"<q{MOST}d")
+ENTRY = KEY + CHECK + _VALUE.size  # 192 bytes
+WAYS = 8  # entries of a bucket, in any of which one may lie
+BUCKETS = 1 << 17  # 2^20 entries, 201 MB once all are in use; the file has no more bytes on disk than that
+_BUCKET = WAYS * ENTRY
+
+
+class DetectionMemory:
+    """The table in the folder `cache`. `recall` and `keep` never fail."""
+
+    def __init__(self, cache: Path) -> None:
+        self._file = _opened(cache / FILE)
+
+    def recall(self, key: bytes) -> tuple[float, ...] | None:
+        """The numbers kept under a key of KEY bytes; None where there are none."""
+        bucket = self._bucket(key)
+        at = _place(bucket, key)
+        if at is None:
+            return None
+        value = bucket[at + KEY + CHECK : at + ENTRY]
+        if bucket[at + KEY : at + KEY + CHECK] != _check(key, value):
+            return None
+        count, *numbers = _VALUE.unpack(value)
+        return tuple(numbers[:count])
+
+    def keep(self, key: bytes, numbers: Sequence[float]) -> None:
+        """Keep at most MOST numbers under a key; in a full bucket they take another entry's place."""
+        if self._file is None:
+            return
+        bucket = self._bucket(key)
+        at = _place(bucket, key)
+        if at is None:
+            at = _place(bucket, bytes(KEY))
+        if at is None:
+            at = key[-1] % WAYS * ENTRY
+        value = _VALUE.pack(len(numbers), *numbers, *([0.0] * (MOST - len(numbers))))
+        try:
+            os.pwrite(self._file.fileno(), key + _check(key, value) + value, _start(key) + at)
+        except OSError:
+            self._file = None
+
+    def _bucket(self, key: bytes) -> bytes:
+        """The bytes of the bucket that a key belongs to; empty entries where there are none."""
+        bucket = b""
+        if self._file is not None:
+            try:
+                bucket = os.pread(self._file.fileno(), _BUCKET, _start(key))
+            except OSError:
+                self._file = None
+        return bucket.ljust(_BUCKET, b"\0")
+
+
+def _opened(path: Path):
+    """The table's file, made where it is missing; None where it cannot be had.
+
+    It is read and written by position, not mapped: a disk that is full then is an error, not a signal, and
+    processes that share the open file after a fork do not move each other's place in it.
+    """
+    if not hasattr(os, "pwrite"):
+        return None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o644), "r+b", buffering=0)
+        if os.fstat(file.fileno()).st_size < BUCKETS * _BUCKET:
+            file.truncate(BUCKETS * _BUCKET)  # nothing but a hole, until entries are written
+    except OSError:
+        return None
+    return file
+
+
+def _start(key: bytes) -> int:
+    return int.from_bytes(key[:8], "little") % BUCKETS * _BUCKET
+
+
+def _place(bucket: bytes, key: bytes) -> int | None:
+    """Where in the bucket the entry with this key begins."""
+    for at in range(0, _BUCKET, ENTRY):
+        if bucket[at : at + KEY] == key:
+            return at
+    return None
+
+
+def _check(key: bytes, value: bytes) -> bytes:
+    return blake2b(key + value, digest_size=CHECK).digest()
