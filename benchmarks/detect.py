@@ -30,7 +30,7 @@ from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, NEED, PaperDetect
 from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
 REPEATS = 300
-GOAL, FOUL_GOAL = 2.5, 4.0  # ms for a detection, in fair weather and foul
+GOAL, FOUL_GOAL = 1.5, 4.0  # ms for a detection, in fair weather and foul
 STEPS = "detect", "hog", "edges", "dbscan", "lines", "edge pixels"
 
 

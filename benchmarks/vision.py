@@ -1,7 +1,7 @@
-"""What pictures cost: drawing a frame, moving it to the car's pose, and opening the image library.
+"""What pictures cost: drawing a frame, moving it to the car's pose, opening the library, and whole runs.
 
-`python benchmarks/vision.py [render] [view] [library] [--repeat N]`. Times are CPU time of this process, in
-one thread; the median counts, and the fastest tells what the machine can do when nothing else runs on it.
+`python benchmarks/vision.py [render] [view] [library] [runs] [--repeat N]`. Times are CPU time of this
+process, in one thread; the median counts, and the fastest tells what the machine can do when idle.
 Exit code 1 where a median misses its goal.
 """
 
@@ -9,6 +9,7 @@ import argparse
 import statistics
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
@@ -18,21 +19,23 @@ sys.path.insert(0, str(ROOT / "target"))
 
 import cv2  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
+from selfdrive.sim.detection_memory import FILE  # noqa: E402
 from selfdrive.sim.image_library import SPACING, open_library  # noqa: E402
-from selfdrive.sim.picture_camera import GroundView, ShiftedView  # noqa: E402
+from selfdrive.sim.moved_picture import GroundView, ShiftedView  # noqa: E402
+from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
-from selfdrive.sim.vision import Pictures  # noqa: E402
+from selfdrive.sim.run import simulate  # noqa: E402
+from selfdrive.sim.scenario import load_scenario  # noqa: E402
+from selfdrive.sim.vision import DETECTORS, Pictures  # noqa: E402
+from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
 GOALS = {"render": 2.0, "view": 0.75}  # ms: a grey frame of 640 x 480, moved by the ground's homography
+RUN_GOAL = 1500.0  # ms: 30 s of driving with pictures of which nothing is known yet
 
 
 def times(work: Callable[[int], object], repeat: int) -> list[float]:
     """CPU time of each call (ms), but for the first, which warms up."""
-    spent = []
-    for number in range(repeat + 1):
-        start = process_time()
-        work(number)
-        spent.append(1000.0 * (process_time() - start))
+    spent = [spent_in(partial(work, number)) for number in range(repeat + 1)]
     return spent[1:]
 
 
@@ -59,10 +62,15 @@ def render(repeat: int) -> bool:
 def view(repeat: int) -> bool:
     """One frame moved to a pose that changes."""
     model = CameraModel()
-    frame = RoadRenderer(model, "dashed", 0, periods=1).grey(0.0)
+    drawn = RoadRenderer(model, "dashed", 0, periods=1).grey(0.0)
+    frame = Picture(("drawn",), drawn.shape, lambda *_: drawn)
     ground, shifted = GroundView(model), ShiftedView(model)
-    good = show("view: ground", times(lambda n: ground.seen(frame, 0.01 * n, 0.02), repeat), GOALS["view"])
-    show("view: shift", times(lambda number: shifted.seen(frame, 0.01, 0.0), repeat))
+    whole = times(lambda number: ground.seen(frame, 0.01 * number, 0.02).pixels(), repeat)
+    part = RoadRegion(model).part
+    looked_at = times(lambda number: ground.seen(frame, 0.01 * number, 0.02)[part], repeat)
+    good = show("view: ground", whole, GOALS["view"])
+    show("view: ground, what `paper` looks at", looked_at)
+    show("view: shift", times(lambda number: shifted.seen(frame, 0.01, 0.0).pixels(), repeat))
     return good
 
 
@@ -70,21 +78,40 @@ def library(repeat: int) -> bool:
     """The image library, made anew and then from its cache."""
     with TemporaryDirectory() as folder:
         pictures = Pictures(cache=Path(folder))
-        show("library: cold, 600 frames", [cold(pictures, seed) for seed in range(2)])
+        made = [spent_in(partial(open_library, pictures, seed)) for seed in range(2)]
+        show("library: cold, 600 frames", made)
         show("library: warm", times(lambda number: open_library(pictures, 0), 5))
     return True
 
 
-def cold(pictures: Pictures, seed: int) -> float:
-    """CPU time (ms) of opening a library that is not in the cache."""
+def runs(repeat: int) -> bool:
+    """Thirty seconds of driving: without pictures, and with ones of which nothing or all is known."""
+    scenario, good = load_scenario(ROOT / "fault_library/scenarios/S1.yaml"), True
+    show("runs: without pictures", times(lambda number: simulate(scenario, 0), 2))
+    with TemporaryDirectory() as folder:
+        for detector in DETECTORS:
+            pictures = Pictures(detector=detector, cache=Path(folder))
+            work = partial(simulate, scenario, 0, pictures)
+            work()
+            unknown = []
+            for _ in range(3):
+                (Path(folder) / FILE).unlink()
+                unknown.append(spent_in(work))
+            good &= show(f"runs: {detector}, nothing is known", unknown, RUN_GOAL)
+            show(f"runs: {detector}, all is known", [spent_in(work) for _ in range(3)])
+    return good
+
+
+def spent_in(work: Callable[[], object]) -> float:
+    """CPU time (ms) of one call."""
     start = process_time()
-    open_library(pictures, seed)
+    work()
     return 1000.0 * (process_time() - start)
 
 
 def main() -> None:
     """Measure and print; exit 1 where a goal is missed."""
-    parts = {"render": render, "view": view, "library": library}
+    parts = {"render": render, "view": view, "library": library, "runs": runs}
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
         "parts", nargs="*", metavar="PART", help=f"of {', '.join(parts)}; all if none is given"

@@ -42,9 +42,7 @@ class GroundView:
             ),
         )
 
-    def _moved(
-        self, frame: np.ndarray, offset: float, heading: float, rows: int, columns: int
-    ) -> np.ndarray:
+    def _moved(self, frame: np.ndarray, offset: float, heading: float, rows: int, columns: int) -> np.ndarray:
         """So many of the moved frame's first rows; below the horizon, columns that are not asked for may be
         missing.
         """

@@ -50,7 +50,7 @@ class RememberingDetector:
 
     def __init__(self, detector: StatedDetector, made_of: object, memory: DetectionMemory) -> None:
         self._detector, self._memory = detector, memory
-        self._seeing = seeing_digest() + repr(made_of).encode()
+        self._seeing = seeing_digest(Path(selfdrive.__path__[0])) + repr(made_of).encode()
 
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in the view's picture. An array, of which nobody knows what it shows, is looked at."""
@@ -68,9 +68,8 @@ class RememberingDetector:
         return lines
 
 
-def seeing_digest() -> bytes:
-    """Stands for the code that sees, as it lies in the tree that runs, and for what it calculates with."""
-    (root,) = map(Path, selfdrive.__path__)
+def seeing_digest(root: Path) -> bytes:
+    """Stands for the code that sees, as it lies in the package at `root`, and for what it calculates with."""
     digest = sha256()
     calculator = sys.version, platform.machine(), cv2.__version__, cv2.getCPUFeaturesLine(), np.__version__
     digest.update(repr(calculator).encode())

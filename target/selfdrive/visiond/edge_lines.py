@@ -39,9 +39,13 @@ class EdgeLines:
 
     def __init__(self, model: CameraModel, region: RoadRegion) -> None:
         self._model = model
-        self._first = region.first_row, region.first_column
         rows = np.arange(region.shape[0]) + region.first_row
-        self._scale = np.array([model.metres_per_pixel(row) for row in rows])
+        scales = np.array([model.metres_per_pixel(row) for row in rows])
+        # Of every pixel: to look up is quicker than to divide.
+        row, column = np.indices(region.shape, float)
+        self._row = (row + region.first_row).ravel()
+        self._column = (column + region.first_column).ravel()
+        self._scale = np.repeat(scales, region.shape[1])
 
     def nearest(
         self, mask: np.ndarray, rising: np.ndarray, labels: np.ndarray
@@ -51,14 +55,13 @@ class EdgeLines:
         For each of its pixels, in row-major order, `rising` tells whether the picture gets brighter there,
         `labels` the cluster.
         """
-        row, column = np.divmod(np.flatnonzero(mask.view(bool)), mask.shape[1])
-        scale = self._scale.take(row)
-        points = Points(row + float(self._first[0]), column + float(self._first[1]), rising, scale)
         clustered = labels >= 0
         if not clustered.any():
             return None, None
+        at = np.flatnonzero(mask.view(bool))
         if not clustered.all():
-            points, labels = points.some(np.flatnonzero(clustered)), labels[clustered]
+            at, rising, labels = at[clustered], rising[clustered], labels[clustered]
+        points = Points(self._row.take(at), self._column.take(at), rising, self._scale.take(at))
         size, spread, a, b = _fit(points.row, points.column, labels)
         y, slope = self._model.line_on_road(a, b)
         usable = (size >= MIN_PIXELS) & (spread >= MIN_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
@@ -90,18 +93,26 @@ class EdgeLines:
         """
         own = points
         for reach in REACHES:
-            away = np.abs(own.column - a * own.row - b) * own.scale
+            away = np.abs(_away(own, a, b))
             own = own.some(np.flatnonzero(away <= reach))
             if own.row.size < MIN_PIXELS:
                 return None, 0
             spread, a, b = _fit_one(own.row, own.column)
         y, slope = self._model.line_on_road(a, b)
-        away = (own.column - a * own.row - b) * own.scale
+        away = _away(own, a, b)
         if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
             return None, 0
         doubt = float(away @ away) / away.size / SURE_SPREAD**2
         prob = min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt)
         return RoadLine(y=y, slope=slope, prob=prob), own.row.size
+
+
+def _away(points: Points, a: float, b: float) -> np.ndarray:
+    """How far (m) points are to the right of the line column = a * row + b."""
+    away = points.column - a * points.row
+    away -= b
+    away *= points.scale
+    return away
 
 
 def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:

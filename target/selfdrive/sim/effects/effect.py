@@ -85,14 +85,14 @@ class Effect(ABC):
         return picture.changed((self._key, moment), lambda *_: self._seen(picture.pixels(), moment))
 
     def ready(self) -> Self:
-        """Itself, with all made that is the same for all pictures: for those who measure how long it takes."""
+        """Itself, with all made that is the same for all pictures."""
         if not self._prepared:
             self._prepare(np.random.Generator(np.random.PCG64([self.seed, *type(self).__name__.encode()])))
             self._prepared = True
         return self
 
     def _seen(self, picture: np.ndarray, moment: Moment | None) -> np.ndarray:
-        """The changed picture. Only now what it takes is made: no pictures of this effect may be looked at."""
+        """The changed picture. What it takes is made only now, as pictures need not be looked at."""
         return self.ready()._affect(picture, moment)
 
     @property

@@ -59,9 +59,7 @@ class _OddKernel(Effect):
         super()._check(amount, seed)
         if amount % 2 != 1:
             name, expected = type(self).__name__, f"an odd number of {self.UNIT}"
-            raise ConfigError(
-                f"{name}: amount {amount:g}", expected=expected, remedy="correct the amount"
-            )
+            raise ConfigError(f"{name}: amount {amount:g}", expected=expected, remedy="correct the amount")
 
 
 class GaussianBlur(_OddKernel):

@@ -132,3 +132,17 @@ def test_pictures_show_no_curves():
     """A road with curvature and pictures, which are of a straight one, are refused together."""
     with pytest.raises(ConfigError, match="a road with curvature, expected a straight road"):
         build_vision(Pictures(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
+
+
+@pytest.mark.parametrize("translation", [GROUND, SHIFT])
+@CAMERAS
+def test_a_part_is_that_of_the_whole_view(model, translation, truth):
+    """Of a moved frame whatever is cut out, to any row and column, has the bytes that all of it has there."""
+    looking, _ = camera(model, translation, frames=1)
+    random = np.random.default_rng(4)
+    for _ in range(60):
+        pose = truth(lateral_offset=random.normal(0.0, 0.4), heading=random.normal(0.0, 0.02))
+        row, column = random.integers(0, (model.rows - 1, model.width - 1))
+        last, right = random.integers((row + 1, column + 1), (model.rows + 1, model.width + 1))
+        part = looking.look(pose).picture[row:last, column:right]
+        assert np.array_equal(part, looking.look(pose).picture.pixels()[row:last, column:right])

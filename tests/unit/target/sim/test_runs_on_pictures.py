@@ -11,12 +11,16 @@ import pytest
 import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim import vision
+from selfdrive.sim import detection_memory, vision
+from selfdrive.sim.detection_memory import ENTRY, FILE
+from selfdrive.sim.effects import PaperRain
 from selfdrive.sim.image_library import SPACING
+from selfdrive.sim.picture import Picture
+from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.sim.run import simulate
+from selfdrive.sim.run import simulate, write
 from selfdrive.sim.scenario import load_scenario
-from selfdrive.sim.vision import GROUND, ROBUST, SHIFT, Pictures
+from selfdrive.sim.vision import GROUND, PAPER, ROBUST, SHIFT, Pictures
 from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
 
 CALIBRATION = f"""\
@@ -96,18 +100,60 @@ def test_the_loop_closes_through_the_picture(
     assert result.record["pictures"]["translation"] == translation
 
 
-def test_a_cold_and_a_warm_cache_give_the_same_run(scenarios, frames, tmp_path):
-    """Runs, and what is recorded of their pictures, do not depend on what is in the cache."""
-    runs = [
-        simulate(
-            brought_aside(scenarios, 300), 0, Pictures(detector=ROBUST, frames=frames, cache=tmp_path / cache)
-        )
-        for cache in ("one", "one", "two")
-    ]
-    for run in runs[1:]:
-        assert run.record == runs[0].record
-        assert all(np.array_equal(run.trace[name], runs[0].trace[name]) for name in run.trace)
-    assert runs[0].record["pictures"]["frames"] == "nine frames"
+@pytest.mark.parametrize("detector", [PAPER, ROBUST])
+def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
+    """From fair weather into rain, trace and record are the same whatever is in the cache, also damaged or
+    not to be had; and a run whose pictures are all known looks at none.
+    """
+    monkeypatch.setattr(detection_memory, "BUCKETS", 512)
+    clean, look = PictureCamera.look, []
+
+    def rainy(self, truth):
+        seen = clean(self, truth)
+        if truth.t < 0.5:
+            return seen
+        rain = PaperRain(5, 7, self.model) if not look else look[0]
+        look[:] = [rain]
+        return seen._replace(picture=rain.apply(seen.picture, truth))
+
+    monkeypatch.setattr(PictureCamera, "look", rainy)
+    cache, without = tmp_path / "cache", tmp_path / "without"
+    (without / FILE).mkdir(parents=True)
+
+    def bytes_of(run, cache):
+        out = tmp_path / run
+        pictures = Pictures(detector=detector, frames=frames, cache=cache)
+        write(simulate(brought_aside(scenarios, 100), 0, pictures), out)
+        return (out / "trace.npz").read_bytes(), (out / "record.json").read_bytes()
+
+    plain = bytes_of("without", without)
+    assert bytes_of("cold", cache) == plain
+    with monkeypatch.context() as patched:
+        patched.setattr(Picture, "pixels", None)
+        patched.setattr(Picture, "__getitem__", None)
+        assert bytes_of("warm", cache) == plain
+    table = bytearray((cache / FILE).read_bytes())
+    for at in range(30, len(table), ENTRY):
+        table[at] ^= 1
+    (cache / FILE).write_bytes(table)
+    assert bytes_of("damaged", cache) == plain
+
+
+def test_a_run_with_pictures_has_one_thread(scenarios, frames, tmp_path):
+    """Neither what is imported nor what detects starts a second thread, so that the process may be forked."""
+    code = (
+        "import os, sys; from pathlib import Path; from dataclasses import replace\n"
+        "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
+        "from selfdrive.sim.vision import Pictures\n"
+        "scenario = replace(load_scenario(Path(sys.argv[1])), steps=20)\n"
+        "simulate(scenario, 0, Pictures(frames=Path(sys.argv[2]), cache=Path(sys.argv[3])))\n"
+        "print(len(os.listdir('/proc/self/task')))"
+    )
+    root = str(Path(selfdrive.__path__[0]).parent)
+    command = [sys.executable, "-c", code, str(scenarios / "S1.yaml"), str(frames), str(tmp_path)]
+    single = {"PYTHONPATH": root, "OPENBLAS_NUM_THREADS": "1"}  # the one library that asks nobody but this
+    printed = subprocess.run(command, env=single, capture_output=True, text=True, check=True)
+    assert printed.stdout.strip() == "1"
 
 
 def test_runs_without_pictures_load_nothing_for_them():

@@ -1,0 +1,123 @@
+"""The table of detections that runs share."""
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import selfdrive
+from selfdrive.sim import detection_memory
+from selfdrive.sim.detection_memory import BUCKETS, ENTRY, FILE, MOST, WAYS, DetectionMemory
+
+NUMBERS = (1.5, -0.0, float("inf"), 5e-324)
+
+
+def key(number: int, bucket: int = 7) -> bytes:
+    """One of many keys of a bucket."""
+    return bucket.to_bytes(8, "little") + number.to_bytes(8, "big")
+
+
+def test_what_is_kept_is_recalled(tmp_path):
+    """To the bit, none or MOST numbers, by whoever opens the same cache; other keys have nothing."""
+    memory = DetectionMemory(tmp_path)
+    memory.keep(key(1), NUMBERS)
+    memory.keep(key(2), ())
+    memory.keep(key(3), range(MOST))
+    other = DetectionMemory(tmp_path)
+    assert [value.hex() for value in other.recall(key(1))] == [value.hex() for value in NUMBERS]
+    assert other.recall(key(2)) == () and other.recall(key(3)) == tuple(range(MOST))
+    assert other.recall(key(4)) is None and other.recall(key(1, 8)) is None
+
+
+def test_the_table_never_grows(tmp_path):
+    """Its size is fixed, its empty part takes no place on disk, and a full bucket gives up an old entry."""
+    memory = DetectionMemory(tmp_path)
+    for number in range(1, 4 * WAYS):
+        memory.keep(key(number), (float(number),))
+        assert memory.recall(key(number)) == (float(number),)
+    left = [memory.recall(key(number)) for number in range(1, 4 * WAYS)]
+    assert sum(value is not None for value in left) == WAYS
+    size = (tmp_path / FILE).stat()
+    assert size.st_size == BUCKETS * WAYS * ENTRY and 512 * size.st_blocks < 1 << 20
+
+
+@pytest.mark.parametrize("at", [0, 16, 24, 32, ENTRY - 1])
+def test_a_damaged_entry_is_not_recalled(tmp_path, at):
+    """One wrong byte, wherever it is, and the entry is as if it were not there; it can be kept again."""
+    memory = DetectionMemory(tmp_path)
+    memory.keep(key(1), NUMBERS)
+    with (tmp_path / FILE).open("r+b") as file:
+        file.seek(7 * WAYS * ENTRY + at)
+        byte = file.read(1)[0]
+        file.seek(-1, os.SEEK_CUR)
+        file.write(bytes([byte ^ 4]))
+    assert memory.recall(key(1)) is None
+    memory.keep(key(1), NUMBERS)
+    assert memory.recall(key(1)) == NUMBERS
+
+
+def test_a_short_or_strange_file_is_taken_over(tmp_path):
+    """Whatever lies where the table should be is no entry, and does not keep others from being kept."""
+    (tmp_path / FILE).write_bytes(b"no table" * 5000)
+    memory = DetectionMemory(tmp_path)
+    assert memory.recall(key(1, 2)) is None
+    memory.keep(key(1, 2), NUMBERS)
+    assert memory.recall(key(1, 2)) == NUMBERS
+
+
+def test_without_a_file_nothing_is_remembered(tmp_path):
+    """Where the table cannot be had, all is as if it were empty."""
+    (tmp_path / FILE).mkdir()
+    memory = DetectionMemory(tmp_path)
+    memory.keep(key(1), NUMBERS)
+    assert memory.recall(key(1)) is None
+
+
+def test_a_full_disk_ends_remembering_and_no_more(tmp_path, monkeypatch):
+    """What cannot be written is not remembered, and no error reaches the run."""
+    memory = DetectionMemory(tmp_path)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(detection_memory.os, "pwrite", full)
+    memory.keep(key(1), NUMBERS)
+    assert memory.recall(key(1)) is None
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from selfdrive.sim.detection_memory import DetectionMemory
+memory = DetectionMemory(Path(sys.argv[1]))
+for turn in range(30):
+    for number in range(1, 200):
+        key = (number % 5).to_bytes(8, "little") + number.to_bytes(8, "little")
+        assert memory.recall(key) in (None, (float(number),) * (number % 20))
+        memory.keep(key, (float(number),) * (number % 20))
+"""
+
+
+def test_processes_share_it_at_once(tmp_path):
+    """Two that write many entries into few places never recall anything but what belongs to the key."""
+    root = str(Path(selfdrive.__path__[0]).parent)
+    command = [sys.executable, "-c", WRITER, str(tmp_path)]
+    both = [subprocess.Popen(command, env={"PYTHONPATH": root}) for _ in range(2)]
+    assert [one.wait() for one in both] == [0, 0]
+
+
+def test_a_forked_child_shares_it(tmp_path):
+    """What a child keeps in the table its parent has opened, the parent recalls."""
+    code = (
+        "import os, sys; from pathlib import Path\n"
+        "from selfdrive.sim.detection_memory import DetectionMemory\n"
+        "memory = DetectionMemory(Path(sys.argv[1])); key = bytes(range(16))\n"
+        "if os.fork() == 0: memory.keep(key, (4.0,)); os._exit(0)\n"
+        "os.wait(); print(memory.recall(key))"
+    )
+    root = str(Path(selfdrive.__path__[0]).parent)
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    done = subprocess.run(command, env={"PYTHONPATH": root}, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "(4.0,)"

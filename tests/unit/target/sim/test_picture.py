@@ -1,0 +1,77 @@
+"""Pictures that are made when somebody looks at them."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+from selfdrive.sim.picture import Picture
+
+WHOLE = np.arange(6 * 8, dtype=np.uint8).reshape(6, 8)
+
+
+def picture(asked=None):
+    """One whose rows and columns that are not asked for are not there; `asked` keeps what was."""
+
+    def make(rows, columns):
+        if asked is not None:
+            asked.append((rows, columns))
+        return WHOLE[:rows, :columns]
+
+    return Picture(("some",), WHOLE.shape, make)
+
+
+CUTS = [
+    np.s_[1:3, 2:5],
+    np.s_[:, :4],
+    np.s_[2:, :],
+    np.s_[-3:5, 1:2],
+    np.s_[1:-1, :3],
+    np.s_[:20, 1:30],
+    np.s_[::2, ::3],
+    np.s_[5:1:-1, :2],
+    np.s_[4:2, :3],
+    np.s_[:0, :3],
+    np.s_[3],
+    np.s_[2, 5],
+    np.s_[1:3],
+    np.s_[..., 0],
+    np.s_[[1, 2], [3, 4]],
+]
+
+
+@pytest.mark.parametrize("cut", CUTS)
+def test_a_cut_is_that_of_the_whole(cut):
+    """Whatever is cut out of a picture is what an array with its pixels would give, made before or not."""
+    one = picture()
+    assert np.array_equal(one[cut], WHOLE[cut])
+    one.pixels()
+    assert np.array_equal(one[cut], WHOLE[cut])
+
+
+def test_no_more_is_made_than_asked_for():
+    """Nothing is made for size and type; a cut asks for rows and columns to its end; all are made once."""
+    asked = []
+    one = picture(asked)
+    assert (one.shape, one.dtype, len(one)) == ((6, 8), np.uint8, 6) and asked == []
+    _ = one[1:3, 2:5]
+    assert asked == [(3, 5)]
+    np.asarray(one), one.pixels(), one[1:3, 2:5], one.mean()
+    assert asked == [(3, 5), (6, 8)]
+
+
+def test_it_is_calculated_with_as_an_array():
+    """Operators, functions and methods of arrays give what they give for its pixels."""
+    one = picture()
+    assert np.array_equal(one * 0.5 + 3, WHOLE * 0.5 + 3) and np.array_equal(200 - one, 200 - WHOLE)
+    assert np.array_equal(one.astype(float), WHOLE.astype(float)) and (one == WHOLE).all()
+    assert one.mean() == WHOLE.mean() and np.array_equal(np.flip(one, 1), WHOLE[:, ::-1])
+    assert np.array_equal(deepcopy(one), WHOLE)
+
+
+def test_it_is_not_written_to():
+    """Neither it nor its pixels take values, as the frame behind it belongs to all runs."""
+    one = picture()
+    with pytest.raises(ValueError, match="read-only"):
+        one[0, 0] = 1
+    with pytest.raises(ValueError, match="read-only"):
+        one.pixels()[0, 0] = 1
