@@ -25,8 +25,8 @@ from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.dbscan import dbscan  # noqa: E402
 from selfdrive.visiond.edge_lines import EdgeLines  # noqa: E402
 from selfdrive.visiond.hog import Hog  # noqa: E402
-from selfdrive.visiond.mark_edges import edges, tiles_with_mark  # noqa: E402
-from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, NEED, PaperDetector  # noqa: E402
+from selfdrive.visiond.mark_edges import edges  # noqa: E402
+from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, PaperDetector  # noqa: E402
 from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
 REPEATS = 300
@@ -62,16 +62,15 @@ def measure(model: CameraModel, picture: np.ndarray) -> list[float]:
     detector, region = PaperDetector(model), RoadRegion(model)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)
     part = np.ascontiguousarray(picture[region.part])
-    tiles = tiles_with_mark(np.ones(region.windows.shape, bool), NEED)
-    mask, rising = edges(part, tiles)
-    labels = dbscan(mask, EPS, MIN_SAMPLES)
+    at, rising = edges(part)
+    labels = dbscan(at, part.shape, EPS, MIN_SAMPLES)
     return [
         median_ms(lambda: detector.detect(SimpleNamespace(picture=picture))),
         median_ms(lambda: hog.blocks(part)),
-        median_ms(lambda: edges(part, tiles)),
-        median_ms(lambda: dbscan(mask, EPS, MIN_SAMPLES)),
-        median_ms(lambda: lines.nearest(mask, rising, labels)),
-        float(mask.sum()),
+        median_ms(lambda: edges(part)),
+        median_ms(lambda: dbscan(at, part.shape, EPS, MIN_SAMPLES)),
+        median_ms(lambda: lines.nearest(at, rising, labels)),
+        float(at.size),
     ]
 
 

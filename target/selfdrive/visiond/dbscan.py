@@ -13,29 +13,40 @@ NOISE = -1
 _NONE = 65535
 
 
-def dbscan(mask: np.ndarray, eps: int, min_samples: int) -> np.ndarray:
-    """Cluster (0, 1, ...) of each set pixel of `mask` (uint8, 0 or 1) in row-major order, NOISE for outliers.
+def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: int) -> np.ndarray:
+    """Cluster (0, 1, ...) of each of some pixels of a picture of that shape, NOISE for outliers.
 
-    A core pixel has at least `min_samples` set ones, itself included, no further than `eps` pixels away.
-    Clusters are numbered, and pixels at the edge of several given to one, as scikit-learn does.
+    `points` are their numbers in row-major order, ascending. A core pixel has at least `min_samples` of them,
+    itself included, no further than `eps` pixels away. Clusters are numbered, and pixels at the edge of
+    several given to one, as scikit-learn does.
     """
+    mask = _marked(points, shape)
     square = np.ones((2 * eps + 1, 2 * eps + 1), np.uint8)
     crowd = cv2.boxFilter(mask, cv2.CV_16U, square.shape, normalize=False, borderType=cv2.BORDER_CONSTANT)
-    core = cv2.bitwise_and(mask, (crowd >= min_samples).view(np.uint8))
-    points = np.flatnonzero(mask.view(bool))
-    is_core = core.take(points).view(bool)
+    is_core = crowd.take(points) >= min_samples
+    all_core = bool(is_core.all())
+    cores = points if all_core else points[is_core]
+    core = mask if all_core else _marked(cores, shape)
     squares = cv2.dilate(core, np.ones((eps, eps), np.uint8), anchor=(0, 0))
     count, labels = cv2.connectedComponents(squares, connectivity=8, ltype=cv2.CV_16U)
-    order = _order(labels.take(points[is_core]), count)
-    found = order.take(labels.take(points))
-    if not is_core.all():
-        numbered = np.full_like(labels, _NONE)
-        cv2.copyTo(order.take(labels), core, numbered)
-        reached = cv2.erode(numbered, square)  # the first cluster with a core pixel near enough
-        found = np.where(is_core, found, reached.take(points))
-    found = found.astype(np.intp)
+    labels = labels.take(cores)
+    found = _order(labels, count).take(labels)
+    if all_core:
+        return found.astype(np.intp)
+    numbered = np.full(shape, _NONE, np.uint16)
+    numbered.ravel()[cores] = found
+    around = cv2.erode(numbered, square).take(points)  # the first cluster with a core pixel near enough
+    around[is_core] = found
+    found = around.astype(np.intp)
     found[found == _NONE] = NOISE
     return found
+
+
+def _marked(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Mask (uint8) with ones at these pixels."""
+    mask = np.zeros(shape, np.uint8)
+    mask.ravel()[points] = 1
+    return mask
 
 
 def _order(labels: np.ndarray, count: int) -> np.ndarray:

@@ -48,17 +48,15 @@ class EdgeLines:
         self._scale = np.repeat(scales, region.shape[1])
 
     def nearest(
-        self, mask: np.ndarray, rising: np.ndarray, labels: np.ndarray
+        self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
     ) -> tuple[RoadLine | None, RoadLine | None]:
-        """The lines next to the car, left and right, of the edges in `mask`.
+        """The lines next to the car, left and right, of the edges at the pixels `at` (numbers, row-major).
 
-        For each of its pixels, in row-major order, `rising` tells whether the picture gets brighter there,
-        `labels` the cluster.
+        For each of them `rising` tells whether the picture gets brighter there, `labels` the cluster.
         """
         clustered = labels >= 0
         if not clustered.any():
             return None, None
-        at = np.flatnonzero(mask.view(bool))
         if not clustered.all():
             at, rising, labels = at[clustered], rising[clustered], labels[clustered]
         points = Points(self._row.take(at), self._column.take(at), rising, self._scale.take(at))
@@ -68,13 +66,13 @@ class EdgeLines:
         sides = []
         for side in (1.0, -1.0):
             away = np.where(usable, side * (y + BESIDE * slope), -1.0)
-            order = [k for k in np.argsort(away) if away[k] >= 0.0][:TRIES]
-            sides.append(
-                self._first_line([(float(away[k]), float(a[k]), float(b[k])) for k in order], points)
-            )
+            order = np.argsort(away)
+            order = order[away[order] >= 0.0][:TRIES]
+            clusters = np.stack((away, a, b), axis=1)[order].tolist()
+            sides.append(self._first_line(clusters, points))
         return sides[0], sides[1]
 
-    def _first_line(self, clusters: list[tuple[float, float, float]], points: Points) -> RoadLine | None:
+    def _first_line(self, clusters: list[list[float]], points: Points) -> RoadLine | None:
         """The line of the first of the clusters (m away, a, b) that is one, or a better one close to it."""
         best, first, most, where = None, 0.0, 0, 0.0
         for away, a, b in clusters:
@@ -94,7 +92,7 @@ class EdgeLines:
         own = points
         for reach in REACHES:
             away = np.abs(_away(own, a, b))
-            own = own.some(np.flatnonzero(away <= reach))
+            own = own.some((away <= reach).nonzero()[0])
             if own.row.size < MIN_PIXELS:
                 return None, 0
             spread, a, b = _fit_one(own.row, own.column)

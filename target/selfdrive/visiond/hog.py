@@ -42,7 +42,10 @@ def _tables() -> _Tables:
 
 
 class Hog:
-    """Computes the blocks of pictures of one size, whose sides are multiples of a cell's."""
+    """Computes the blocks of pictures of one size, whose sides are multiples of a cell's.
+
+    Its memory is used again for each picture: to get it anew each time takes as long as to calculate.
+    """
 
     def __init__(self, rows: int, width: int) -> None:
         self._cells = rows // CELL, width // CELL
@@ -50,20 +53,26 @@ class Hog:
         cell = (row // CELL) * self._cells[1] + column // CELL
         self._first_bin = np.ascontiguousarray(cell * BINS).ravel()
         self._tables = _tables()
+        self._code, self._bins = np.empty((rows, width), np.intp), np.empty(rows * width, np.intp)
+        self._lengths = np.empty(rows * width)
+        self._blocks = np.empty((self._cells[0] - 1, self._cells[1] - 1, 2, 2 * BINS), np.float32)
 
     def blocks(self, picture: np.ndarray) -> np.ndarray:
-        """Normalised blocks (rows, columns, 36), float32, of a uint8 picture."""
-        code = _gradient_codes(picture).ravel()
-        bins = self._tables.orientation.take(code)
+        """Normalised blocks (rows, columns, 36), float32, of a uint8 picture, until the next call."""
+        self._code[...] = _gradient_codes(picture)
+        code = self._code.ravel()  # all inside the tables: "wrap" only saves a copy
+        bins = self._tables.orientation.take(code, out=self._bins, mode="wrap")
         bins += self._first_bin
-        votes = np.bincount(bins, self._tables.length.take(code), self._cells[0] * self._cells[1] * BINS)
+        lengths = self._tables.length.take(code, out=self._lengths, mode="wrap")
+        votes = np.bincount(bins, lengths, self._cells[0] * self._cells[1] * BINS)
         cells = votes.astype(np.float32).reshape(*self._cells, BINS)
         power = np.einsum("ijk,ijk->ij", cells, cells)
         power = power[:-1] + power[1:]
         scale = 1.0 / np.sqrt(power[:, :-1] + power[:, 1:] + np.float32(_TINY))
         down, right, one = cells.strides
         pairs = np.lib.stride_tricks.as_strided(cells, (*scale.shape, 2, 2 * BINS), (down, right, down, one))
-        return (pairs * scale[:, :, np.newaxis, np.newaxis]).reshape(*scale.shape, BLOCK_FEATURES)
+        np.multiply(pairs, scale[:, :, np.newaxis, np.newaxis], out=self._blocks)
+        return self._blocks.reshape(*scale.shape, BLOCK_FEATURES)
 
 
 def windows(blocks: np.ndarray) -> np.ndarray:
@@ -80,6 +89,5 @@ def windows(blocks: np.ndarray) -> np.ndarray:
 
 
 def _gradient_codes(picture: np.ndarray) -> np.ndarray:
-    """Index of each pixel's gradient (central differences, 0 across the border) in the tables."""
-    code = cv2.filter2D(picture, cv2.CV_32F, _CODE, delta=_STEPS**2 // 2, borderType=cv2.BORDER_REFLECT_101)
-    return code.astype(np.intp)
+    """Index of each pixel's gradient (central differences, 0 across the border) in the tables, float32."""
+    return cv2.filter2D(picture, cv2.CV_32F, _CODE, delta=_STEPS**2 // 2, borderType=cv2.BORDER_REFLECT_101)

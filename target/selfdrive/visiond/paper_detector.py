@@ -13,7 +13,7 @@ from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_bet
 from selfdrive.visiond.edge_lines import EdgeLines
 from selfdrive.visiond.hog import FEATURES, Hog, windows
 from selfdrive.visiond.lane_net import LaneNet
-from selfdrive.visiond.mark_edges import edges, tiles_with_mark
+from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
 from selfdrive.visiond.road_region import RoadRegion
 
 EPS, MIN_SAMPLES = 4, 8  # pixels, edge pixels
@@ -30,29 +30,33 @@ class PaperDetector:
         self._region = RoadRegion(model)
         self._hog = Hog(*self._region.shape)
         self._net = LaneNet.load()
-        self._looked_at = _stacked(self._region.windows)
+        self._tile = tile_numbers(*self._region.shape)
         self._lines = EdgeLines(model, self._region)
 
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in `view.picture`. One that is not seen has prob 0, and is where a lane's would be."""
         part = np.ascontiguousarray(view.picture[self._region.part])
-        mask, rising = edges(part, tiles_with_mark(self._marked(part), NEED))
-        left, right = self._lines.nearest(mask, rising, dbscan(mask, EPS, MIN_SAMPLES))
+        at, rising = edges(part)
+        tile = self._tile.take(at)
+        inside = tiles_with_mark(self._marked(part, tile), NEED).take(tile)
+        at, rising = at[inside], rising[inside]
+        labels = dbscan(at, part.shape, EPS, MIN_SAMPLES)
+        left, right = self._lines.nearest(at, rising, labels)
         left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
         right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
         return LaneLines(left=left, right=right, path=path_between(left, right))
 
-    def _marked(self, part: np.ndarray) -> np.ndarray:
-        """Which windows (rows x columns, bool) hold a lane mark."""
-        found = windows(self._hog.blocks(part))
-        features = found[self._looked_at].reshape(-1, STACK, FEATURES)
-        marked = np.zeros(found.shape[:2], bool)
-        marked[self._looked_at] = self._net.score(features).ravel() > 0.0
+    def _marked(self, part: np.ndarray, tile: np.ndarray) -> np.ndarray:
+        """Which windows (rows x columns, bool) on these tiles (numbers) hold a lane mark."""
+        looked_at = self._region.windows
+        tiles = np.zeros((looked_at.shape[0] + 1, looked_at.shape[1] + 1), bool)
+        tiles.ravel()[tile] = True
+        marked = looked_at & windows_on(tiles)
+        row, column = marked.nonzero()
+        if row.size:
+            spare = np.full(-row.size % STACK, row.size - 1)
+            stacked = np.concatenate((np.arange(row.size), spare))
+            found = windows(self._hog.blocks(part))[row[stacked], column[stacked]]
+            score = self._net.score(found.reshape(-1, STACK, FEATURES)).ravel()
+            marked[row, column] = score[: row.size] > 0.0
         return marked
-
-
-def _stacked(looked_at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the windows looked at, the last repeated to fill the last stack."""
-    row, column = np.nonzero(looked_at)
-    spare = -row.size % STACK
-    return np.pad(row, (0, spare), mode="edge"), np.pad(column, (0, spare), mode="edge")

@@ -10,7 +10,7 @@ from selfdrive.sim.road_look import Look, standard_look
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.lane_net import LaneNet
-from selfdrive.visiond.mark_edges import edges, tiles_with_mark
+from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
 from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, NEED, PaperDetector
 from selfdrive.visiond.road_region import RoadRegion
 from sklearn.cluster import DBSCAN
@@ -110,11 +110,11 @@ def test_real_edges_get_the_clusters_of_scikit_learn():
     region = RoadRegion(CALTECH)
     for look in (Look(), Look(shadows=0.5, shadow_depth=0.6, cracks=20.0, grain=9.0)):
         part = RoadRenderer(CALTECH, look, 2, periods=3).grey(3.0)[region.part]
-        everywhere = tiles_with_mark(np.ones(region.windows.shape, bool), 1)
-        mask = edges(np.ascontiguousarray(part), everywhere)[0]
-        expected = DBSCAN(eps=EPS, min_samples=MIN_SAMPLES, metric="chebyshev").fit_predict(np.argwhere(mask))
+        at, _ = edges(np.ascontiguousarray(part))
+        pixels = np.stack(np.unravel_index(at, part.shape), axis=1)
+        expected = DBSCAN(eps=EPS, min_samples=MIN_SAMPLES, metric="chebyshev").fit_predict(pixels)
         assert expected.max() > 0
-        assert np.array_equal(dbscan(mask, EPS, MIN_SAMPLES), expected)
+        assert np.array_equal(dbscan(at, part.shape, EPS, MIN_SAMPLES), expected)
 
 
 def test_what_is_seen_does_not_depend_on_the_number_of_threads():
@@ -133,3 +133,21 @@ def test_a_tile_needs_its_share_of_marked_windows():
     marked[1, 2] = True
     assert tiles_with_mark(marked, 1).sum() == 4
     assert tiles_with_mark(marked, NEED).sum() == 0
+
+
+def test_the_windows_on_a_tile_are_those_that_can_light_it():
+    """Windows on a tile are the four that share it, and a pixel's number is its tile's."""
+    tiles = np.zeros((4, 5), bool)
+    tiles.ravel()[tile_numbers(64, 80)[40 * 80 + 50]] = True  # the pixel in row 40, column 50
+    assert np.argwhere(tiles).tolist() == [[2, 3]]
+    assert np.argwhere(windows_on(tiles)).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3]]
+    assert tiles_with_mark(windows_on(tiles), 4)[2, 3]
+
+
+def test_a_window_is_judged_alike_whatever_others_are_looked_at():
+    """The net's score of a window has the same bits at any place of a stack, beside any others."""
+    features = np.random.default_rng(1).random((64, 1764), dtype=np.float32)
+    net = LaneNet.load()
+    scores = net.score(features.reshape(-1, 8, 1764)).ravel()
+    other = np.random.default_rng(2).permutation(64)
+    assert np.array_equal(net.score(features[other].reshape(-1, 8, 1764)).ravel(), scores[other])
