@@ -1,6 +1,5 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
-import ast
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,16 +9,12 @@ from pydantic import Field
 
 from mutator.columns import COLUMNS
 from mutator.errors import MutatorError
-from mutator.locations import AtModel, dotted_name
-from mutator.model import FaultLocation
-from mutator.paths import inside
+from mutator.observation import Observation, ObservationModel, observation
 from mutator.sources import SourceTree, read_tree
 from mutator.yamlio import Source, StrictModel, read
 
 SCHEMA = "target/1"
-OBSERVED = ("t", "d_rel", "v_ego", "v_lead")
 FILM = "film"  # folder in the output of a run that is filmed
-_READING = (ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.UAdd, ast.USub, ast.Load)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,17 +24,6 @@ class Channel:
     name: str
     unit: str
     tolerance: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Observation:
-    """Where ground truth is observed, and the target's expressions for it.
-
-    `expressions` gives, for each of t, d_rel, v_ego, v_lead, an expression valid at the location.
-    """
-
-    location: FaultLocation
-    expressions: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +52,8 @@ class TargetManifest:
     forbid: tuple[str, ...]  # globs: no fault may be injected there
     entry_module: str  # run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}
+    stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
+    reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
     armed_after_s: float  # triggers wait so long where nothing else is said: until the controller is at work
@@ -128,7 +114,7 @@ class TargetManifest:
                 expected="`film` in its manifest",
                 remedy="say there which commands take and show a film",
             )
-        return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
+        return replace(self, entry_args=(*self.entry_args, *self.film.run_args), stepwise=None)
 
 
 class _ChannelModel(StrictModel):
@@ -144,6 +130,7 @@ class _ChangeModel(StrictModel):
 class _EntryModel(StrictModel):
     module: str
     args: list[str]
+    stepwise: str | None = None
     changes: dict[str, list[str] | _ChangeModel] = Field(default_factory=dict)
 
 
@@ -154,14 +141,6 @@ class _FilmModel(StrictModel):
     still: list[str]
 
 
-class _ObservationModel(StrictModel):
-    at: AtModel
-    t: str
-    d_rel: str
-    v_ego: str
-    v_lead: str
-
-
 class _ManifestModel(StrictModel):
     name: str
     about: str = ""
@@ -169,6 +148,7 @@ class _ManifestModel(StrictModel):
     package: str
     files: list[str]
     forbid: list[str] = Field(default_factory=list)
+    reads_itself: list[str] = Field(default_factory=list)
     step_s: float = Field(gt=0.0, allow_inf_nan=False)
     armed_after_s: float = Field(0.0, ge=0.0, allow_inf_nan=False)
     entry: _EntryModel
@@ -177,7 +157,7 @@ class _ManifestModel(StrictModel):
     record_file: str
     compare: dict[str, _ChannelModel]
     plot: dict[str, _ChannelModel] = Field(default_factory=dict)
-    observation: _ObservationModel
+    observation: ObservationModel
     hazards: list[str]
     alerts: list[str]
     film: _FilmModel | None = None
@@ -206,6 +186,8 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         forbid=tuple(model.forbid),
         entry_module=model.entry.module,
         entry_args=tuple(model.entry.args),
+        stepwise=model.entry.stepwise,
+        reads_itself=tuple(model.reads_itself),
         changes={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
         same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, _ChangeModel)},
         step_s=model.step_s,
@@ -215,7 +197,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         compared=_channels(model.compare),
         plotted=_channels(model.plot),
         record_file=model.record_file,
-        observation=_observation(model.observation, source, folder),
+        observation=observation(model.observation, source, folder),
         hazards=tuple(model.hazards),
         alerts=tuple(model.alerts),
         film=_film(model.film),
@@ -228,6 +210,8 @@ def _check_names(model: _ManifestModel, source: Source) -> None:
     for key, command in (("entry", model.entry), ("film", model.film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error((key, "module"), f"'{command.module}'", expected="a dotted module name")
+    if (stepwise := model.entry.stepwise) is not None and not stepwise.isidentifier():
+        raise source.error(("entry", "stepwise"), f"'{stepwise}'", expected="a function of the entry module")
     for key in ("trace_file", "record_file"):
         name = getattr(model, key)
         if Path(name).name != name:
@@ -262,36 +246,3 @@ def _film(model: _FilmModel | None) -> Film | None:
         args=tuple(model.args),
         still_args=tuple(model.still),
     )
-
-
-def _observation(model: _ObservationModel, source: Source, root: Path) -> Observation:
-    location = model.at.location(source, ("observation", "at"))
-    try:
-        inside(root, location.path)
-    except MutatorError as error:
-        raise source.error(
-            ("observation", "at", "file"), error.got, expected=error.expected, remedy=error.remedy
-        ) from None
-    expressions = []
-    for name in OBSERVED:
-        try:
-            expressions.append((name, _expression(getattr(model, name))))
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise source.error(
-                ("observation", name),
-                f"'{getattr(model, name)}'",
-                expected="a local name or attribute, a number, or a sum, difference or product of them",
-                remedy="say where the value is at that statement",
-            ) from None
-    return Observation(location=location, expressions=tuple(expressions))
-
-
-def _expression(text: str) -> str:
-    """The text of an expression that does nothing but read and reckon; ValueError for any other."""
-    tree = ast.parse(text.strip(), mode="eval").body
-    for node in ast.walk(tree):
-        constant = isinstance(node, ast.Constant) and type(node.value) in (int, float)
-        name = isinstance(node, ast.Name | ast.Attribute) and dotted_name(ast.unparse(node))
-        if not (constant or name or isinstance(node, _READING)):
-            raise ValueError(text)
-    return ast.unparse(tree)

@@ -28,26 +28,61 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = _parse(arguments)
     try:
-        scenario = load_scenario(options.scenario)
-        if options.no_lead:
-            scenario = replace(scenario, lead=None)
-        if options.plant:
-            scenario = on_plant(scenario, options.plant)
-        if options.max_steps is not None:
-            scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
-        write(simulate(scenario, options.seed, _pictures(options), options.film), options.out)
+        run = _open(options)
+        while not run.done:
+            run.step()
+        run.write(options.out)
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_INPUT
     return 0
 
 
-def simulate(
-    scenario: Scenario, seed: int, pictures: Pictures | None = None, film: Path | None = None
-) -> SimulationResult:
-    """Run a scenario to its end; a folder `film` gets a film of it."""
+class Run:
+    """A run under way. Whoever drives it step by step does what the command line does, and in its order."""
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._simulator = simulator
+
+    @property
+    def done(self) -> bool:
+        """True once there is no step left."""
+        return self._simulator.done
+
+    def step(self) -> None:
+        """Make the next step."""
+        self._simulator.step()
+
+    def write(self, folder: Path) -> None:
+        """Write trace and record of the steps made so far into `folder`."""
+        write(self._simulator.result(), folder)
+
+
+def open_run(arguments: Sequence[str]) -> Run:
+    """The run that these arguments of the command line ask for, before its first step.
+
+    `--out` is of no account here: `write` is told where to. Raises ConfigError for wrong input.
+    """
+    return _open(_parse(arguments))
+
+
+def _open(options: argparse.Namespace) -> Run:
+    scenario = load_scenario(options.scenario)
+    if options.no_lead:
+        scenario = replace(scenario, lead=None)
+    if options.plant:
+        scenario = on_plant(scenario, options.plant)
+    if options.max_steps is not None:
+        scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
     simulator = Simulator()
-    simulator.reset(scenario, seed, pictures, film)
+    simulator.reset(scenario, options.seed, _pictures(options), options.film)
+    return Run(simulator)
+
+
+def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) -> SimulationResult:
+    """Run a scenario to its end."""
+    simulator = Simulator()
+    simulator.reset(scenario, seed, pictures)
     while not simulator.done:
         simulator.step()
     return simulator.result()

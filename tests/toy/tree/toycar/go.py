@@ -20,6 +20,7 @@ class Drive:
         self.driver = Driver()
         self.commands = (0.0, 0.0, 0.0)
         self.rows = []
+        self.steps = int(case["steps"])
 
     def step(self):
         world = self.world
@@ -30,24 +31,36 @@ class Drive:
         self.rows.append((now, world.gap, world.speed, world.lead_speed, world.offset, *self.commands))
 
 
-def main(arguments):
-    case_file, to, number = arguments[0], Path(arguments[2]), int(arguments[4])
+    @property
+    def done(self):
+        return len(self.rows) == self.steps
+
+    def write(self, to):
+        names = ("time", "gap", "speed", "lead_speed", "offset", "gas", "brake", "wheel_turn")
+        columns = np.array(self.rows).T
+        np.savez(to / "log.npz", **dict(zip(names, columns, strict=True)))
+        said = {
+            "hazards": self.world.hazards,
+            "alert_events": [{"name": name, "t": t} for name, t in self.driver.warned],
+        }
+        (to / "said.json").write_text(json.dumps(said))
+
+
+def begin(arguments):
+    case_file, number = arguments[0], int(arguments[4])
     case = dict(line.split(": ") for line in Path(case_file).read_text().splitlines() if ": " in line)
     case = {key: float(value) for key, value in case.items()}
     if "--alone" in arguments:
         case |= {"gap": 500.0, "lead_brakes": 0.0}
     case["gap"] += number * 0.001
-    drive = Drive(case)
-    for _ in range(int(case["steps"])):
+    return Drive(case)
+
+
+def main(arguments):
+    drive = begin(arguments)
+    while not drive.done:
         drive.step()
-    names = ("time", "gap", "speed", "lead_speed", "offset", "gas", "brake", "wheel_turn")
-    columns = np.array(drive.rows).T
-    np.savez(to / "log.npz", **dict(zip(names, columns, strict=True)))
-    said = {
-        "hazards": drive.world.hazards,
-        "alert_events": [{"name": name, "t": t} for name, t in drive.driver.warned],
-    }
-    (to / "said.json").write_text(json.dumps(said))
+    drive.write(Path(arguments[2]))
     if "--film" in arguments:
         film = Path(arguments[arguments.index("--film") + 1])
         film.mkdir()
