@@ -49,9 +49,13 @@ def main(job_file: str) -> int:
 def die_with_parent(parent: int) -> None:
     """Have the kernel kill this process when its parent dies (not on Linux: the CPU limit ends it)."""
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def prctl(option: int, value: int) -> None:
+    ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def limit_resources(job: dict[str, Any]) -> None:

@@ -2,15 +2,13 @@
 
 import json
 import os
-import re
-import select
 import shutil
-import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,13 +18,30 @@ from mutator.ids import digest
 from mutator.jsonio import disk_full, full_disk_told, is_disk_full
 from mutator.manifest import TargetManifest
 from mutator.model import Status
+from mutator.processes import (
+    Ended,
+    ended_within,
+    environment,
+    is_full,
+    judge_report,
+    judge_silent,
+    kill_group,
+    read_report,
+    steady,
+    tail,
+)
 
 _CHILD = Path(__file__).with_name("child.py")
 _LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
-_LOG_TAIL = 4000
-_LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-_OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
+
+
+class How(StrEnum):
+    """What a run was: a fresh interpreter, a fork of a loaded program, or the golden run itself."""
+
+    REFERENCE = "reference"
+    WARM = "warm"
+    FORK = "fork"
+    GOLDEN = "golden"  # the trigger never held, so there was nothing to run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,13 +55,16 @@ class Job:
     files: Mapping[str, bytes] = field(default_factory=dict)
     mutant: str | None = None  # id that the probe must report; None: a tree without probe
     hash_seed: int = 0
+    golden: Path | None = None  # output folder of the run without the fault, where it is known
 
 
 @dataclass(frozen=True, kw_only=True)
 class Execution:
     """What came of a job. `out` holds the target's trace and record when status is ok.
 
-    `probe` is the probe's report if the tree has one; `log` the tail of what the run printed.
+    `probe` is the probe's report if the tree has one; `log` the tail of what the run printed; `how` what ran
+    it, and where it was not the engine that was asked, `why`; `start` is the step before which the golden run
+    did its work.
     """
 
     status: Status
@@ -56,22 +74,21 @@ class Execution:
     cpu_s: float
     wall_s: float
     log: str = ""
+    how: How = How.REFERENCE
+    why: str = ""
+    start: int = 0
 
 
 class Engine(Protocol):
-    """Runs jobs and yields each with what came of it, in any order; `out` is valid until the next one."""
+    """Runs jobs and yields each with what came of it, in any order; `out` is valid until the next one.
+
+    The output folder of a job whose trigger never holds may be the golden run's: it is not to be touched.
+    """
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Ended:
-    """How a child process ended: wait status, its CPU and wall time, and whether this engine killed it."""
-
-    code: int
-    cpu_s: float
-    wall_s: float
-    out_of_wall: bool
+    def close(self) -> None:
+        """End what the engine keeps running between jobs."""
 
 
 class ReferenceEngine:
@@ -99,19 +116,22 @@ class ReferenceEngine:
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
 
+    def close(self) -> None:
+        """Nothing is kept."""
+
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
         with full_disk_told(self.work):
             request = self._prepare(job, folder)
         ended = self._spawn(request, folder, job.hash_seed)
-        log = _tail(folder / "log")
-        report = _read_report(folder / "report.json")
+        log = tail(folder / "log")
+        report = read_report(folder / "report.json")
         status, detail = self._judge(job, ended, report)
-        if status is not Status.OK and _is_full(self.work, report):
+        if status is not Status.OK and is_full(self.work, report):
             raise disk_full(self.work)
         return Execution(
             status=status,
-            detail=_steady(detail, folder),
+            detail=steady(detail, folder),
             out=folder / "out",
             probe=report.get("probe") if report else None,
             cpu_s=ended.cpu_s,
@@ -145,7 +165,7 @@ class ReferenceEngine:
         path.write_text(json.dumps(request), encoding="utf-8")
         return path
 
-    def _spawn(self, request: Path, folder: Path, hash_seed: int) -> _Ended:
+    def _spawn(self, request: Path, folder: Path, hash_seed: int) -> Ended:
         began = time.monotonic()
         with (folder / "log").open("wb") as log:
             child = subprocess.Popen(
@@ -153,16 +173,16 @@ class ReferenceEngine:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env=_environment(hash_seed, folder),
+                env=environment(hash_seed, folder),
                 start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
             )
         try:
             out_of_wall = not self._wait(child.pid, began + self.limits.wall_s)
         finally:
-            _kill_group(child.pid)
+            kill_group(child.pid)
             _, code, usage = os.wait4(child.pid, 0)
             child.returncode = os.waitstatus_to_exitcode(code)
-        return _Ended(
+        return Ended(
             code=child.returncode,
             cpu_s=usage.ru_utime + usage.ru_stime,
             wall_s=time.monotonic() - began,
@@ -172,35 +192,19 @@ class ReferenceEngine:
     def _wait(self, pid: int, deadline: float) -> bool:
         """Wait until the process ended (true) or the deadline passed; leave if our own parent is gone."""
         while (left := deadline - time.monotonic()) > 0:
-            if _ended_within(pid, min(left, _LOOK_UP_S)):
+            if ended_within(pid, min(left, _LOOK_UP_S)):
                 return True
             if self._parent is not None and os.getppid() != self._parent:
                 raise SystemExit("the process that started this one is gone")
         return False
 
-    def _judge(self, job: Job, ended: _Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-        limits = self.limits
-        if ended.out_of_wall:
-            return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
-        if report is not None:
-            return self._judge_report(job, report)
-        if ended.code == -signal.SIGXCPU or (ended.code == -signal.SIGKILL and ended.cpu_s >= limits.cpu_s):
-            return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
-        if ended.code < 0 and -ended.code in _OUTSIDE_SIGNALS:
-            return Status.HARNESS_ERROR, f"killed from outside by {signal.Signals(-ended.code).name}"
-        if ended.code < 0:
-            return Status.CRASHED, f"killed by {signal.Signals(-ended.code).name}"
-        return Status.CRASHED, f"left with status {ended.code} without a report"
-
-    def _judge_report(self, job: Job, report: dict[str, Any]) -> tuple[Status, str]:
+    def _judge(self, job: Job, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
+        if report is None or ended.out_of_wall:
+            return judge_silent(self.limits, ended)
         if problem := self._wrong_tree(job, report):
             self._restore_base()
             return Status.HARNESS_ERROR, problem
-        if report["ended"] == "steps":
-            return Status.TIMEOUT, f"limit of {self.limits.steps} simulation steps"
-        if report["ended"] == "error":
-            return Status.CRASHED, report["error"]
-        return Status.OK, ""
+        return judge_report(self.limits, report)
 
     def _restore_base(self) -> None:
         """Make the pristine tree pristine again, should a run have written through its links."""
@@ -233,19 +237,6 @@ def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
     return dest
 
 
-def _environment(hash_seed: int, folder: Path) -> dict[str, str]:
-    """The whole environment of a run: nothing of the user's but what starting Python needs."""
-    kept = {name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH", "HOME") if name in os.environ}
-    return kept | {
-        "LC_ALL": "C.UTF-8",
-        "PYTHONUTF8": "1",
-        "PYTHONHASHSEED": str(hash_seed),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "TMPDIR": str(folder),
-        **dict.fromkeys(_THREADS, "1"),
-    }
-
-
 def _link_or_copy(source: str, dest: str) -> None:
     """One file of the pristine tree in a run's own. A link, since copies cost as much as a tenth of a run;
     a run that writes through it is found out, as is every other that it could have touched."""
@@ -255,54 +246,3 @@ def _link_or_copy(source: str, dest: str) -> None:
         if is_disk_full(err):
             raise
         shutil.copyfile(source, dest)
-
-
-def _ended_within(pid: int, seconds: float) -> bool:
-    """Whether the child ended within that time; it is not reaped."""
-    if not hasattr(os, "pidfd_open"):
-        time.sleep(min(seconds, 0.02))
-        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
-    handle = os.pidfd_open(pid)
-    try:
-        poll = select.poll()
-        poll.register(handle, select.POLLIN)
-        return bool(poll.poll(seconds * 1000))
-    finally:
-        os.close(handle)
-
-
-def _kill_group(pid: int) -> None:
-    """Kill the child and whatever it started; nothing happens when all are gone."""
-    try:
-        os.killpg(pid, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        return
-
-
-def _tail(path: Path) -> str:
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - _LOG_TAIL))
-        return file.read().decode("utf-8", "replace")
-
-
-def _read_report(path: Path) -> dict[str, Any] | None:
-    """The child's report; None when it did not come to write one, or only a part of it."""
-    try:
-        report: dict[str, Any] = json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return None
-    return report
-
-
-def _is_full(work: Path, report: dict[str, Any] | None) -> bool:
-    if report is not None and report["disk_full"]:
-        return True
-    state = os.statvfs(work)
-    return state.f_bavail * state.f_frsize < _LEAST_FREE
-
-
-def _steady(detail: str, folder: Path) -> str:
-    """The text without what differs from run to run (scratch paths, addresses), printable, kept short."""
-    text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
-    text = re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -18,7 +18,7 @@ from mutator.render import render, snippet
 from mutator.skeletons import compiles, skeleton
 from mutator.trigger import check_condition, to_code
 
-_OBSERVE_TAG = "observe"
+OBSERVE_TAG = "observe"
 
 
 class InvalidMutant(MutatorError):
@@ -124,7 +124,7 @@ def _observation(manifest: TargetManifest) -> splice.Edit:
     file = manifest.tree.parsed(observation.location.path)
     arguments = ", ".join(f"{name}={text}" for name, text in observation.expressions)
     return splice.insertion(
-        file, file.resolve(observation.location), [f"_fi.observe({arguments})"], _OBSERVE_TAG
+        file, file.resolve(observation.location), [f"_fi.observe({arguments})"], OBSERVE_TAG
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator import golden, mutant
-from mutator.engine import Engine, Execution, Job
+from mutator.engine import Engine, Execution, How, Job
 from mutator.errors import MutatorError
 from mutator.fault_models import FaultModels
 from mutator.golden import BadOutput, Trace
@@ -22,7 +22,7 @@ from mutator.verdict import first_events, judge
 @dataclass(frozen=True, kw_only=True)
 class Finished:
     """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
-    None without a mutant or a run."""
+    None without a mutant or a run. `how` and `why` are the execution's."""
 
     experiment: Experiment
     record: Record
@@ -31,6 +31,8 @@ class Finished:
     cpu_s: float = 0.0
     wall_s: float = 0.0
     log: str = ""
+    how: How | None = None  # None: it was not run
+    why: str = ""
 
 
 class Goldens:
@@ -41,11 +43,15 @@ class Goldens:
         self._folder_of = folder_of
         self._traces: dict[tuple[str, tuple[str, ...]], Trace] = {}
 
+    def folder(self, experiment: Experiment) -> Path:
+        """Where the run without the fault left its files."""
+        return self._folder_of(experiment.scenario, experiment.changes)
+
     def trace(self, experiment: Experiment) -> Trace:
         key = (experiment.scenario, experiment.changes)
         if key not in self._traces:
             channels = [channel.name for channel in self._manifest.compared]
-            self._traces[key] = golden.load_trace(self._manifest, self._folder_of(*key), channels)
+            self._traces[key] = golden.load_trace(self._manifest, self.folder(experiment), channels)
         return self._traces[key]
 
 
@@ -104,6 +110,7 @@ class Runner:
             changes=experiment.changes,
             files=built.files,
             mutant=built.id,
+            golden=self.goldens.folder(experiment),
         )
 
     def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
@@ -124,6 +131,8 @@ class Runner:
             cpu_s=execution.cpu_s,
             wall_s=execution.wall_s,
             log=execution.log,
+            how=execution.how,
+            why=execution.why,
         )
 
     def _record(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
