@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from mutator import results
+from mutator import engines, proof, results
 from mutator.campaign import load_campaign
 from mutator.checks import run_checks
 from mutator.chunks import Pending, pending
@@ -31,6 +31,7 @@ from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
 from mutator.model import Record, Status
 from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
+from mutator.proof import Proof
 from mutator.provenance import check_sources, sources
 from mutator.records import Progress, Tail, label, read_records
 from mutator.runfolder import RunFolder
@@ -55,6 +56,7 @@ class Summary:
     problem: str  # empty, or why the session ended early (disk full, a worker died)
     interrupted: bool
     results: Path | None  # results.csv; None when there was no room for it
+    proof: Proof | None  # None: nothing that the reference engine has not run
     elapsed_s: float
 
     @property
@@ -62,7 +64,8 @@ class Summary:
         """0 fine; 3 harness errors or experiments left; 130 interrupted."""
         if self.interrupted:
             return EXIT_INTERRUPTED
-        return EXIT_OK if self.done == self.planned and not self.problem else EXIT_HARNESS_ERRORS
+        proven = self.proof is None or self.proof.same == self.proof.sampled
+        return EXIT_OK if self.done == self.planned and proven and not self.problem else EXIT_HARNESS_ERRORS
 
 
 def run(
@@ -72,19 +75,21 @@ def run(
     *,
     workers: int = 0,
     choices: Choices | None = None,
+    engine: str | None = None,
     notify: Notify | None = None,
 ) -> Summary:
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
     A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
-    MutatorError, as is a changed campaign file or target. `notify` is called from another thread about
-    twice a second. MutatorError for wrong input, CheckFailed when the checks before the campaign fail.
+    MutatorError, as is a changed campaign file or target. `engine` is one of `engines.ENGINES` (None: the
+    fastest that is worth it). `notify` is called from another thread about twice a second. MutatorError for
+    wrong input, CheckFailed when the checks before the campaign fail, or the proof of its engine does.
     """
     with session(
-        workspace, campaign, out, workers=workers, choices=choices or Choices(), notify=notify
+        workspace, campaign, out, workers=workers, choices=choices or Choices(), engine=engine, notify=notify
     ) as begun:
         begun.prepare()
-        if begun.pending:
+        if begun.pending or begun.proof:
             with _followed(begun):
                 _run_pytest(begun)
         return begun.finish()
@@ -93,12 +98,17 @@ def run(
 class Session:
     """One command at work in a run folder that it owns."""
 
-    def __init__(self, workspace: Workspace, folder: RunFolder, workers: int, notify: Notify | None) -> None:
+    def __init__(
+        self, workspace: Workspace, folder: RunFolder, workers: int, engine: str | None, notify: Notify | None
+    ) -> None:
         self.workspace = workspace
         self.folder = folder
         self.workers = workers
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
+        self.proof: tuple[proof.Sample, ...] = ()
+        self._manifest = workspace.manifest(folder.head["target"])
+        self.engine = engines.choose(engine, self._manifest, folder.planned)
         self.problem = ""
         self.interrupted = False
         self._began = time.monotonic()
@@ -110,16 +120,18 @@ class Session:
         records = read_records(self.folder.path)
         self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
         left = pending(self.folder, records)
-        if left:
+        if left and self.engine != engines.REFERENCE:
+            proof.begin(self.folder.path)
+        self.proof = proof.left(self.folder)
+        if left or self.proof:
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
-            manifest = self.workspace.manifest(self.folder.head["target"])
-            prepare_base(manifest, self.folder.base)
+            prepare_base(self._manifest, self.folder.base)
         self.pending = left
         self._records = None if left else records
 
     def worker_name(self, name: str) -> str:
         """Name of a worker's files, used by no session before this one."""
-        files = (self.folder.path / "records").glob("*.jsonl")
+        files = self.folder.path.glob("records/*.jsonl")
         taken = [int(path.name.split("-")[0]) for path in files]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
@@ -130,7 +142,9 @@ class Session:
             "run": str(self.folder.path),
             "session": self.worker_name(""),
             "workspace": {k: str(v) if v else None for k, v in asdict(self.workspace).items()},
+            "engine": self.engine,
             "pending": [[item.chunk, list(item.places)] for item in self.pending],
+            "proof": [[piece.number, list(piece.ids)] for piece in self.proof],
         }
 
     def finish(self) -> Summary:
@@ -144,6 +158,7 @@ class Session:
             built = results.ensure(self.folder.path)
         except DiskFull as err:  # the records are there, the table can be made any time
             self.problem = self.problem or str(err)
+        proven = proof.judge(self.folder, records)
         return Summary(
             planned=self.folder.planned,
             done=done,
@@ -153,6 +168,7 @@ class Session:
             problem=self.problem,
             interrupted=self.interrupted,
             results=built,
+            proof=proven,
             elapsed_s=time.monotonic() - self._began,
         )
 
@@ -165,6 +181,7 @@ def session(
     *,
     workers: int,
     choices: Choices,
+    engine: str | None = None,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
     """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
@@ -184,7 +201,7 @@ def session(
             if is_half_written(path.name):
                 path.unlink()
         try:
-            yield Session(workspace, folder, workers, notify)
+            yield Session(workspace, folder, workers, engine, notify)
         finally:
             shutil.rmtree(folder.work, ignore_errors=True)
 

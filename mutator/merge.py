@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from mutator import planfile, results
+from mutator import planfile, proof, results
 from mutator.checks import FILE as CHECKS
 from mutator.checks import SCHEMA as CHECKS_SCHEMA
 from mutator.errors import CheckFailed, MutatorError
@@ -110,6 +110,13 @@ def _check_complete(folder: RunFolder) -> None:
             expected="a finished shard",
             remedy="run it to its end with the command it was begun with",
         )
+    if left := sum(len(piece.ids) for piece in proof.left(folder)):
+        raise MutatorError(
+            f"unfinished: {left} experiments of its proof are left to run",
+            where=folder.path,
+            expected="a finished shard",
+            remedy="run it to its end with the command it was begun with",
+        )
 
 
 def _counts(record: Record) -> bool:
@@ -154,8 +161,9 @@ def _copy(folders: Sequence[RunFolder], out: Path) -> None:
     for folder in folders:
         assert folder.shard is not None
         shutil.copytree(folder.path / "patches", out / "patches", dirs_exist_ok=True)
-        for name in ("records", "timings"):
-            (out / name).mkdir(exist_ok=True)
+        for name in ("records", "timings", proof.FOLDER):
+            if (folder.path / name).is_dir():
+                (out / name).mkdir(exist_ok=True)
             for path in (folder.path / name).glob("*.jsonl"):
                 shutil.copy(path, out / name / f"{path.stem}-shard{folder.shard.number}.jsonl")
     head = first.head

@@ -21,7 +21,7 @@ from mutator.provenance import check_sources, sources, versions
 from mutator.runfolder import HEAD, SCHEMA, RunFolder
 from mutator.sample import pick, pick_in_proportion
 from mutator.shards import Shard
-from mutator.sharing import runs
+from mutator.sharing import in_turn, runs
 from mutator.workspace import Workspace
 
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
@@ -122,7 +122,7 @@ def make_plan(
     reading = reading or loaded.reading
     _check(choices, loaded)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
-    once = runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed))
+    once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
     canary = expansion.canary()
     chunks = cut_runs(once, loaded.chunk)

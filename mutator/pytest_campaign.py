@@ -16,6 +16,7 @@ from mutator.errors import MutatorError
 from mutator.jsonio import DiskFull
 from mutator.locks import living_workers, register_worker
 from mutator.plan import Choices
+from mutator.proof import Sample
 from mutator.worker import Assignment, Worker, bind_to_parent
 from mutator.workspace import Workspace
 
@@ -27,17 +28,19 @@ class HarnessErrors(Exception):
     """A chunk has experiments that the harness could not judge."""
 
 
-class ChunkItem(pytest.Item):
-    """One chunk of the plan. It fails for harness errors only: a hazard is a result, not a failure."""
+class WorkItem(pytest.Item):
+    """One chunk of the plan, or a piece of the proof. It fails for harness errors only: a hazard is a result,
+    not a failure."""
 
-    def __init__(self, *, pending: Pending, worker: "LazyWorker", **keywords: Any) -> None:
+    def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
         super().__init__(**keywords)
-        self.pending = pending
+        self.work = work
         self.worker = worker
 
     def runtest(self) -> None:
         try:
-            errors = self.worker.get().run(self.pending)
+            worker, work = self.worker.get(), self.work
+            errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
         except Exception as err:
             problem = str(err) if isinstance(err, MutatorError) else _defect(err, self.name)
             self.user_properties.append((_PROBLEM, problem))
@@ -91,13 +94,13 @@ def configure(config: pytest.Config, campaign: str, out: Path) -> None:
         config.pluginmanager.register(PlainController(campaign, out))
 
 
-def _collect(session: pytest.Session, pending: Sequence[Pending], worker: LazyWorker) -> bool:
-    """Make the chunks the session's items; nothing is read but what is already here."""
+def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
+    """Make chunks, then pieces of the proof, the session's items; nothing is read but what is here."""
     session.items = []
-    for item in pending:
-        name = f"chunk-{item.chunk:05d}"
+    for work in works:
+        name = f"chunk-{work.chunk:05d}" if isinstance(work, Pending) else f"proof-{work.number:05d}"
         session.items.append(
-            ChunkItem.from_parent(session, name=name, nodeid=f"campaign::{name}", pending=item, worker=worker)
+            WorkItem.from_parent(session, name=name, nodeid=f"campaign::{name}", work=work, worker=worker)
         )
     session.testscollected = len(session.items)
     session.config.hook.pytest_collection_finish(session=session)
@@ -115,14 +118,19 @@ class WorkerSide:
             templates=Path(places["templates"]),
             target=Path(places["target"]) if places["target"] else None,
         )
-        assignment = Assignment(run=run, name=given["session"] + worker_id, parent=given["parent"])
+        assignment = Assignment(
+            run=run, name=given["session"] + worker_id, engine=given["engine"], parent=given["parent"]
+        )
         self._config = config
         self._registration = register_worker(run)
-        self._pending = [Pending(chunk, tuple(places)) for chunk, places in given["pending"]]
+        self._work: list[Pending | Sample] = [
+            *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
+            *(Sample(number, tuple(ids)) for number, ids in given["proof"]),
+        ]
         self._worker = LazyWorker(workspace, assignment)
 
     def pytest_collection(self, session: pytest.Session) -> bool:
-        return _collect(session, self._pending, self._worker)
+        return _collect(session, self._work, self._worker)
 
     def pytest_sessionfinish(self) -> None:
         try:
@@ -154,9 +162,11 @@ class Controller:
         if session.config.pluginmanager.hasplugin("dsession"):
             return None  # xdist's: nothing is collected here
         assert self.begun is not None
-        assignment = Assignment(run=self.begun.folder.path, name=self.begun.worker_name("main"))
-        self._worker = LazyWorker(self.begun.workspace, assignment)
-        return _collect(session, self.begun.pending, self._worker)
+        begun = self.begun
+        name = begun.worker_name("main")
+        assignment = Assignment(run=begun.folder.path, name=name, engine=begun.engine)
+        self._worker = LazyWorker(begun.workspace, assignment)
+        return _collect(session, (*begun.pending, *begun.proof), self._worker)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         self._note(str(dict(report.user_properties).get(_PROBLEM, "")))
@@ -234,6 +244,7 @@ def _lines(summary: campaign_run.Summary) -> list[str]:
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
+        f"proof: {summary.proof}" if summary.proof else "",
         f"results: {summary.results}" if summary.results else "",
     ]
     return [line for line in lines if line]

@@ -127,13 +127,13 @@ def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
     return tuple((name, value) for name, value in items)
 
 
-def read_records(run: Path) -> dict[str, Record]:
+def read_records(run: Path, folder: str = "records") -> dict[str, Record]:
     """The final record of each experiment id that has one (torn last lines are skipped).
 
     Any other record goes before a harness error. CheckFailed when two final records of one experiment differ.
     """
     records: dict[str, Record] = {}
-    for path in sorted((run / "records").glob("*.jsonl")):
+    for path in sorted((run / folder).glob("*.jsonl")):
         for number, data in enumerate(read_lines(path, SCHEMA), start=2):
             try:
                 record = record_from(data)

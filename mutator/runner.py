@@ -22,7 +22,7 @@ from mutator.verdict import first_events, judge
 @dataclass(frozen=True, kw_only=True)
 class Finished:
     """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
-    None without a mutant or a run. `how` and `why` are the execution's."""
+    None without a mutant or a run. `how`, `why` and `start` are the execution's."""
 
     experiment: Experiment
     record: Record
@@ -33,6 +33,7 @@ class Finished:
     log: str = ""
     how: How | None = None  # None: it was not run
     why: str = ""
+    start: int = 0
 
 
 class Goldens:
@@ -133,6 +134,7 @@ class Runner:
             log=execution.log,
             how=execution.how,
             why=execution.why,
+            start=execution.start,
         )
 
     def _record(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:

@@ -4,6 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 
 from mutator.manifest import TargetManifest
 from mutator.model import Experiment
+from mutator.trigger import time_of
 
 
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
@@ -17,6 +18,17 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
 def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
     """The scenarios that are the same under these changes; empty: none is like another."""
     return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
+
+
+def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
+    """The runs in the order that shares most work between one and the next: those of a golden run together,
+    of these the ones with the same trigger, then the others by their times."""
+
+    def turn(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
+        first = run[0]
+        return (first.scenario, first.changes, time_of(first.trigger) or 0.0, first.trigger.condition)
+
+    return sorted(runs, key=turn)
 
 
 def runs(manifest: TargetManifest, experiments: Iterable[Experiment]) -> list[list[Experiment]]:

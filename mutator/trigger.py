@@ -64,6 +64,15 @@ def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None)
     return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
 
 
+def time_of(trigger: Trigger) -> float | None:
+    """The time at which a trigger of `at_time` fires; None for any other."""
+    name, _, time = trigger.condition.partition(" >= ")
+    try:
+        return float(time) if name == "t" else None
+    except ValueError:
+        return None
+
+
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
     """A time uniform on the steps from `first_s` to `last_s` (both included), drawn from (seed, key).
 

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from mutator import planfile
+from mutator import engines, planfile, proof
 from mutator.chunks import Pending
-from mutator.engine import ReferenceEngine
 from mutator.jsonio import full_disk_told
 from mutator.model import Experiment, Status
+from mutator.proof import Sample
 from mutator.provenance import check_sources, sources
 from mutator.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
 from mutator.runfolder import RunFolder
@@ -26,11 +26,12 @@ _PR_SET_PDEATHSIG = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assignment:
-    """Who a worker is: `name` makes its files in the run folder its own, `parent` is the process it must not
-    outlive (None: it is the command itself)."""
+    """Who a worker is: `name` makes its files in the run folder its own, `engine` runs its chunks, `parent`
+    is the process it must not outlive (None: it is the command itself)."""
 
     run: Path
     name: str
+    engine: str
     parent: int | None = None
 
 
@@ -46,14 +47,14 @@ class Worker:
         check_sources(self.folder.path, head["sources"], sources(workspace, manifest, scenarios))
         with full_disk_told(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
-        engine = ReferenceEngine(
-            manifest, self.folder.base, self.folder.work, self.folder.limits, assignment.parent
-        )
-        goldens = Goldens(manifest, self.folder.golden)
-        self._runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
+        self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
+        self._runner = self._make_runner(assignment.engine)
+        self._prover: Runner | None = None
+        self._proofs: LineWriter | None = None
         self._faults = planfile.read_faults(self.folder.path)
         plan = head["plan"]
-        self._records = LineWriter(self._file("records"), {"schema": SCHEMA, "plan": plan})
+        self._head = {"schema": SCHEMA, "plan": plan}
+        self._records = LineWriter(self._file("records"), self._head)
         self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
@@ -68,10 +69,39 @@ class Worker:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
 
+    def prove(self, sample: Sample) -> list[tuple[str, str]]:
+        """Run a piece of the proof's sample on the reference engine; harness errors as `run`."""
+        if self._prover is None or self._proofs is None:
+            self._prover = self._make_runner(engines.REFERENCE)
+            self._proofs = LineWriter(self._file(proof.FOLDER), self._head)
+        wanted = [e for e in planfile.read_all(self.folder.path) if e.id in sample.ids]
+        errors = []
+        for finished in self._prover.run(wanted):
+            self._proofs.append(asdict(finished.record))
+            if finished.record.status is Status.HARNESS_ERROR:
+                errors.append((finished.experiment.id, finished.record.detail))
+        return errors
+
     def close(self) -> None:
-        """Sync and close this worker's files."""
-        self._records.close()
-        self._timings.close()
+        """End the engine; sync and close this worker's files."""
+        self._runner.engine.close()
+        for writer in (self._records, self._timings, self._proofs):
+            if writer is not None:
+                writer.close()
+
+    def _make_runner(self, engine: str) -> Runner:
+        folder, models = self.folder, self._workspace.fault_models()
+        made = engines.make(
+            engine,
+            self._manifest,
+            models,
+            base=folder.base,
+            work=folder.work,
+            limits=folder.limits,
+            parent=self._parent,
+        )
+        goldens = Goldens(self._manifest, folder.golden)
+        return Runner(self._manifest, models, made, goldens, self._workspace.scenario)
 
     def _keep(self, finished: Finished) -> None:
         """Patch first, record last: what has a record has everything."""
@@ -84,6 +114,8 @@ class Worker:
                 "wall_s": finished.wall_s,
                 "host": socket.gethostname(),
                 "worker": self._name,
+                "engine": finished.how,
+                "why": finished.why,
             }
         )
         self._records.append(asdict(finished.record))

@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Exclude, Json, Limit, Only, OutRun, Place, Reading, Seed, ShardOf, with_place
+from mutator.cli.options import (
+    Engine,
+    Exclude,
+    Json,
+    Limit,
+    Only,
+    OutRun,
+    Place,
+    Reading,
+    Seed,
+    ShardOf,
+    with_place,
+)
 from mutator.cli.progress import duration
 from mutator.errors import MutatorError
 
@@ -124,6 +136,7 @@ def run(
     seed: Seed = None,
     reading: Reading = None,
     shard: ShardOf = None,
+    engine: Engine = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -139,7 +152,7 @@ def run(
     try:
         with campaign_progress(terminal) as notify:
             summary = campaign_run.run(
-                workspace, campaign, out, workers=workers, choices=chosen, notify=notify
+                workspace, campaign, out, workers=workers, choices=chosen, engine=engine, notify=notify
             )
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
@@ -158,13 +171,16 @@ def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspa
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
         paths = {"run": str(out), "report": str(written.markdown) if written else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
-        terminal.emit(counts | paths | {"outcomes": summary.outcomes, "harness_errors": errors})
+        found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
+        terminal.emit(counts | paths | found)
     if written:
         show_counts(terminal, out)
     terminal.say(
         f"{summary.done} of {summary.planned} experiments done, "
         f"{summary.ran} now in {duration(summary.elapsed_s)}"
     )
+    if summary.proof:
+        terminal.say(f"proof: {summary.proof}")
     if written:
         terminal.say(f"report: {written.markdown} and {written.page}")
     if summary.harness_errors:

@@ -42,6 +42,14 @@ ShardOf = Annotated[
     str | None,
     typer.Option("--shard", metavar="K/N", help="Run the K-th of N shares of the plan; see `merge`."),
 ]
+Engine = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="reference: an interpreter for each run; warm: a fork of the loaded target; fork: a fork of its "
+        "golden run. The results are the same. Default: fork, where that is possible and worth it.",
+    ),
+]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 
 

@@ -1,0 +1,186 @@
+"""The reference, warm and fork engines on the same experiments of the paper's campaign, half guided, half random.
+
+`python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. User CPU time of this process
+and of all that it starts; goldens and what is done once for a campaign (loading the target, one look at each
+golden run) is told apart. Exit code 1 when records differ, or when the fork engine costs more than its goals.
+"""
+
+import argparse
+import json
+import resource
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from mutator import golden, mutant  # noqa: E402
+from mutator.engine import Engine, Job, ReferenceEngine, prepare_base  # noqa: E402
+from mutator.fork_engine import ForkEngine  # noqa: E402
+from mutator.golden import golden_key  # noqa: E402
+from mutator.model import Experiment, Record  # noqa: E402
+from mutator.plan import Plan, make_plan  # noqa: E402
+from mutator.runner import Finished, Goldens, Runner  # noqa: E402
+from mutator.trigger import always  # noqa: E402
+from mutator.workspace import Workspace  # noqa: E402
+
+GOAL_OF_WARM = 1.15  # fork's CPU over warm's times the share of simulated time that remains after activation
+GOAL_OF_REFERENCE = 1 / 3
+
+
+@dataclass
+class Measured:
+    """What an engine cost (s of user CPU), and what it found."""
+
+    cpu_s: float = 0.0
+    children_s: float = 0.0  # of it, the runs themselves
+    steps: int = 0  # that the runs drove
+    how: Counter[str] = field(default_factory=Counter)
+    why: Counter[str] = field(default_factory=Counter)
+    records: dict[str, Record] = field(default_factory=dict)
+
+
+class Bench:
+    """Golden runs and engines in a scratch folder."""
+
+    def __init__(self, plan: Plan, workspace: Workspace, folder: Path) -> None:
+        self.workspace, self.folder = workspace, folder
+        self.manifest = workspace.manifest(plan.campaign.target)
+        self.models = workspace.fault_models()
+        self.plan = plan
+        work = folder / "work"
+        work.mkdir()
+        base = prepare_base(self.manifest, folder / "base")
+        null = mutant.build(self.manifest, self.models, None, always()).files
+        arguments = (self.manifest, base, work, plan.campaign.limits)
+        self.engines: dict[str, Callable[[], Engine]] = {
+            "reference": lambda: ReferenceEngine(*arguments),
+            "warm": lambda: ForkEngine(*arguments, null=null, warm=True),
+            "fork": lambda: ForkEngine(*arguments, null=null),
+        }
+        self._drive_goldens(ReferenceEngine(*arguments))
+
+    def golden(self, scenario: str, changes: tuple[str, ...]) -> Path:
+        return self.folder / "golden" / golden_key(scenario, changes)
+
+    def steps(self, experiment: Experiment) -> int:
+        """Steps of the golden run, which all that end well have."""
+        trace = golden.load_trace(self.manifest, self.golden(experiment.scenario, experiment.changes))
+        return len(trace[self.manifest.time_channel])
+
+    def _drive_goldens(self, engine: ReferenceEngine) -> None:
+        (self.folder / "golden").mkdir()
+        for scenario, changes in self.plan.goldens():
+            job = Job(
+                name=golden_key(scenario, changes),
+                scenario=self.workspace.scenario(scenario),
+                seed=self.plan.seed,
+                changes=changes,
+            )
+            execution = engine.execute(job, engine.work / job.name)
+            execution.out.rename(self.golden(scenario, changes))
+
+    def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
+        """What an engine took for all of the experiments, and what it took beforehand for each golden run."""
+        engine = self.engines[name]()
+        runner = Runner(
+            self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario
+        )
+        firsts = {(e.scenario, e.changes): e for e in experiments}.values()
+        before = _cpu()
+        for key in firsts:
+            list(runner.run([key]))
+        engine.close()  # only then are its processes counted
+        first_s = _cpu() - before
+        before, measured = _cpu(), Measured()
+        for finished in runner.run(sorted(experiments, key=lambda e: (e.scenario, e.changes, e.method))):
+            self._take(measured, finished)
+        engine.close()
+        measured.cpu_s = _cpu() - before
+        return measured, first_s
+
+    def _take(self, measured: Measured, finished: Finished) -> None:
+        measured.records[finished.experiment.id] = finished.record
+        measured.how[str(finished.how)] += 1
+        measured.why[finished.why] += 1
+        measured.children_s += finished.cpu_s
+        if finished.how != "golden":
+            measured.steps += self.steps(finished.experiment) - finished.start
+
+
+def _cpu() -> float:
+    """User CPU time (s) of this process and of those it waited for."""
+    return sum(resource.getrusage(who).ru_utime for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--campaign", default="paper")
+    parser.add_argument("--experiments", type=int, default=200, metavar="N")
+    parser.add_argument("--skip", action="append", default=[], choices=("reference", "warm", "fork"))
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args(arguments)
+    workspace = Workspace.find(root=ROOT)
+    plan = make_plan(workspace, options.campaign, limit=options.experiments)
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(plan, workspace, Path(folder))
+        found: dict[str, Measured] = {}
+        facts: dict[str, object] = {"campaign": options.campaign, "experiments": len(plan.experiments)}
+        for name in bench.engines:
+            if name not in options.skip:
+                found[name], first_s = bench.measure(name, plan.experiments)
+                facts[name] = _told(name, found[name], first_s)
+    facts |= _compared(found)
+    if options.json:
+        options.json.write_text(json.dumps(facts, indent=1) + "\n")
+    return int(not facts["good"])
+
+
+def _told(name: str, measured: Measured, first_s: float) -> dict[str, object]:
+    count = len(measured.records)
+    print(
+        f"{name:10} {measured.cpu_s:8.2f} s CPU, {1e3 * measured.cpu_s / count:7.1f} ms an experiment "
+        f"({1e3 * measured.children_s / count:.1f} in the runs), {measured.steps} steps, "
+        f"{dict(measured.how)}; beforehand {first_s:.1f} s",
+        flush=True,
+    )
+    for why, times in measured.why.items():
+        if why:
+            print(f"{'':10} {times} on the reference engine: {why}")
+    return {
+        "cpu_s": measured.cpu_s,
+        "runs_cpu_s": measured.children_s,
+        "steps": measured.steps,
+        "how": dict(measured.how),
+        "why": dict(measured.why),
+        "beforehand_s": first_s,
+    }
+
+
+def _compared(found: dict[str, Measured]) -> dict[str, object]:
+    records = [measured.records for measured in found.values()]
+    facts: dict[str, object] = {"same": all(other == records[0] for other in records)}
+    good = facts["same"]
+    print(f"the same records: {facts['same']}")
+    if "fork" in found and "warm" in found:
+        fork, warm = found["fork"], found["warm"]
+        share = fork.steps / warm.steps
+        ratio = fork.cpu_s / (warm.cpu_s * share)
+        good = good and ratio <= GOAL_OF_WARM
+        facts |= {"share": share, "fork_of_warm": ratio}
+        print(f"simulated time that remains after activation: {share:.3f}")
+        print(f"fork / (warm x share): {ratio:.3f} (at most {GOAL_OF_WARM})")
+    if "fork" in found and "reference" in found:
+        ratio = found["fork"].cpu_s / found["reference"].cpu_s
+        good = good and ratio <= GOAL_OF_REFERENCE
+        facts["fork_of_reference"] = ratio
+        print(f"fork / reference: {ratio:.3f} (at most {GOAL_OF_REFERENCE:.3f})")
+    return facts | {"good": good}
+
+
+if __name__ == "__main__":
+    sys.exit(main())
