@@ -1,8 +1,9 @@
-"""The reference, warm and fork engines on the same experiments of the paper's campaign, half guided, half random.
+"""Reference, warm and fork engine on the same experiments of the paper's campaign, half guided, half random.
 
-`python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. User CPU time of this process
-and of all that it starts; goldens and what is done once for a campaign (loading the target, one look at each
-golden run) is told apart. Exit code 1 when records differ, or when the fork engine costs more than its goals.
+`python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. User CPU time of this
+process and of all that it starts; golden runs and what is done once for a campaign (loading the target, one
+look at each golden run) are told apart. Exit code 1 when records differ, or when the fork engine costs more
+than its goals.
 """
 
 import argparse

@@ -86,13 +86,13 @@ class ForkEngine:
         if job.mutant is None or job.golden is None or job.hash_seed:
             raise Refused("no experiment")
         changes = exchange(self._manifest, job.files, str(self._running().tree))
+        if self._warm:
+            first = self._running().first
+            first.load(_needed(changes), self._patience_s)
+            return self._become(first, job, folder, changes, _FROM_THE_START)
         start = first_active(changes.probe, self._observed(job, job.golden))
         if start is None:
             return _golden(job, job.golden)
-        if self._warm:
-            return self._become(
-                self._running().first, job, folder, changes, Start(step=0, observed=0, t=None)
-            )
         return self._become(self._at(job, start.step, changes), job, folder, changes, start)
 
     def _running(self) -> Pool:
@@ -109,7 +109,7 @@ class ForkEngine:
     def _at(self, job: Job, step: int, changes: Exchange) -> Waiting:
         pool = self._running()
         golden = Golden(key=_key(job), arguments=self._arguments(job, pool.home))
-        return pool.before(step, golden, changes.imports, self._patience_s)
+        return pool.before(step, golden, _needed(changes), self._patience_s)
 
     def _arguments(self, job: Job, out: Path) -> list[str]:
         return list(
@@ -226,6 +226,11 @@ class ForkEngine:
 
 
 _FROM_THE_START = Start(step=0, observed=0, t=None)
+
+
+def _needed(changes: Exchange) -> list[str]:
+    """Modules to load before the mutant is made: those that it changes, and those that it imports."""
+    return [*dict.fromkeys(function.module for function in changes.functions), *changes.imports]
 
 
 def _key(job: Job) -> _Key:

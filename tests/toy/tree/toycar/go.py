@@ -30,7 +30,6 @@ class Drive:
         self.commands = self.driver.drive(now, world.speed, self.sensor.reading)
         self.rows.append((now, world.gap, world.speed, world.lead_speed, world.offset, *self.commands))
 
-
     @property
     def done(self):
         return len(self.rows) == self.steps

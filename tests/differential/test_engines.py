@@ -1,0 +1,207 @@
+"""The fork and warm engines against the reference engine: the same bytes for every fault and every end."""
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator import engines, mutant
+from mutator.campaign import Limits
+from mutator.engine import Engine, Execution, How, Job, prepare_base
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Status, Trigger, Value
+from mutator.trigger import always, at_time
+from mutator.workspace import Workspace
+
+LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500)
+GAP = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
+CLOSING = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="closing")
+OFFSET = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="offset")
+SENT = Anchor(kind=AnchorKind.BEFORE_CALL, name="self.publish")
+
+MODELS: dict[str, tuple[str, Anchor, dict[str, Value]]] = {
+    "offset": ("offset", GAP, {"target": "gap", "by": 30.0, "low": 0.0}),
+    "scale": ("scale", CLOSING, {"target": "closing", "factor": -0.5}),
+    "stuck": ("stuck", OFFSET, {"target": "offset", "value": 0.7}),
+    "held": ("stuck", GAP, {"target": "gap", "value": None}),
+    "drift": ("drift", OFFSET, {"target": "offset", "per_step": 0.02, "stays": False}),
+    "drift that stays": ("drift", OFFSET, {"target": "offset", "per_step": 0.02, "stays": True}),
+    "noise": ("noise", GAP, {"target": "gap", "std": 9.0, "seed": 5}),
+    "omission": ("omission", SENT, {}),
+    "delay": ("delay", GAP, {"target": "gap", "delay": 1.0}),
+    "ghost_object": (
+        "ghost_object",
+        CLOSING,
+        {"distance_name": "gap", "speed_name": "closing", "distance": 9.0, "speed": -1.0},
+    ),
+    "bit_flip": ("bit_flip", OFFSET, {"target": "offset", "bit": 62}),
+    "image_effect": (
+        "image_effect",
+        GAP,
+        {
+            "target": "gap",
+            "effect": "toycar.haze.Haze",
+            "amount": 20.0,
+            "camera": "self",
+            "scene": "world",
+            "seed": 3,
+        },
+    ),
+}
+ENDS = ("crash", "hang", "hoard", "leave", "segfault")
+TRIGGERS = {
+    "always": always(),
+    "from 2.01 s": at_time(2.01),
+    "for 1 s": at_time(3.0, hold_s=1.0),
+    "in a context": Trigger(name="x", condition="hwt < 1.915 and rs > 0.0", armed_after_s=1.0),
+    "once in a context": Trigger(name="x", condition="hwt < 1.915", hold=Hold.TO_END, armed_after_s=1.0),
+    "off and on": Trigger(name="x", condition="v_ego > 18.5 or v_ego < 17.5"),
+    "never": Trigger(name="x", condition="d_rel < -5.0"),
+}
+
+
+def fault(model: str, anchor: Anchor, params: dict[str, Value]) -> Fault:
+    place = FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
+    injection = Injection(location=place, model=model, params=tuple(sorted(params.items())))
+    return Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+
+
+class Engines:
+    """The three engines on one toy, and jobs for them."""
+
+    def __init__(self, toy: Workspace, folder: Path, limits: Limits = LIMITS) -> None:
+        self.toy = toy
+        self.folder = folder
+        self.manifest = toy.manifest("toycar")
+        self.models = toy.fault_models()
+        self.limits = limits
+        base = prepare_base(self.manifest, folder / "base")
+        self.made: dict[str, Any] = {}
+        for name in engines.ENGINES:
+            work = folder / name
+            work.mkdir()
+            self.made[name] = engines.make(
+                name, self.manifest, self.models, base=base, work=work, limits=limits, parent=None
+            )
+        self._goldens: dict[str, Path] = {}
+
+    def close(self) -> None:
+        for engine in self.made.values():
+            engine.close()
+
+    def golden(self, scenario: str) -> Path:
+        if scenario not in self._goldens:
+            job = Job(name="golden", scenario=self.toy.scenario(scenario), seed=7)
+            execution = self.made["reference"].execute(job, self.folder / f"golden-{scenario}")
+            self._goldens[scenario] = execution.out
+        return self._goldens[scenario]
+
+    def job(self, fault: Fault | None, trigger: Trigger, scenario: str = "A") -> Job:
+        built = mutant.build(self.manifest, self.models, fault, trigger)
+        return Job(
+            name="job",
+            scenario=self.toy.scenario(scenario),
+            seed=7,
+            files=built.files,
+            mutant=built.id,
+            golden=self.golden(scenario),
+        )
+
+    def run(self, name: str, job: Job) -> tuple[Execution, dict[str, bytes]]:
+        """What came of a job, and the files that it left."""
+        ((_, execution),) = [
+            (job, replace(done, log=done.log)) for job, done in self._kept(self.made[name], [job])
+        ]
+        files = {path.name: path.read_bytes() for path in execution.out.iterdir()}
+        return execution, files
+
+    def _kept(self, engine: Engine, jobs: Sequence[Job]) -> Iterator[tuple[Job, Execution]]:
+        for job, execution in engine.run(jobs):
+            kept = self.folder / "kept"
+            shutil.rmtree(kept, ignore_errors=True)
+            shutil.copytree(execution.out, kept)
+            yield job, replace(execution, out=kept)
+
+
+@pytest.fixture(scope="module")
+def three(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
+) -> Iterator[Engines]:
+    folder = tmp_path_factory.mktemp("engines")
+    made = Engines(copy_toycar(folder), folder)
+    yield made
+    made.close()
+
+
+def check_same(three: Engines, job: Job, how: How | None = None) -> Execution:
+    """Status, words, probe and files are those of the reference engine; the fork engine's execution."""
+    expected, files = three.run("reference", job)
+    for name in ("warm", "fork"):
+        execution, found = three.run(name, job)
+        assert (execution.status, execution.detail) == (expected.status, expected.detail)
+        if expected.status is Status.OK:
+            assert execution.probe is not None
+            assert expected.probe is not None
+            never = all(not told["count"] for told in expected.probe["injections"].values())
+            assert never if execution.how is How.GOLDEN else execution.probe == expected.probe
+            assert found == files
+    if how is not None:
+        assert (execution.how, execution.why) == (how, "")
+    return execution
+
+
+@pytest.mark.parametrize("model", ["offset", "omission", "image_effect"])
+def test_same_bytes(three: Engines, model: str) -> None:
+    """A fault that is active in a context gives the reference engine's bytes, without its interpreter."""
+    execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), How.FORK)
+    assert execution.start > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trigger", TRIGGERS)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
+    """Every fault model under every kind of trigger gives the reference engine's bytes; one whose trigger
+    never holds gives them without being run."""
+    how = How.GOLDEN if trigger == "never" else How.FORK
+    for scenario in ("A", "B"):
+        check_same(
+            three,
+            three.job(fault(*MODELS[model]), TRIGGERS[trigger], scenario),
+            how if scenario == "A" else None,
+        )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ENDS)
+def test_every_bad_end(three: Engines, model: str) -> None:
+    """A run that crashes, hangs, hoards, leaves or breaks the interpreter ends in the same words."""
+    execution = check_same(three, three.job(fault(model, GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"]))
+    assert execution.status is (Status.TIMEOUT if model == "hang" else Status.CRASHED)
+    check_same(three, three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]), How.FORK)
+
+
+def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
+    """What does not end well is run again by the reference engine, and its server goes on."""
+    job = three.job(fault("crash", GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"])
+    execution, _ = three.run("fork", job)
+    assert (execution.status, execution.how) == (Status.CRASHED, How.REFERENCE)
+    assert execution.detail == "IndexError: list index out of range (toycar/sensing.py:14)"
+    assert execution.why.startswith("ended as crashed: IndexError")
+    execution, _ = three.run("fork", three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]))
+    assert (execution.how, execution.status) == (How.FORK, Status.OK)
+
+
+def test_the_limit_of_steps_counts_golden_ones(
+    tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
+) -> None:
+    """A fork that goes on beyond the limit of steps is a timeout after as many steps as anywhere."""
+    few = Engines(copy_toycar(tmp_path), tmp_path, replace(LIMITS, steps=100))
+    try:
+        job = few.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])
+        told = [few.run(name, job)[0] for name in ("reference", "warm")]
+        assert {(e.status, e.detail) for e in told} == {(Status.TIMEOUT, "limit of 100 simulation steps")}
+    finally:
+        few.close()

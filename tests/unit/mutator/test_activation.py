@@ -1,0 +1,79 @@
+"""Where a mutant leaves its golden run: asked of its own probe."""
+
+import math
+import types
+
+import pytest
+
+from mutator import mutant
+from mutator.activation import Observed, Start, first_active
+from mutator.model import Hold, Trigger
+from mutator.trigger import always, at_time
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def probe(toycar: Workspace):
+    """The code of the null mutant's probe with a trigger."""
+    manifest, models = toycar.manifest("toycar"), toycar.fault_models()
+
+    def make(trigger: Trigger) -> types.CodeType:
+        return compile(
+            mutant.build(manifest, models, None, trigger).files[manifest.probe_path], "_fi", "exec"
+        )
+
+    return make
+
+
+GAPS = (50.0, 40.0, 30.0, 20.0, 30.0, 40.0)
+SEEN = Observed(
+    values=tuple((0.05 * i, gap, 10.0, 10.0) for i, gap in enumerate(GAPS)), before=(0, 1, 2, 3, 4, 5)
+)
+
+
+@pytest.mark.parametrize(
+    ("trigger", "step"),
+    [
+        (always(), 0),
+        (always(armed_after_s=0.1), 2),
+        (at_time(0.07), 2),
+        (at_time(9.0), None),
+        (Trigger(name="x", condition="d_rel <= 30.0"), 2),
+        (Trigger(name="x", condition="hwt < 2.5", hold=Hold.FOR, hold_s=0.1), 3),
+        (Trigger(name="x", condition="d_rel <= 30.0", armed_after_s=0.19), 4),
+        (Trigger(name="x", condition="d_rel < 0.0 or rs > 0.0"), None),
+    ],
+)
+def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
+    """The step is the one in which the probe itself first says active; none when it never does."""
+    start = first_active(probe(trigger), SEEN)
+    assert (start.step if start else None) == step
+    if start:
+        assert start.observed == step
+        assert start.t == (SEEN.values[step - 1][0] if step else None)
+
+
+def test_several_observations_in_a_step(probe) -> None:
+    """Steps that observe never or often are told apart: the run is left before that of the observation."""
+    seen = Observed(values=SEEN.values, before=(1, 1, 3, 3, 6))
+    starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
+    assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
+    assert starts[4] == Start(step=3, observed=3, t=SEEN.values[2][0])
+
+
+@pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
+def test_a_probe_that_is_told_is_as_one_that_saw(probe, trigger: Trigger) -> None:
+    """A probe that is told how much was observed is in the state of one that observed it all."""
+    start = first_active(probe(trigger), SEEN)
+    saw: dict = {}
+    told: dict = {}
+    for module in (saw, told):
+        exec(probe(trigger), module)
+    for values in SEEN.values[: start.observed]:
+        saw["observe"](*values)
+    told["_run"].observed, told["_run"].t = start.observed, start.t
+    state = [
+        {name: getattr(module["_run"], name) for name in module["_Run"].__slots__} for module in (saw, told)
+    ]
+    assert state[0] == state[1]
+    assert not math.isinf(state[0]["t"])
