@@ -211,6 +211,10 @@ class ForkEngine:
             execution = self._become(
                 self._at(job, 0, changes), null, folder, changes, _FROM_THE_START, watch=True
             )
+            if execution.status is Status.HARNESS_ERROR:
+                raise Lost(execution.detail)
+            if execution.status is not Status.OK:
+                raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in (self._manifest.trace_file, self._manifest.record_file):
                 if (execution.out / name).read_bytes() != (golden / name).read_bytes():
                     raise Refused(f"its {name} is another one when it is driven step by step")

@@ -1,0 +1,94 @@
+"""A whole campaign on each engine: the same results, also after kills."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator import campaign_run
+from mutator.locks import living_workers
+from mutator.proof import Proof
+from mutator.records import read_records
+from mutator.workspace import Workspace
+
+TABLES = ("results.csv", "results.parquet")
+
+
+@pytest.fixture(scope="module")
+def expected(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
+) -> dict[str, bytes]:
+    """The tables of a campaign on the reference engine."""
+    folder = tmp_path_factory.mktemp("reference")
+    campaign_run.run(copy_toycar(folder), "toy", folder / "run", engine="reference")
+    return {name: (folder / "run" / name).read_bytes() for name in TABLES}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("engine", "workers"), [("fork", 0), ("fork", 2), ("warm", 2)])
+def test_every_engine_gives_the_same_tables(
+    toy: Workspace, tmp_path: Path, expected: dict[str, bytes], engine: str, workers: int
+) -> None:
+    """The tables of a campaign are the same bytes from each engine and any number of workers."""
+    summary = campaign_run.run(toy, "toy", tmp_path / "run", engine=engine, workers=workers)
+    assert (summary.exit_code, summary.problem) == (0, "")
+    assert summary.proof == Proof(sampled=20, same=20)
+    assert {name: (tmp_path / "run" / name).read_bytes() for name in TABLES} == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("victim", ["fork_server", "worker"])
+def test_killed_again_and_again(
+    toy: Workspace, tmp_path: Path, expected: dict[str, bytes], victim: str
+) -> None:
+    """Servers or workers killed in the middle of a campaign cost nothing but time: the tables are the same."""
+    out = tmp_path / "run"
+    command = [
+        sys.executable,
+        "-m",
+        "mutator",
+        "run",
+        "toy",
+        "--out",
+        str(out),
+        "-n",
+        "2",
+        "--engine",
+        "fork",
+    ]
+    places = {"MUTATOR_LIBRARY": str(toy.library), "MUTATOR_TEMPLATES": str(toy.templates)}
+    for _ in range(3):
+        process = subprocess.Popen(
+            command, env=os.environ | places, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        done = len(read_records(out)) if out.exists() else 0
+        while process.poll() is None:
+            time.sleep(0.02)
+            if out.exists() and len(read_records(out)) > done + 2:
+                done = len(read_records(out))
+                for pid in _victims(out, victim):
+                    os.kill(pid, signal.SIGKILL)
+        process.wait()
+    summary = campaign_run.run(toy, "toy", out, engine="fork")
+    assert (summary.exit_code, summary.done) == (0, 24)
+    assert {name: (out / name).read_bytes() for name in TABLES} == expected
+    assert _victims(out, "fork_server") == []
+
+
+def _victims(out: Path, kind: str) -> list[int]:
+    if kind == "worker":
+        return living_workers(out)[:1]
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            line = (path / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if b"fork_server.py" in line and str(out).encode() in line:
+            found.append(int(path.name))
+    return sorted(found)
