@@ -65,6 +65,10 @@ def main(connection: int, start_file: str) -> int:
             return 0
 
 
+class Over(Exception):
+    """Nobody waits for this process any more."""
+
+
 class Process:
     """One waiting process. `run` is the golden run it is in the middle of, at `step`; None before any."""
 
@@ -84,48 +88,47 @@ class Process:
         self.connection.sendall(data)
 
     def serve(self) -> None:
-        """Answer until nobody asks any more."""
+        """Answer until nobody asks any more; what runs for them then ends with it."""
         answers: dict[str, Callable[..., dict[str, Any] | None]] = {
             "branch": self.branch,
             "advance": self.advance,
             "load": load,
             "mutant": self.mutant,
         }
-        while (request := self.receive()) is not None:
-            reap()
-            reply = answers[request.pop("do")](**request)
-            if reply is not None:
-                self.send(reply)
+        with suppress(Over):
+            while True:
+                request = self.receive()
+                reap()
+                reply = answers[request.pop("do")](**request)
+                if reply is not None:
+                    self.send(reply)
 
-    def receive(self) -> dict[str, Any] | None:
-        if not self.wait(self.connection.fileno(), None):
-            return None
-        head = self.read(4)
-        data = self.read(struct.unpack("<I", head)[0]) if head else None
-        return marshal.loads(data) if data else None
+    def receive(self) -> Any:
+        self.wait(self.connection.fileno(), None)
+        return marshal.loads(self.read(struct.unpack("<I", self.read(4))[0]))
 
-    def read(self, count: int) -> bytes | None:
+    def read(self, count: int) -> bytes:
         data = b""
         while len(data) < count:
             try:
                 part = self.connection.recv(count - len(data))
             except ConnectionError:
-                return None
+                raise Over from None
             if not part:
-                return None
+                raise Over
             data += part
         return data
 
     def wait(self, handle: int, seconds: float | None) -> bool:
-        """Whether there is something on `handle` before the time is over; false when all is over."""
+        """Whether there is something on `handle` before the time is over. Ends this process when nobody waits
+        for it any more."""
+        ends = {self.life[0], self.connection.fileno()} - {handle}
         poll = select.poll()
-        poll.register(handle, select.POLLIN)
-        poll.register(self.life[0], select.POLLIN)
-        if handle != self.connection.fileno():
-            poll.register(self.connection, select.POLLIN)
+        for one in (handle, *ends):
+            poll.register(one, select.POLLIN)
         ready = {fd for fd, _ in poll.poll(None if seconds is None else seconds * 1000)}
-        if self.life[0] in ready:
-            return False
+        if ready & ends:
+            raise Over
         return handle in ready
 
     def branch(self, step: int, args: list[str] | None = None) -> None:
@@ -177,11 +180,14 @@ class Process:
         if not pid:
             self.become(job, parent)
         handle = os.pidfd_open(pid)
-        out_of_wall = not self.wait(handle, job["wall_s"])
-        os.close(handle)
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(pid, signal.SIGKILL)
-        _, code, usage = os.wait4(pid, 0)
+        try:
+            out_of_wall = not self.wait(handle, job["wall_s"])
+        finally:
+            os.close(handle)
+            for kill in (os.killpg, os.kill):  # it may not have come to have a group yet
+                with suppress(ProcessLookupError, PermissionError):
+                    kill(pid, signal.SIGKILL)
+            _, code, usage = os.wait4(pid, 0)
         return {
             "code": os.waitstatus_to_exitcode(code),
             "cpu_s": usage.ru_utime + usage.ru_stime,

@@ -46,7 +46,7 @@ def test_every_engine_gives_the_same_tables(
 def test_killed_again_and_again(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], victim: str
 ) -> None:
-    """Servers or workers killed in the middle of a campaign cost nothing but time: the tables are the same."""
+    """Servers or workers killed in the middle of a campaign cost but time: the tables are the same."""
     out = tmp_path / "run"
     command = [
         sys.executable,

@@ -70,7 +70,7 @@ def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) 
 
 
 def test_which_engine_runs(toycar: Workspace) -> None:
-    """Forking is the default where it is possible and worth its proof; what is asked for is used or refused."""
+    """Forking is the default where it is possible and worth it; what is asked for is used, or refused."""
     manifest = toycar.manifest("toycar")
     assert engines.choose(None, manifest, 1000) == "fork"
     assert engines.choose(None, manifest, 10) == "reference"
