@@ -103,9 +103,9 @@ def place(err: BaseException, tree: str) -> str:
 def imported_elsewhere(package: str, tree: str) -> list[str]:
     """Files of the package that were imported from outside the tree."""
     found = []
-    for name, module in sorted(sys.modules.items()):
-        file = getattr(module, "__file__", None)
-        if name.partition(".")[0] == package and file and not file.startswith(tree + os.sep):
+    for name in sorted(name for name in sys.modules if name.partition(".")[0] == package):
+        file = getattr(sys.modules[name], "__file__", None)
+        if file and not file.startswith(tree + os.sep):
             found.append(file)
     return found
 
@@ -119,6 +119,17 @@ def tree_files(tree: str) -> dict[str, str]:
                 path = Path(folder, name)
                 files[str(path.relative_to(tree))] = hashlib.sha256(path.read_bytes()).hexdigest()
     return files
+
+
+def places(tree: str) -> list[str]:
+    """Every folder and file of the tree."""
+    return [f"{folder}/{name}" for folder, _, files in os.walk(tree) for name in ("", *files)]
+
+
+def stamp(places: list[str]) -> list[tuple[int, int, int]]:
+    """What changes when one of them is written to, or a file is put there or taken away."""
+    states = map(os.stat, places)
+    return [(state.st_mtime_ns, state.st_size, state.st_ino) for state in states]
 
 
 if __name__ == "__main__":

@@ -76,7 +76,8 @@ class Process:
         self.start = start
         self.connection = connection
         self.life = os.pipe()  # never written to: its end tells the others that the first process is gone
-        self.stamp = stamp(start["tree"])
+        self.places = child.places(start["tree"])
+        self.stamp = child.stamp(self.places)
         self.begin: Any = None
         self.run: Any = None
         self.step = 0
@@ -212,12 +213,19 @@ class Process:
         os.chdir(job["out"])
         report = self.finish(job)
         report["outside"] = child.imported_elsewhere(self.start["package"], self.start["tree"])
-        report["touched"] = stamp(self.start["tree"]) != self.stamp
+        report["touched"] = self.touched()
         report["threads"] = threads()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(0)
+
+    def touched(self) -> bool:
+        """Whether the tree is another one than it was."""
+        try:
+            return bool(child.stamp(self.places) != self.stamp)
+        except OSError:
+            return True
 
     def finish(self, job: dict[str, Any]) -> dict[str, Any]:
         """Drive the run to its end as the mutant; the report on it."""
@@ -282,17 +290,6 @@ def reap() -> None:
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
-
-
-def stamp(tree: str) -> list[tuple[str, int, int, int]]:
-    """What changes when a file of the tree is written to, put there or taken away."""
-    found = []
-    for folder, names, files in os.walk(tree):
-        for name in (*names, *files):
-            path = f"{folder}/{name}"
-            state = os.stat(path)  # noqa: PTH116 - for each run, so it must be cheap
-            found.append((path, state.st_mtime_ns, state.st_size, state.st_ino))
-    return sorted(found)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,7 @@ class Runner:
         self.models = models
         self.engine = engine
         self.goldens = goldens
-        self.scenario_file = scenario_file
+        self.scenario_file = cache(scenario_file)
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
         """Each experiment with its record; what cannot be built has its record without being run, and what
