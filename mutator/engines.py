@@ -2,15 +2,18 @@
 
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from mutator import mutant
 from mutator.campaign import Limits
 from mutator.engine import Engine, ReferenceEngine
 from mutator.errors import MutatorError
+from mutator.exchange import NotExchangeable, exchange
 from mutator.fault_models import FaultModels
 from mutator.fork_engine import ForkEngine
 from mutator.manifest import TargetManifest
+from mutator.model import Fault
 from mutator.trigger import always
 
 REFERENCE, WARM, FORK = ENGINES = ("reference", "warm", "fork")
@@ -40,6 +43,22 @@ def _not_forkable(manifest: TargetManifest) -> str:
     except OSError:
         return "this kernel has no pidfd_open"
     return ""
+
+
+def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
+    """Variants that the reference engine runs, whatever is asked for, and why; one fault of each is tried."""
+    variants = {fault.spec: fault for fault in faults}
+    if why := _not_forkable(manifest):
+        return dict.fromkeys(variants, why)
+    found = {}
+    for name, fault in variants.items():
+        try:
+            exchange(manifest, mutant.build(manifest, models, fault, always()).files, "")
+        except NotExchangeable as reason:
+            found[name] = str(reason)
+        except MutatorError:
+            continue  # the checks before the campaign tell it, or it is not run at all
+    return found
 
 
 def make(

@@ -69,6 +69,7 @@ def plan(
 
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
+    from mutator import engines
     from mutator.plan import freeze, load_plan, make_plan
 
     terminal = Terminal(as_json)
@@ -78,16 +79,21 @@ def plan(
             workspace, campaign, seed=seed, reading=reading, only=only, exclude=exclude, limit=limit
         )
     folder = freeze(made, out, workspace)
+    manifest = workspace.manifest(made.campaign.target)
+    faults = [experiment.fault for experiment in made.experiments]
+    anew = engines.not_forked(manifest, workspace.fault_models(), faults)
     cost = load_plan(folder.path).cost(workers)  # knows what a run took, once one was driven here
     groups = Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in made.experiments)
     if as_json:
-        faults = [
+        kinds = [
             {"module": m, "fault_type": f, "method": how, "experiments": n}
             for (m, f, how), n in sorted(groups.items())
         ]
         facts = {"run": str(folder.path), "digest": made.digest, "seed": made.seed, "reading": made.reading}
         terminal.emit(
-            facts | {"experiments": len(made.experiments), "runs": made.runs, "groups": faults, "cost": cost}
+            facts
+            | {"experiments": len(made.experiments), "runs": made.runs, "groups": kinds, "cost": cost}
+            | {"not_forked": anew}
         )
     rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in sorted(groups.items())]
     terminal.table(
@@ -98,10 +104,16 @@ def plan(
     )
     if shared := len(made.experiments) - made.runs:
         terminal.say(f"{made.runs} runs: {shared} are the same run as one in another scenario, and share it")
+    for why, variants in _by_reason(anew).items():
+        terminal.say(f"on the reference engine: {', '.join(variants)}: {why}")
     terminal.say(f"expected: {_cost_line(cost)}")
     terminal.say(f"plan: {short_path(folder.path / 'plan.csv')} (digest {made.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
     terminal.say(f"run it: {shlex.join(command)}")
+
+
+def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:
+    return {why: [name for name in found if found[name] == why] for why in found.values()}
 
 
 def _cost_line(cost: "Cost") -> str:

@@ -1,0 +1,46 @@
+"""The engines on the controller that ships: the same records, nothing left to the reference engine."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mutator import engines
+from mutator.engine import Job, ReferenceEngine, prepare_base
+from mutator.golden import golden_key
+from mutator.model import Record
+from mutator.plan import make_plan
+from mutator.runner import Goldens, Runner
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("campaign", "limit"), [("quickstart", 26), ("paper", 8)])
+def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
+    """Experiments of every kind, with ideal vision and with pictures, have the same records, trace digests
+    included, and are forked rather than run anew."""
+    clone = Workspace.find(root=CLONE)
+    plan = make_plan(clone, campaign, limit=limit)
+    manifest, models = clone.manifest("openpilot"), clone.fault_models()
+    base = prepare_base(manifest, tmp_path / "base")
+    (tmp_path / "work").mkdir()
+    limits = plan.campaign.limits
+    reference = ReferenceEngine(manifest, base, tmp_path / "work", limits)
+    for scenario, changes in plan.goldens():
+        name = golden_key(scenario, changes)
+        job = Job(name=name, scenario=clone.scenario(scenario), seed=plan.seed, changes=changes)
+        reference.execute(job, tmp_path / name)
+    goldens = Goldens(manifest, lambda scenario, changes: tmp_path / golden_key(scenario, changes) / "out")
+    found: dict[str, dict[str, Record]] = {}
+    for name in engines.ENGINES:
+        work = tmp_path / name
+        work.mkdir()
+        engine = engines.make(name, manifest, models, base=base, work=work, limits=limits, parent=None)
+        done = list(Runner(manifest, models, engine, goldens, clone.scenario).run(plan.experiments))
+        engine.close()
+        found[name] = {finished.experiment.id: finished.record for finished in done}
+        assert Counter(finished.why for finished in done) == {"": len(plan.experiments)}
+    assert found["fork"] == found["reference"]
+    assert found["warm"] == found["reference"]
