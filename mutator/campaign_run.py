@@ -31,7 +31,6 @@ from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
 from mutator.model import Record, Status
 from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
-from mutator.proof import Proof
 from mutator.provenance import check_sources, sources
 from mutator.records import Progress, Tail, label, read_records
 from mutator.runfolder import RunFolder
@@ -56,7 +55,7 @@ class Summary:
     problem: str  # empty, or why the session ended early (disk full, a worker died)
     interrupted: bool
     results: Path | None  # results.csv; None when there was no room for it
-    proof: Proof | None  # None: nothing that the reference engine has not run
+    proof: proof.Proof | None  # None: nothing that the reference engine has not run
     elapsed_s: float
 
     @property
@@ -64,8 +63,8 @@ class Summary:
         """0 fine; 3 harness errors or experiments left; 130 interrupted."""
         if self.interrupted:
             return EXIT_INTERRUPTED
-        proven = self.proof is None or self.proof.same == self.proof.sampled
-        return EXIT_OK if self.done == self.planned and proven and not self.problem else EXIT_HARNESS_ERRORS
+        whole = self.done == self.planned and (self.proof is None or self.proof.whole)
+        return EXIT_OK if whole and not self.problem else EXIT_HARNESS_ERRORS
 
 
 def run(

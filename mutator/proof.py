@@ -37,6 +37,10 @@ class Proof:
     sampled: int
     same: int
 
+    @property
+    def whole(self) -> bool:
+        return self.same == self.sampled
+
     def __str__(self) -> str:
         return f"{self.same} of {self.sampled} experiments came out the same on the reference engine"
 

@@ -10,6 +10,7 @@ DIR/
   patches/<xx>/<experiment>.patch                source diff of each experiment that ran
   records/<session>-<worker>.jsonl               one line per finished experiment, appended
   timings/<session>-<worker>.jsonl               CPU and wall time, host: what may differ between runs
+  proof/<session>-<worker>.jsonl                 records of the sample run again on the reference engine
   traces/<experiment>/                           on request (`rerun --trace`)
   results.csv, results.parquet, timings.parquet  derived; can be made again at any time
   owner.lock, workers/                           held by the running command and by its workers

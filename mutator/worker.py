@@ -51,6 +51,7 @@ class Worker:
         self._runner = self._make_runner(assignment.engine)
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
+        self._planned: tuple[Experiment, ...] = ()
         self._faults = planfile.read_faults(self.folder.path)
         plan = head["plan"]
         self._head = {"schema": SCHEMA, "plan": plan}
@@ -74,7 +75,8 @@ class Worker:
         if self._prover is None or self._proofs is None:
             self._prover = self._make_runner(engines.REFERENCE)
             self._proofs = LineWriter(self._file(proof.FOLDER), self._head)
-        wanted = [e for e in planfile.read_all(self.folder.path) if e.id in sample.ids]
+            self._planned = planfile.read_all(self.folder.path)
+        wanted = [experiment for experiment in self._planned if experiment.id in sample.ids]
         errors = []
         for finished in self._prover.run(wanted):
             self._proofs.append(asdict(finished.record))
