@@ -175,6 +175,7 @@ def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
         assert all(map(gone, victims)), "nothing is left of the server that was killed"
 
 
+@pytest.mark.slow
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
     """All that waits ends when the first process is killed."""
     fork.run(fork.job(at_time(2.0)))
@@ -198,6 +199,7 @@ time.sleep(60)
 """
 
 
+@pytest.mark.slow
 def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> None:
     """Killing the process of the engine ends the server and all that waits."""
     arguments = [toycar.library, toycar.templates, tmp_path, Path(__file__).parent]
@@ -240,6 +242,7 @@ def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
     assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
 
 
+@pytest.mark.slow
 def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> None:
     """A stepwise golden run with other bytes than the command's disqualifies the engine for it."""
     edit(
@@ -252,6 +255,7 @@ def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> No
     assert "log.npz is another one" in execution.why
 
 
+@pytest.mark.slow
 def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
     """A run that leaves a thread behind would not have ended by itself: the reference engine says so."""
     fork.limits = replace(LIMITS, wall_s=3)
@@ -266,6 +270,7 @@ def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
     assert execution.why == "it leaves threads behind"
 
 
+@pytest.mark.slow
 def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
     """A run that writes into its tree does not reach the next one, and the reference engine judges it."""
     edit(
@@ -309,6 +314,7 @@ def test_the_cpu_limit_is_a_childs_own(fork: Fork, edit: Edit) -> None:
     assert execution.detail == "CPU time limit of 1 s"
 
 
+@pytest.mark.slow
 def test_a_golden_run_that_does_not_end_well(fork: Fork, edit: Edit) -> None:
     """Where the stepwise golden run breaks down, the reference engine runs, and it is told why."""
     edit(

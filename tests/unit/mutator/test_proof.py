@@ -39,6 +39,7 @@ def proven(toycar: Workspace, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
+@pytest.mark.slow
 def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path) -> None:
     """One record that the reference engine would not have written is named, and the campaign fails."""
     (path,) = (proven / "records").iterdir()
@@ -49,6 +50,7 @@ def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Pat
         campaign_run.run(toycar, "small", proven)
 
 
+@pytest.mark.slow
 def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -> None:
     """A proof that is not whole is no success; the same command makes it whole, with any engine."""
     (path,) = (proven / "proof").iterdir()
@@ -62,6 +64,7 @@ def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -
     assert proof.left(folder) == ()
 
 
+@pytest.mark.slow
 def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) -> None:
     """A run that the reference engine alone has driven has none."""
     summary = campaign_run.run(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
