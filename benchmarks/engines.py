@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bench = Bench(plan, workspace, Path(folder))
         found: dict[str, Measured] = {}
         facts: dict[str, object] = {"campaign": options.campaign, "experiments": len(plan.experiments)}
-        bench.measure("fork", plan.experiments)  # what the target remembers between runs is then there for all
+        bench.measure("fork", plan.experiments)  # what a target remembers between runs is then there for all
         for name in bench.engines:
             if name not in options.skip:
                 found[name], first_s = bench.measure(name, plan.experiments)
