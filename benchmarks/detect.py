@@ -58,7 +58,7 @@ def pictures(model: CameraModel) -> dict[str, np.ndarray]:
 
 
 def measure(model: CameraModel, picture: np.ndarray) -> list[float]:
-    """Medians (ms) of the detection as it is, and of its steps with every window marked."""
+    """Medians (ms) of the detection as it is, and of its steps with every edge that is steep."""
     detector, region = PaperDetector(model), RoadRegion(model)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)
     part = np.ascontiguousarray(picture[region.part])
