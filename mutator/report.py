@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from mutator.figures.figures import Drawing
+    from mutator.report_engine import Told as EngineTold
     from mutator.report_observations import Told
     from mutator.statistics.sheet import Sheet
     from mutator.workspace import Workspace
@@ -71,6 +72,7 @@ class Content:
     statistics: "tuple[Sheet, ...]"  # written as files of their own, too
     figures: "tuple[Drawing, ...]"  # written as files that the report shows
     failed: list[Row]  # runs that did not end well, harness errors first
+    engine: "EngineTold | None"  # None: nothing was written down of how experiments were run
     experiments: list[Line]
 
 
@@ -112,7 +114,7 @@ def _files(out: Path) -> tuple[Path, Path]:
 
 def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Content:
     """What the report says; its tables and figures are written."""
-    from mutator import report_observations
+    from mutator import report_engine, report_observations
     from mutator.statistics import sheets
     from mutator.statistics.frame import load
 
@@ -136,6 +138,7 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
         failed=sorted(
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),
+        engine=report_engine.told(folder),
         experiments=[_line(folder, row) for row in sorted(rows, key=_reading_order)],
     )
 

@@ -18,6 +18,8 @@ actuator output then differed from the fault-free run. *Hazard, no alert*: no co
 def markdown(content: "Content") -> str:
     """The report as Markdown."""
     parts = [f"# {content.name}", f"{_outcome_text(content)} {content.planned}"]
+    if content.engine and content.engine.failed:
+        parts.append(f"**{content.engine.proof}**")
     if content.observations:
         parts += ["## The paper's observations", content.observations.coverage, content.observations.verdicts]
         parts.append("Their claims, rules, numbers and queries are in [observations.md](observations.md).")
@@ -34,6 +36,9 @@ def markdown(content: "Content") -> str:
             parts.append(f"![{drawing.title}]({drawing.link('svg')})")
     if content.failed:
         parts += ["## Runs that did not end well", _failed_text(content)]
+    if content.engine:
+        parts += ["## How the experiments were run", content.engine.proof]
+        parts.append(markdown_table(content.engine.heads, content.engine.lines))
     parts += [
         "## Where this comes from",
         markdown_table(["what", "value"], [list(f) for f in content.facts]),
@@ -119,6 +124,9 @@ code { font-size: .9em; }
 <span class="{{ name }}">{{ n }} {{ name }}</span>
 {% endfor %}</p>
 <p>{{ content.planned }}</p>
+{% if content.engine and content.engine.failed %}
+<p class="hazard">{{ content.engine.proof }}</p>
+{% endif %}
 {% if content.observations %}
 <h2>The paper's observations</h2>
 <p>{{ content.observations.coverage }}</p>
@@ -211,6 +219,16 @@ by its option <code>--still</code>.</p>
 {% endfor %}</td></tr>
 {% endfor %}
 </table></div>
+{% if content.engine %}
+<h2>How the experiments were run</h2>
+<p>{{ content.engine.proof }}</p>
+<div class="scroll"><table>
+<tr>{% for head in content.engine.heads %}<th>{{ head }}</th>{% endfor %}</tr>
+{% for way, count in content.engine.lines %}
+<tr><td>{{ way }}</td><td class="number">{{ count }}</td></tr>
+{% endfor %}
+</table></div>
+{% endif %}
 <h2>Where this comes from</h2>
 <div class="scroll"><table>
 {% for name, value in content.facts %}

@@ -1,0 +1,75 @@
+"""How the experiments of a run were run, and what their proof came to, as its report tells it."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mutator import proof
+from mutator.engine import How
+from mutator.errors import CheckFailed
+from mutator.records import TIMINGS_SCHEMA, read_lines, read_records
+from mutator.runfolder import RunFolder
+
+HEADS = ["how", "experiments"]
+LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
+_WORDS = {
+    How.FORK: "a fork of the golden run, taken right before the fault is first active",
+    How.GOLDEN: "no run: the trigger never holds, so what came of the golden run comes of it",
+    How.WARM: "a fork of the loaded program, from the run's beginning",
+    How.REFERENCE: "a fresh interpreter (reference engine)",
+    None: "no run: there is no mutant",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """A table of how many experiments were run how, and a sentence on the proof; `failed`: it found one that
+    is another one on the reference engine."""
+
+    heads: list[str]
+    lines: list[list[str]]
+    proof: str
+    failed: bool
+
+
+def told(folder: RunFolder) -> Told | None:
+    """What the timings and `proof/` of a run folder say; None when its timings say nothing of engines."""
+    ways = _ways(folder)
+    if not ways:
+        return None
+    sentence, failed = _proof(folder)
+    return Told(heads=HEADS, lines=list(_lines(ways)), proof=sentence, failed=failed)
+
+
+def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
+    """How many experiments were run how, and why not as was asked; the newest line of each counts."""
+    newest: dict[str, tuple[str | None, str]] = {}
+    for path in sorted((folder.path / "timings").glob("*.jsonl")):
+        for line in read_lines(path, TIMINGS_SCHEMA):
+            if "engine" in line:  # not in runs of before there were several
+                newest[line["experiment_id"]] = (line["engine"], line["why"])
+    return Counter(newest.values())
+
+
+def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
+    for how, words in _WORDS.items():
+        reasons = {why: count for (name, why), count in ways.items() if name == how}
+        if count := reasons.pop("", 0):
+            yield [words, str(count)]
+        by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
+        for why, count in by_count[:LISTED]:
+            yield [f"{words}, as it cannot be forked: {why}", str(count)]
+        if rest := sum(count for _, count in by_count[LISTED:]):
+            yield [f"{words}, for other reasons, which are in timings/", str(rest)]
+
+
+def _proof(folder: RunFolder) -> tuple[str, bool]:
+    """What is said of the proof, and whether it failed."""
+    try:
+        found = proof.judge(folder, read_records(folder.path))
+    except CheckFailed as err:
+        return f"The proof failed, so nothing here is to be trusted: {err.got}.", True
+    if found is None:
+        return "All were run on the reference engine, so there is nothing to prove.", False
+    rest = "" if found.whole else " The rest of the sample is still to be run."
+    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.{rest}", False
