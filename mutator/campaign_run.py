@@ -163,7 +163,7 @@ class Session:
             done=done,
             ran=done - self._done_before,
             outcomes=Counter(label(r.status, r.outcome) for r in records.values()),
-            harness_errors=tuple(sorted(wrong.items())),
+            harness_errors=(*sorted(wrong.items()), *(proven.errors if proven else ())),
             problem=self.problem,
             interrupted=self.interrupted,
             results=built,

@@ -95,11 +95,19 @@ class ReferenceEngine:
     """A fresh interpreter per job, on a tree of its own, with nothing else of the package to import.
 
     `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
-    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go).
+    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). The runs
+    of an `independent` one take nothing from what other runs left behind, where the manifest says how.
     """
 
     def __init__(
-        self, manifest: TargetManifest, base: Path, work: Path, limits: Limits, parent: int | None = None
+        self,
+        manifest: TargetManifest,
+        base: Path,
+        work: Path,
+        limits: Limits,
+        parent: int | None = None,
+        *,
+        independent: bool = False,
     ) -> None:
         self.manifest = manifest
         self.base = base.resolve()
@@ -107,6 +115,7 @@ class ReferenceEngine:
         self.limits = limits
         self._pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
         self._parent = parent
+        self._independent = independent
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
@@ -146,7 +155,11 @@ class ReferenceEngine:
         bytecode.put(job.files, tree)
         out.mkdir()
         arguments = self.manifest.arguments(
-            scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.changes
+            scenario=job.scenario.resolve(),
+            seed=job.seed,
+            out=out,
+            changes=job.changes,
+            independent=self._independent,
         )
         request = {
             "parent": os.getpid(),

@@ -53,6 +53,7 @@ class TargetManifest:
     entry_module: str  # run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}
     stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
+    independent: tuple[str, ...]  # more arguments, of a run that takes nothing from what others left behind
     reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
@@ -87,12 +88,18 @@ class TargetManifest:
         return f"{self.package}/_fi.py"
 
     def arguments(
-        self, *, scenario: Path, seed: int, out: Path, changes: tuple[str, ...] = ()
+        self,
+        *,
+        scenario: Path,
+        seed: int,
+        out: Path,
+        changes: tuple[str, ...] = (),
+        independent: bool = False,
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
         places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
         places["{film}"] = str(out / FILM)
-        extra: list[str] = []
+        extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:
                 raise MutatorError(
@@ -131,6 +138,7 @@ class _EntryModel(StrictModel):
     module: str
     args: list[str]
     stepwise: str | None = None
+    independent: list[str] = Field(default_factory=list)
     changes: dict[str, list[str] | _ChangeModel] = Field(default_factory=dict)
 
 
@@ -187,6 +195,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         entry_module=model.entry.module,
         entry_args=tuple(model.entry.args),
         stepwise=model.entry.stepwise,
+        independent=tuple(model.entry.independent),
         reads_itself=tuple(model.reads_itself),
         changes={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
         same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, _ChangeModel)},

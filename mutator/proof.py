@@ -1,7 +1,9 @@
 """The proof of a campaign's engine: a sample of its experiments, run again on the reference engine.
 
-Every record of the sample must be the same, trace digest included; one that is not fails the campaign. What
-the reference engine found is kept in `proof/` of the run folder, as records.
+Every record of the sample must be the same, trace digest included; one that is not fails the campaign. The
+proof's runs are independent: they take nothing from what other runs left behind (`entry.independent` of the
+manifest), so that whatever runs share is proved with the engine. What they found is kept in `proof/` of the
+run folder, as records.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,10 +34,12 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """How far the proof of a run is: experiments in the sample, and how many of them came out the same."""
+    """How far the proof of a run is: experiments in the sample, how many of them came out the same, and the
+    harness errors of its own runs (experiment id, detail)."""
 
     sampled: int
     same: int
+    errors: tuple[tuple[str, str], ...] = ()
 
     @property
     def whole(self) -> bool:
@@ -95,10 +99,13 @@ def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
     if not (folder.path / FOLDER).is_dir():
         return None
     found = read_records(folder.path, FOLDER)
-    same = 0
+    same, errors = 0, []
     for name, truth in found.items():
         record = records.get(name)
-        if record is None or not _counts(record) or not _counts(truth):
+        if record is None or not _counts(record):
+            continue
+        if not _counts(truth):
+            errors.append((name, f"in the proof: {truth.detail}"))
             continue
         if record != truth:
             raise CheckFailed(
@@ -108,7 +115,7 @@ def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
                 remedy="do not trust this run: run it anew with --engine reference, and report this",
             )
         same += 1
-    return Proof(sampled=len(_sampled(folder)), same=same)
+    return Proof(sampled=len(_sampled(folder)), same=same, errors=tuple(sorted(errors)))
 
 
 def _difference(record: Record, truth: Record) -> str:

@@ -8,10 +8,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 
 from mutator import engines, planfile, proof
 from mutator.chunks import Pending
+from mutator.engine import Engine, ReferenceEngine
 from mutator.jsonio import full_disk_told
 from mutator.model import Experiment, Status
 from mutator.proof import Sample
@@ -48,7 +50,7 @@ class Worker:
         with full_disk_told(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
-        self._runner = self._make_runner(assignment.engine)
+        self._runner = self._make_runner(self._engine(assignment.engine))
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
         self._planned: tuple[Experiment, ...] = ()
@@ -71,14 +73,17 @@ class Worker:
         return errors
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:
-        """Run a piece of the proof's sample on the reference engine; harness errors as `run`."""
+        """Run a piece of the proof's sample on the reference engine; harness errors as `run`.
+
+        Each has a run of its own, which takes nothing from others: what they share is to be proved, too.
+        """
         if self._prover is None or self._proofs is None:
-            self._prover = self._make_runner(engines.REFERENCE)
+            self._prover = self._make_runner(self._independent_engine())
             self._proofs = LineWriter(self._file(proof.FOLDER), self._head)
             self._planned = planfile.read_all(self.folder.path)
         wanted = [experiment for experiment in self._planned if experiment.id in sample.ids]
         errors = []
-        for finished in self._prover.run(wanted):
+        for finished in chain.from_iterable(self._prover.run([experiment]) for experiment in wanted):
             self._proofs.append(asdict(finished.record))
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
@@ -91,19 +96,28 @@ class Worker:
             if writer is not None:
                 writer.close()
 
-    def _make_runner(self, engine: str) -> Runner:
-        folder, models = self.folder, self._workspace.fault_models()
-        made = engines.make(
-            engine,
+    def _make_runner(self, engine: Engine) -> Runner:
+        goldens = Goldens(self._manifest, self.folder.golden)
+        models = self._workspace.fault_models()
+        return Runner(self._manifest, models, engine, goldens, self._workspace.scenario)
+
+    def _engine(self, name: str) -> Engine:
+        folder = self.folder
+        return engines.make(
+            name,
             self._manifest,
-            models,
+            self._workspace.fault_models(),
             base=folder.base,
             work=folder.work,
             limits=folder.limits,
             parent=self._parent,
         )
-        goldens = Goldens(self._manifest, folder.golden)
-        return Runner(self._manifest, models, made, goldens, self._workspace.scenario)
+
+    def _independent_engine(self) -> Engine:
+        folder = self.folder
+        return ReferenceEngine(
+            self._manifest, folder.base, folder.work, folder.limits, self._parent, independent=True
+        )
 
     def _keep(self, finished: Finished) -> None:
         """Patch first, record last: what has a record has everything."""

@@ -120,6 +120,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
     )
     parser.add_argument("--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="rendered pictures")
+    parser.add_argument("--forget", action="store_true", help="look at every picture, also at known ones")
     parser.add_argument("--film", type=Path, metavar="DIR", help="keep what the camera shows, to be watched")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
@@ -138,6 +139,7 @@ def _pictures(options: argparse.Namespace) -> Pictures | None:
         frames=options.frames,
         translation=options.translation,
         cache=options.cache,
+        forget=options.forget,
     )
 
 

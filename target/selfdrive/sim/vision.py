@@ -27,7 +27,8 @@ class Pictures:
 
     `frames` is a folder of a user's own frames; None: a rendered road with these `marks` (left and right
     both solid, or the right one dashed), kept in `cache`. `translation` is how a frame is moved to the
-    car's offset and heading: by the ground's homography, or shifted as a whole, as in the paper.
+    car's offset and heading: by the ground's homography, or shifted as a whole, as in the paper. With
+    `forget` a picture is looked at also where `cache` tells what was seen in it; what is seen is the same.
     """
 
     detector: str = PAPER
@@ -35,6 +36,7 @@ class Pictures:
     frames: Path | None = None
     translation: str = GROUND
     cache: Path = DEFAULT_CACHE
+    forget: bool = False
 
 
 class RoadCamera(Protocol):
@@ -99,5 +101,8 @@ def _detector(pictures: Pictures, library) -> LaneDetector:
         from selfdrive.visiond.paper_detector import PaperDetector as Detector
     else:
         from selfdrive.visiond.robust_detector import RobustDetector as Detector
+    detector = Detector(library.model)
+    if pictures.forget:
+        return detector
     memory = DetectionMemory(cache_folder(pictures.cache))
-    return RememberingDetector(Detector(library.model), (pictures.detector, library.model), memory)
+    return RememberingDetector(detector, (pictures.detector, library.model), memory)

@@ -72,6 +72,56 @@ def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) 
     assert not (tmp_path / "run" / "proof").exists()
 
 
+_BELIEVE = """
+    drive = Drive(case)
+    known = "0 0" if "--forget" in arguments else Path("{kept}").read_text()
+    drive.world.since, drive.world.more = map(float, known.split())
+    return drive
+"""
+
+
+@pytest.fixture
+def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
+    """A toy whose runs believe what a file says of the world from some time on, unless told to forget it."""
+    go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
+    believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
+    go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
+    line = "        self.frame += 1\n"
+    misled = line + "        self.offset += self.more * (now > self.since)\n"
+    world.write_text(world.read_text().replace(line, misled))
+    (path,) = (toycar.library / "targets").iterdir()
+    path.write_text(path.read_text().replace("entry:\n", "entry:\n  independent: [--forget]\n"))
+    return toycar
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [
+        ("0.0 0.0", ""),
+        ("5.7 0.01", "is another one on the reference engine"),
+        ("0.5 0.01", "in the proof: differs from golden at 0."),
+    ],
+)
+def test_the_proof_believes_nothing_that_runs_share(
+    sharing: Workspace, tmp_path: Path, kept: str, told: str
+) -> None:
+    """What misleads golden runs and forks alike fails the campaign and names the experiment, whether it shows
+    after the fault began or before; what is right passes."""
+    (tmp_path / "kept").write_text(kept)
+    out = tmp_path / "run"
+    try:
+        summary = campaign_run.run(sharing, "small", out, engine="fork", choices=Choices(limit=1))
+        found, code = " ".join(map(": ".join, summary.harness_errors)), summary.exit_code
+    except CheckFailed as err:
+        found, code = str(err), err.exit_code
+    (name,) = read_records(out)
+    if told:
+        assert code and name in found and told in found
+    else:
+        assert (code, found) == (0, "")
+
+
 def test_which_engine_runs(toycar: Workspace) -> None:
     """Forking is the default where it is possible and worth it; what is asked for is used, or refused."""
     manifest = toycar.manifest("toycar")

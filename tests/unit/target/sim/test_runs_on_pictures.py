@@ -12,13 +12,13 @@ import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import detection_memory, vision
-from selfdrive.sim.detection_memory import ENTRY, FILE
+from selfdrive.sim.detection_memory import ENTRY, FILE, DetectionMemory
 from selfdrive.sim.effects import PaperRain
 from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.sim.run import simulate, write
+from selfdrive.sim.run import main, simulate, write
 from selfdrive.sim.scenario import load_scenario
 from selfdrive.sim.vision import GROUND, PAPER, ROBUST, SHIFT, Pictures
 from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
@@ -137,6 +137,34 @@ def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_pat
         table[at] ^= 1
     (cache / FILE).write_bytes(table)
     assert bytes_of("damaged", cache) == plain
+
+
+def test_a_run_that_forgets_believes_nothing_kept(monkeypatch, scenarios, frames, tmp_path):
+    """With `--forget` a memory that is wrong changes no byte of a run, and without it the trace is another;
+    who forgets leaves nothing in the memory, and says nothing of it in the record.
+    """
+    monkeypatch.setattr(detection_memory, "BUCKETS", 512)
+    cache = tmp_path / "cache"
+
+    def bytes_of(name, *more):
+        out = tmp_path / name
+        arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(out), "--max-steps", "140"]
+        arguments += ["--pictures", "--frames", str(frames), "--cache", str(cache), *more]
+        assert main(arguments) == 0
+        return (out / "trace.npz").read_bytes(), (out / "record.json").read_bytes()
+
+    plain = bytes_of("first", "--forget")
+    assert not (cache / FILE).exists()
+    assert bytes_of("remembered") == plain
+    recall = DetectionMemory.recall
+
+    def wrong(self, key):
+        kept = recall(self, key)
+        return kept and (kept[0] + 0.3, *kept[1:])
+
+    monkeypatch.setattr(DetectionMemory, "recall", wrong)
+    assert bytes_of("misled") != plain
+    assert bytes_of("forgotten", "--forget") == plain
 
 
 def test_a_run_with_pictures_has_one_thread(scenarios, frames, tmp_path):
