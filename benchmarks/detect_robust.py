@@ -77,14 +77,14 @@ def main() -> int:
     repeat = parser.parse_args().repeat
     cv2.setNumThreads(1)
     slow = False
-    print(f"{'marks':<8}{'weather':<18}{'first':>10}{'median':>10}{'slowest':>10}{'goal':>10}")
+    print(f"{'marks':<8}{'weather':<18}{'first':>10}{'median':>10}{'slowest':>10}{'goal':>10}{'ratio':>8}")
     for marks in ("solid", "dashed"):
         for weather, amount, goal in CASES:
             found = times(drive(marks, weather, amount), repeat)
             slow |= median(found) > goal
             name = f"{weather} {amount:g}" if weather else "clean"
             figures = "".join(f"{value:7.2f} ms" for value in (found[0], median(found), max(found[1:]), goal))
-            print(f"{marks:<8}{name:<18}{figures}")
+            print(f"{marks:<8}{name:<18}{figures}{median(found) / goal:8.2f}")
     return int(slow)
 
 

@@ -49,7 +49,7 @@ def main() -> int:
     camera = CameraModel()
     picture = RoadRenderer(camera, "solid", 0).grey(10.0)
     slow = []
-    print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}")
+    print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}{'of the goal':>13}")
     for kind, amounts in LEVELS.items():
         if given.effects and kind.__name__ not in given.effects:
             continue
@@ -61,6 +61,7 @@ def main() -> int:
             times = [milliseconds(lambda m=m, e=effect: e.apply(picture, m)) for m in moments]
             print(
                 f"{kind.__name__:<16}{amount:>8g}{made:>9.1f} ms{median(times):>9.2f} ms{min(times):>9.2f} ms"
+                f"{median(times) / GOAL:>13.2f}"
             )
             if median(times) > GOAL:
                 slow.append(kind.__name__)

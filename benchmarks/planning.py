@@ -3,8 +3,10 @@ experiment, resume when complete.
 
 `python benchmarks/planning.py`. The complete run is made up: every experiment has a record of a masked fault.
 So are the checks that a start finds in the cache; it ends where the first mutant would be run (no workers).
+Each time is told for one experiment, too, and beside that of planning.
 """
 
+import argparse
 import os
 import tempfile
 from collections.abc import Callable
@@ -26,11 +28,23 @@ from mutator.workspace import Workspace
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def timed(name: str, work: Callable[[], Any]) -> Any:
-    began = process_time()
-    done = work()
-    print(f"{name:18} {process_time() - began:5.2f} s")
-    return done
+class Table:
+    """Prints times as they come; the first is what the others stand beside."""
+
+    def __init__(self) -> None:
+        self.count = 0  # experiments
+        self._first = 0.0
+
+    def add(self, name: str, seconds: float) -> None:
+        self._first = self._first or seconds
+        each, ratio = 1e3 * seconds / self.count, seconds / self._first
+        print(f"{name:18}{seconds:8.2f} s{each:9.3f} ms an experiment{ratio:8.2f} times planning")
+
+    def timed(self, name: str, work: Callable[[], Any]) -> Any:
+        began = process_time()
+        done = work()
+        self.add(name, process_time() - began)
+        return done
 
 
 def masked(experiment: Experiment) -> Record:
@@ -64,7 +78,8 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     check_cache.store(check_cache.entry(looked_at.digest), folder.path, checks.FILE)
 
 
-def timed_until_the_first_run(name: str, workspace: Workspace, out: Path) -> None:
+def until_the_first_run(workspace: Workspace, out: Path) -> float:
+    """CPU seconds from the command to where the first mutant would be run."""
     reached = []
 
     def stop(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
@@ -73,28 +88,32 @@ def timed_until_the_first_run(name: str, workspace: Workspace, out: Path) -> Non
 
     run, ReferenceEngine.execute = ReferenceEngine.execute, stop  # type: ignore[method-assign]
     began = process_time()
-    campaign_run.run(workspace, "paper", out)
+    campaign_run.run(workspace, "paper", out, engine="reference")
     ReferenceEngine.execute = run  # type: ignore[method-assign]
-    print(f"{name:18} {reached[0] - began:5.2f} s")
+    return float(reached[0] - began)
 
 
 def main() -> None:
-    workspace = Workspace.find(root=ROOT)
+    argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0]).parse_args()
+    workspace, table = Workspace.find(root=ROOT), Table()
     with tempfile.TemporaryDirectory() as place:
         os.environ["XDG_CACHE_HOME"] = place
         out = Path(place) / "run"
-        plan = timed("plan", lambda: make_plan(workspace, "paper"))
-        folder = timed("freeze", lambda: freeze(plan, out, workspace))
+        began = process_time()
+        plan = make_plan(workspace, "paper")
+        table.count = len(plan.experiments)
+        table.add("plan", process_time() - began)
+        folder = table.timed("freeze", lambda: freeze(plan, out, workspace))
         make_up_checks(workspace, folder)
         new = out.with_name("new")
-        timed_until_the_first_run("new, first run", workspace, new)
-        timed_until_the_first_run("frozen, first run", workspace, new)
+        table.add("new, first run", until_the_first_run(workspace, new))
+        table.add("frozen, first run", until_the_first_run(workspace, new))
         lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
         for experiment in plan.experiments:
             lines.append(asdict(masked(experiment)))
         lines.close()
-        timed("tables", lambda: campaign_run.run(workspace, "paper", out))
-        timed("resume, complete", lambda: campaign_run.run(workspace, "paper", out))
+        table.timed("tables", lambda: campaign_run.run(workspace, "paper", out))
+        table.timed("resume, complete", lambda: campaign_run.run(workspace, "paper", out))
 
 
 if __name__ == "__main__":
