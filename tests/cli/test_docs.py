@@ -15,7 +15,8 @@ import pytest
 
 CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
-PAGES = [README, *sorted((CLONE / "docs").rglob("*.md"))]
+BENCHMARKS = CLONE / "benchmarks" / "README.md"
+PAGES = [README, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 COMPARISON = CLONE / "docs" / "how-to" / "compare-with-openpilot.md"
 
@@ -117,6 +118,12 @@ def test_links_lead_somewhere(page: Path) -> None:
         if anchor:
             headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
             assert anchor in [heading.lower().replace(" ", "-") for heading in headings]
+
+
+def test_every_benchmark_is_told_of() -> None:
+    """The table of benchmarks has a line for each, and for nothing that is not there."""
+    told = re.findall(r"^\| `(\w+\.py)` ", BENCHMARKS.read_text(encoding="utf-8"), re.MULTILINE)
+    assert sorted(told) == sorted(file.name for file in BENCHMARKS.parent.glob("*.py"))
 
 
 def test_the_readme_has_both_command_lines() -> None:
