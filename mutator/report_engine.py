@@ -71,5 +71,6 @@ def _proof(folder: RunFolder) -> tuple[str, bool]:
         return f"The proof failed, so nothing here is to be trusted: {err.got}.", True
     if found is None:
         return "All were run on the reference engine, so there is nothing to prove.", False
-    rest = "" if found.whole else " The rest of the sample is still to be run."
-    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.{rest}", False
+    if not found.whole:
+        return f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run.", False
+    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.", False
