@@ -190,7 +190,7 @@ class Plan:
     t: float = 0.0
     v_target: float = 0.0  # m/s
     a_target: float = 0.0  # m/s^2
-    v_target_future: float = 0.0  # m/s, the plan's end; infinite where no stop or start is to be decided
+    v_target_future: float = 0.0  # m/s, the plan's end, decides stopping and starting
     source: str = "cruise"  # cruise, mpc1 or mpc2
     has_lead: bool = False
     fcw: bool = False

@@ -42,23 +42,14 @@ class Packer:
         self._checksum_base = checksum_base(message.address)
         self._values: tuple[float, ...] | None = None
         self._word = 0
-        self._frames: dict[int, CanFrame] = {}  # of these values, by counter: most signals seldom change
 
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
         """The frame for physical `values`; `counter` counts the frames sent of this message."""
         if values != self._values:
             self._word = self._encode(values)
             self._values = values
-            self._frames.clear()
-        counter &= self._counter_mask
-        frame = self._frames.get(counter)
-        if frame is None:
-            frame = self._frames[counter] = self._frame(counter)
-        return frame
-
-    def _frame(self, counter: int) -> CanFrame:
         size = self._size
-        word = self._word | counter << self._counter_shift
+        word = self._word | (counter & self._counter_mask) << self._counter_shift
         halves = half_byte_sum(word.to_bytes(size, "big"))
         word |= (self._checksum_base - halves) & self._checksum_mask
         return CanFrame(self._address, word.to_bytes(size, "big"), self._bus)

@@ -9,7 +9,6 @@ from selfdrive.messages import CanFrame
 
 MISSED_PERIODS = 10  # a message this much overdue is invalid
 MAX_BAD_COUNTERS = 5  # frames with a wrong counter, before they are no longer believed
-MOST_KNOWN = 64  # frames of a message that are remembered
 
 
 class Expected(NamedTuple):
@@ -25,13 +24,14 @@ class _State:
 
     __slots__ = (
         "bad_counters",
+        "body",
+        "body_mask",
         "checksum_base",
         "checksum_mask",
         "counter",
         "counter_shift",
         "deadline",
         "fields",
-        "known",
         "name",
         "size",
         "timeout",
@@ -43,29 +43,21 @@ class _State:
         self.counter_shift = message.counter_shift
         self.checksum_mask = 0xF if message.has_checksum else 0
         self.checksum_base = checksum_base(message.address)
-        # what frames seen before say: most come again and again, and need no second look
-        self.known: dict[bytes, tuple[int, tuple[float, ...]]] = {}
+        self.body_mask = sum(field.mask << field.shift for field in self.fields)
+        self.body = -1  # the payload's bits that matter, of the last valid frame
         self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # the excess keeps rounding of t out
         self.deadline = float("-inf")  # s, after which the message is overdue
         self.counter: int | None = None  # of the next frame
         self.bad_counters = 0
 
-    def read(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
-        """Counter and physical values of a frame not seen of late; None where size or checksum are wrong."""
+    def accepts(self, data: bytes, word: int) -> bool:
+        """Whether size, checksum and counter are right; keeps count of wrong counters."""
         if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
-            return None
-        word = int.from_bytes(data, "big")
-        if len(self.known) >= MOST_KNOWN:
-            self.known.clear()
-        said = self.known[data] = word >> (self.counter_shift or 0) & 0x3, decode(self.fields, word)
-        return said
-
-    def in_turn(self, counter: int) -> bool:
-        """Whether a frame with this counter is believed; keeps count of wrong ones."""
+            return False
         if self.counter_shift is None:
             return True
-        expected, self.counter = self.counter, counter + 1 & 0x3
-        if counter == expected or expected is None:
+        expected, self.counter = self.counter, (word >> self.counter_shift) + 1 & 0x3
+        if word >> self.counter_shift & 0x3 == expected or expected is None:
             if self.bad_counters:
                 self.bad_counters -= 1
         else:
@@ -98,12 +90,14 @@ class CanParser:
         for address, data, frame_bus in frames:
             if frame_bus != bus or (state := states.get(address)) is None:
                 continue
-            said = state.known.get(data) or state.read(data)
-            if said is None or not state.in_turn(said[0]):
+            word = int.from_bytes(data, "big")
+            if not state.accepts(data, word):
                 continue
             state.deadline = t + state.timeout
             updated.append(state.name)
-            self.values[state.name] = said[1]
+            if word & state.body_mask != state.body:
+                state.body = word & state.body_mask
+                self.values[state.name] = decode(state.fields, word)
         self.updated = updated
         if t > self._valid_until:
             self._valid_until = min([state.deadline for state in states.values()])

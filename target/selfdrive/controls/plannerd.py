@@ -1,7 +1,5 @@
 """plannerd: how fast to go and where, from the leads, the set speed and the road."""
 
-from math import inf
-
 from selfdrive.car.params import CarParams
 from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.common.realtime import DT_CTRL
@@ -9,7 +7,7 @@ from selfdrive.controls.lib.cruise_plan import cruise_limits, is_following
 from selfdrive.controls.lib.events import IMMEDIATE_DISABLE, NO_ENTRY, Event
 from selfdrive.controls.lib.fcw import FcwChecker
 from selfdrive.controls.lib.long_mpc import LongitudinalMpc
-from selfdrive.controls.lib.longcontrol import MIN_CAN_SPEED, PID, STARTING, STOPPING, decides_to_stop
+from selfdrive.controls.lib.longcontrol import MIN_CAN_SPEED, PID, STARTING, STOPPING
 from selfdrive.controls.lib.pathplanner import ModelFit, PathPlanner
 from selfdrive.controls.lib.speed_smoother import smooth_speed
 from selfdrive.messages import CarState, ModelData, Plan, RadarState
@@ -41,7 +39,7 @@ class Planner:
         self._v_goal = self._a_goal = 0.0
         self._v_now = self._a_now = 0.0
         self._v_cruise = self._a_cruise = 0.0
-        self._v_set = 0.0
+        self._v_future = 0.0
 
     def take_model(self, v_ego: float, model: ModelData | None) -> bool:
         """Update the path if the model message is a new one; returns whether it was."""
@@ -73,7 +71,7 @@ class Planner:
             t,
             self._v_now,
             self._a_now,
-            self._v_future() if decides_to_stop(long_state, car) else inf,
+            self._v_future,
             self._source,
             self.mpc1.prev_lead_status,
             self._fcw,
@@ -85,7 +83,7 @@ class Planner:
     def _replan(
         self, t: float, car: CarState, radar: RadarState, long_state: str, v_set: float, slow_down: bool
     ) -> None:
-        self._planned_at, self._v_set = t, v_set
+        self._planned_at = t
         self._v_start, self._a_start = self._v_now, self._a_now
         enabled = long_state in (PID, STOPPING)
         if enabled:
@@ -97,11 +95,10 @@ class Planner:
             mpc.update(car.v_ego, car.a_ego, lead)
         if enabled:
             self._choose()
+        self._v_future = min(self.mpc1.v_mpc_future, self.mpc2.v_mpc_future, v_set)
         if self.mpc1.new_lead:
             self._fcw_checker.reset()
-        # asked for only where there is something to warn of: without a lead the plan is not worked out
-        a_plan = self.mpc1.a_plan if radar.lead_one.status else ()
-        warn = self._fcw_checker.update(t, car, radar.lead_one, a_plan)
+        warn = self._fcw_checker.update(t, car, radar.lead_one, self.mpc1.a_plan)
         self._fcw = warn and not car.brake_pressed
 
     def _plan_cruise(self, car: CarState, radar: RadarState, v_set: float, slow_down: bool) -> None:
@@ -126,10 +123,6 @@ class Planner:
         for name, mpc in (("mpc1", self.mpc1), ("mpc2", self.mpc2)):
             if mpc.prev_lead_status and mpc.v_mpc < self._v_goal:
                 self._source, self._v_goal, self._a_goal = name, mpc.v_mpc, mpc.a_mpc
-
-    def _v_future(self) -> float:
-        """The lowest speed (m/s) that anything planned for leads to."""
-        return min(self.mpc1.v_mpc_future, self.mpc2.v_mpc_future, self._v_set)
 
     def _interpolate(self, t: float) -> None:
         """Where the plan is one cycle from now; a plan that is not renewed is left to end."""

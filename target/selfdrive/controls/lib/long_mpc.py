@@ -66,16 +66,6 @@ def long_ocp() -> Ocp:
     )
 
 
-def _when_asked(name: str) -> property:
-    """A result, worked out from the updates so far when somebody asks for it."""
-
-    def result(mpc: "LongitudinalMpc"):
-        mpc._catch_up()
-        return getattr(mpc, name)
-
-    return property(result)
-
-
 class LongitudinalMpc:
     """Plans the host's speed behind one lead; one real-time iteration an update (20 Hz).
 
@@ -93,15 +83,7 @@ class LongitudinalMpc:
     in the original at the end of a stop; jerk has no limit, so some jerk always meets the bounds and
     the problem is never infeasible. Where the solver fails all the same, the jerk planned before is
     kept (`unsolved` counts this), and the rules above judge the outcome.
-
-    Without a lead hardly anybody reads the results, so such updates only wait, with their input. They are
-    solved, one after the other, when a result is asked for or a lead appears: with the same outcome.
     """
-
-    v_mpc, a_mpc, v_mpc_future = _when_asked("_v_mpc"), _when_asked("_a_mpc"), _when_asked("_v_mpc_future")
-    v_plan, a_plan = _when_asked("_v_plan"), _when_asked("_a_plan")
-    x_plan, x_lead_plan = _when_asked("_x_plan"), _when_asked("_x_lead_plan")
-    resets, unsolved = _when_asked("_resets"), _when_asked("_unsolved")
 
     def __init__(self, mpc_id: int, solver: ca.Function | None = None) -> None:
         """`mpc_id` is 1 or 2, for the log. `solver`: that of another instance, which has no memory."""
@@ -117,12 +99,11 @@ class LongitudinalMpc:
         self._decay = LEAD_DECAY
         self._prev_x_lead = 0.0
         self.prev_lead_status = self.new_lead = False
-        self._resets = self._iteration.unsolved = 0
-        self._waiting: list[tuple[tuple[float, ...], float, float]] = []  # start, the car's own v and a
+        self.resets = self._iteration.unsolved = 0
         self._publish(self._iteration.guess)
 
     @property
-    def _unsolved(self) -> int:
+    def unsolved(self) -> int:
         """Number of updates in which the solver failed and the plan's jerk was kept."""
         return self._iteration.unsolved
 
@@ -134,23 +115,11 @@ class LongitudinalMpc:
         """Plan for `lead` (None or status False: no lead). `v_ego`, `a_ego`: the car's own."""
         self.new_lead = False
         if lead is not None and lead.status:
-            self._catch_up()
             x_lead, v_lead, a_lead, decay = self._follow(lead)
-            start = (0.0, self._v_start, self._a_start, x_lead, v_lead, a_lead)
-            self._solve(start, decay, v_ego, a_ego)
         else:
             self.prev_lead_status = False
-            start = (0.0, self._v_start, self._a_start, NO_LEAD_GAP, v_ego + NO_LEAD_SPEED, 0.0)
-            self._waiting.append((start, v_ego, a_ego))
-
-    def _catch_up(self) -> None:
-        """Solve the updates without a lead that still wait."""
-        if self._waiting:
-            waiting, self._waiting = self._waiting, []
-            for start, v_ego, a_ego in waiting:
-                self._solve(start, LEAD_DECAY, v_ego, a_ego)
-
-    def _solve(self, start: tuple[float, ...], decay: float, v_ego: float, a_ego: float) -> None:
+            x_lead, v_lead, a_lead, decay = NO_LEAD_GAP, v_ego + NO_LEAD_SPEED, 0.0, LEAD_DECAY
+        start = (0.0, self._v_start, self._a_start, x_lead, v_lead, a_lead)
         self._iteration.guess[:6] = array("d", start)  # the original linearises the first node there
         finite = self._iteration.run(start, (decay,))
         if finite:
@@ -174,7 +143,7 @@ class LongitudinalMpc:
 
     def _simulate(self, x_lead: float, v_lead: float, a_lead: float, decay: float) -> None:
         """First guess for a new lead: the host brakes evenly to the lead's speed over the gap."""
-        x, v, a = 0.0, self._v_mpc, 0.0
+        x, v, a = 0.0, self.v_mpc, 0.0
         room = 2 * x_lead + 0.01
         if v > v_lead and room != 0.0:
             a = a_lead - (v - v_lead) * (v - v_lead) / room
@@ -193,19 +162,19 @@ class LongitudinalMpc:
     def _publish(self, z: array) -> None:
         """Take the results out of the trajectory `z`."""
         end = 6 * N_NODES
-        self._x_plan, self._v_plan, self._a_plan = z[0:end:6], z[1:end:6], z[2:end:6]
-        self._x_lead_plan = z[3:end:6]
-        self._v_mpc, self._a_mpc = self._v_plan[1], self._a_plan[1]
-        self._v_mpc_future = self._v_plan[FUTURE_NODE]
+        self.x_plan, self.v_plan, self.a_plan = z[0:end:6], z[1:end:6], z[2:end:6]
+        self.x_lead_plan = z[3:end:6]
+        self.v_mpc, self.a_mpc = self.v_plan[1], self.a_plan[1]
+        self.v_mpc_future = self.v_plan[FUTURE_NODE]
 
     def _runs_into_lead(self) -> bool:
         """The plan goes through the lead, or backwards."""
-        gap = min(map(sub, self._x_lead_plan, self._x_plan))
-        return gap < CRASH_GAP or min(self._v_plan) < BACKWARDS_SPEED
+        gap = min(map(sub, self.x_lead_plan, self.x_plan))
+        return gap < CRASH_GAP or min(self.v_plan) < BACKWARDS_SPEED
 
     def _discard(self, v_ego: float, a_ego: float) -> None:
         """Throw the solution away and start anew from the car's own speed."""
-        self._resets += 1
+        self.resets += 1
         self._iteration.restart()
-        self._v_mpc, self._a_mpc = v_ego, a_ego
+        self.v_mpc, self.a_mpc = v_ego, a_ego
         self.prev_lead_status = False

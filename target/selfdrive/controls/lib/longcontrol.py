@@ -24,11 +24,6 @@ CREEP_SPEED = 2.3  # m/s, below it an idling car pushes forward
 CREEP_BRAKE = 0.15  # brake that holds it at rest
 
 
-def decides_to_stop(state: str, car: CarState) -> bool:
-    """Whether the plan's end can matter now: near standstill, and while the driver brakes."""
-    return car.v_ego < STOPPING_EGO_SPEED or state == STOPPING or car.brake_pressed
-
-
 class LongControl:
     """Gas and brake as one output in -1..1, the states around standstill included."""
 

@@ -1,7 +1,6 @@
 """Choosing and interpolating the longitudinal plan."""
 
 from itertools import pairwise
-from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -143,30 +142,10 @@ def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:
 
 
 def test_future_is_the_slowest_of_all(params: CarParams) -> None:
-    """Where a stop may end, the plan's end is the slowest of both controllers and the set speed."""
-
-    def future(drive: Drive, **options: float) -> float:
-        return drive.run(1, "stopping", **options)[-1].v_target_future
-
-    assert future(Drive(params, FixedMpc(future=12.0))) == 12.0
-    assert future(Drive(params, FixedMpc(), FixedMpc(future=11.0))) == 11.0
-    assert future(Drive(params), kph=36.0) == pytest.approx(10.0)
-
-
-@pytest.mark.parametrize(
-    ("long_state", "car"),
-    [
-        ("stopping", CarState(v_ego=20.0)),
-        ("pid", CarState(v_ego=0.4)),
-        ("pid", CarState(v_ego=20.0, brake_pressed=True)),
-    ],
-)
-def test_future_is_told_where_it_decides(params: CarParams, long_state: str, car: CarState) -> None:
-    """The plan's end is told near standstill and while the driver brakes; elsewhere nobody works it out."""
-    drive = Drive(params, FixedMpc(future=12.0))
-    assert drive.run(1)[-1].v_target_future == inf
-    drive.car = car
-    assert drive.run(1, long_state)[-1].v_target_future == 12.0
+    """The plan's end is the slowest of both controllers and the set speed."""
+    assert Drive(params, FixedMpc(future=12.0)).run(1)[-1].v_target_future == 12.0
+    assert Drive(params, FixedMpc(), FixedMpc(future=11.0)).run(1)[-1].v_target_future == 11.0
+    assert Drive(params).run(1, kph=36.0)[-1].v_target_future == pytest.approx(10.0)
 
 
 def test_absent_driver_slows_the_car(params: CarParams) -> None:

@@ -51,7 +51,7 @@ def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead)
 
 def test_first_guess_brakes_evenly_to_the_lead(long_mpc):
     """For a new lead the first plan slows from 20 to 10 m/s over the 80 m between, by 0.625 m/s^2."""
-    long_mpc._v_mpc = 20.0
+    long_mpc.v_mpc = 20.0
     long_mpc._simulate(80.0, 10.0, 0.0, LEAD_DECAY)
     speeds = long_mpc._iteration.guess[1:126:6]
     steps = [0.2] * 5 + [0.6] * 15
