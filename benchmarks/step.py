@@ -48,7 +48,7 @@ GROUPS: dict[str, tuple[tuple[type, str], ...]] = {
     "visiond": ((Visiond, "update"),),
     "radard": ((Radard, "update"),),
     "planner": ((Planner, "take_model"), (Planner, "update")),
-    "longitudinal MPC": ((LongitudinalMpc, "update"), (LongitudinalMpc, "_catch_up")),
+    "longitudinal MPC": ((LongitudinalMpc, "update"),),
     "longitudinal control": ((LongControl, "update"),),
     "lateral MPC": ((LatControl, "plan"),),
     "lateral control": ((LatControl, "update"),),
