@@ -77,3 +77,13 @@ def test_a_probe_that_is_told_is_as_one_that_saw(probe, trigger: Trigger) -> Non
     ]
     assert state[0] == state[1]
     assert not math.isinf(state[0]["t"])
+
+
+def test_probes_of_one_trigger_are_asked_once(probe) -> None:
+    """Mutants that differ in their ids share the answer; what holds later has an answer of its own."""
+    one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
+    assert one != other
+    assert first_active(one, SEEN) is first_active(other, SEEN)
+    assert first_active(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != first_active(
+        one, SEEN
+    )

@@ -1,0 +1,138 @@
+"""What an experiment costs beyond its simulation: faults that first act in the last steps of a 30 s run.
+
+`python benchmarks/overhead.py [--experiments 200] [--json FILE]`. The fork engine runs faults of the paper's
+campaign with ideal vision, each at a time of its own shortly before the end, and does with them all that a
+worker does: mutant, run, comparison with golden, patch, record. CPU of the worker, of the children and of the
+processes that they are forks of; beside it what 30 s of the same driving cost in this run. Exit code 1 where
+the overhead is more than its goal.
+"""
+
+import argparse
+import json
+import resource
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import cycle, islice
+from pathlib import Path
+from time import process_time
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from mutator import mutant  # noqa: E402
+from mutator.engine import Job, ReferenceEngine, prepare_base  # noqa: E402
+from mutator.fork_engine import ForkEngine  # noqa: E402
+from mutator.model import Experiment, Hold, Trigger  # noqa: E402
+from mutator.plan import make_plan  # noqa: E402
+from mutator.records import SCHEMA, LineWriter  # noqa: E402
+from mutator.runner import Goldens, Runner  # noqa: E402
+from mutator.trigger import always  # noqa: E402
+from mutator.workspace import Workspace  # noqa: E402
+
+GOAL_MS = 5.0
+END_S, LAST_STEPS, STEP_S = 30.0, 10, 0.01
+SCENARIO = "S1"
+FEW = 5  # experiments that show what is done once
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """CPU time (s, user and system) of so many experiments."""
+
+    worker: float
+    children: float
+    server: float
+
+    def __sub__(self, other: "Cost") -> "Cost":
+        return Cost(
+            worker=self.worker - other.worker,
+            children=self.children - other.children,
+            server=self.server - other.server,
+        )
+
+
+def late(workspace: Workspace, count: int) -> list[Experiment]:
+    """Faults of the campaign that need no change of the scenario, first active in the last steps."""
+    plan = make_plan(workspace, "paper", limit=8 * count)
+    known = {e.fault.id: e for e in plan.experiments if e.scenario == SCENARIO and not e.fault.changes}
+    made = []
+    for number, experiment in enumerate(islice(cycle(known.values()), count)):
+        # no two triggers are alike; later and later, as a golden run goes on
+        t = END_S - STEP_S * (1.5 + LAST_STEPS * (1 - (number + 1) / count))
+        trigger = Trigger(name="late", condition=f"t >= {t:.9f}", hold=Hold.TO_END, armed_after_s=1.5)
+        made.append(replace(experiment, trigger=trigger, setting=()))
+    return made
+
+
+class Bench:
+    """The target and its golden run in a scratch folder."""
+
+    def __init__(self, workspace: Workspace, folder: Path) -> None:
+        self.workspace, self.folder = workspace, folder
+        self.manifest, self.models = workspace.manifest("openpilot"), workspace.fault_models()
+        self.work = folder / "work"
+        self.work.mkdir()
+        limits = make_plan(workspace, "paper", limit=1).campaign.limits
+        self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
+
+    def golden(self) -> float:
+        """Drive the golden run; CPU time (s) beyond that of one of two steps."""
+        job = Job(name="golden", scenario=self.workspace.scenario(SCENARIO), seed=1)
+        engine = ReferenceEngine(*self.common)
+        whole = engine.execute(job, self.folder / "golden")
+        few = replace(self.manifest, entry_args=(*self.manifest.entry_args, "--max-steps", "2"))
+        short = ReferenceEngine(few, *self.common[1:]).execute(job, self.folder / "few")
+        return whole.cpu_s - short.cpu_s
+
+    def cost(self, experiments: Sequence[Experiment]) -> Cost:
+        """What an engine of their own takes for the experiments; all of them must be forked."""
+        null = mutant.build(self.manifest, self.models, None, always()).files
+        engine = ForkEngine(*self.common, null=null)
+        goldens = Goldens(self.manifest, lambda scenario, changes: self.folder / "golden" / "out")
+        runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
+        records = LineWriter(self.folder / f"{len(experiments)}.jsonl", {"schema": SCHEMA})
+        before, began, children = _ended(), process_time(), 0.0
+        for finished in runner.run(experiments):
+            assert finished.how == "fork" and finished.mutant, finished.record
+            (self.folder / "patch").write_bytes(finished.mutant.patch_bytes)
+            records.append(asdict(finished.record))
+            children += finished.cpu_s
+        worker = process_time() - began
+        records.close()
+        engine.close()  # only then are its processes counted
+        return Cost(worker=worker, children=children, server=_ended() - before - children)
+
+
+def _ended() -> float:
+    """CPU time (s) of the processes that this one waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--experiments", type=int, default=200, metavar="N")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args(arguments)
+    workspace = Workspace.find(root=ROOT)
+    known = late(workspace, options.experiments + FEW)
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(workspace, Path(folder))
+        driving = bench.golden()
+        cost = bench.cost(known) - bench.cost(known[-FEW:])  # without what is done once
+    count = options.experiments
+    facts = {name: 1e3 * seconds / count for name, seconds in asdict(cost).items()}
+    total = sum(facts.values())
+    for name, ms in facts.items():
+        print(f"{name:10} {ms:6.2f} ms of CPU an experiment")
+    print(f"all        {total:6.2f} ms (goal {GOAL_MS}), {total / driving / 10:.2f} % of 30 s of driving")
+    if options.json:
+        told = {"experiments": count, "ms": facts, "total_ms": total, "driving_s": driving}
+        options.json.write_text(json.dumps(told, indent=1) + "\n")
+    return int(total > GOAL_MS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
