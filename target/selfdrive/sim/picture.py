@@ -33,17 +33,15 @@ class Picture(NDArrayOperatorsMixin):
     def pixels(self) -> np.ndarray:
         """All of it, read-only."""
         if self._whole is None:
-            whole = self._make(*self.shape).view()
-            whole.flags.writeable = False
-            self._whole = whole
+            self._whole = _read_only(self._make(*self.shape))
         return self._whole
 
     def __getitem__(self, where):
-        """As an array; for two slices no more than they need is made."""
+        """As an array; for two slices no more than they need is made. The cut is read-only."""
         if self._whole is None and isinstance(where, tuple) and len(where) == 2:
             ends = [_end(part, size) for part, size in zip(where, self.shape, strict=True)]
             if all(ends):
-                return self._make(*ends)[where]
+                return _read_only(self._make(*ends)[where])
         return self.pixels()[where]
 
     def __setitem__(self, where, value) -> None:
@@ -56,6 +54,8 @@ class Picture(NDArrayOperatorsMixin):
         return np.array(self.pixels(), dtype=dtype, copy=copy)
 
     def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
+        if "out" in keywords:  # to be refused there, as any read-only array is
+            keywords["out"] = tuple(map(_pixels, keywords["out"]))
         return getattr(ufunc, method)(*map(_pixels, inputs), **keywords)
 
     def __getattr__(self, name: str):
@@ -70,6 +70,12 @@ def _end(part: object, size: int) -> int:
     if not isinstance(part, slice) or part.step is not None or (part.start or 0) < 0:
         return 0
     return size if part.stop is None else min(part.stop, size) if part.stop > 0 else 0
+
+
+def _read_only(pixels: np.ndarray) -> np.ndarray:
+    view = pixels.view()
+    view.flags.writeable = False
+    return view
 
 
 def _pixels(value: object) -> object:

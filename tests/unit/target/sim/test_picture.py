@@ -68,10 +68,44 @@ def test_it_is_calculated_with_as_an_array():
     assert np.array_equal(deepcopy(one), WHOLE)
 
 
-def test_it_is_not_written_to():
-    """Neither it nor its pixels take values, as the frame behind it belongs to all runs."""
+def add_in_place(one):
+    one += 5
+
+
+def add_into(one):
+    np.add(one, 1, out=one)
+
+
+def put(one):
+    one[...] = 1
+
+
+def put_into_cut(one):
+    one[1:3, 2:5][:] = 1
+
+
+def put_into_pixels(one):
+    one.pixels()[0, 0] = 1
+
+
+@pytest.mark.parametrize("made", [False, True])
+@pytest.mark.parametrize("write", [add_in_place, add_into, put, put_into_cut, put_into_pixels])
+def test_it_is_not_written_to(write, made):
+    """Neither it nor its pixels nor cuts take values, made before or not, as the frame behind it belongs to
+    all runs; who tries is told what NumPy tells of any such array.
+    """
     one = picture()
+    if made:
+        one.pixels()
     with pytest.raises(ValueError, match="read-only"):
-        one[0, 0] = 1
-    with pytest.raises(ValueError, match="read-only"):
-        one.pixels()[0, 0] = 1
+        write(one)
+    assert np.array_equal(one, np.arange(48).reshape(6, 8))
+
+
+def test_what_is_made_of_it_can_be_written_to():
+    """A sum is an array of its own, and a picture may be added to another array in place."""
+    one = picture()
+    more = one + 5
+    more += one
+    more[0, 0] = 9
+    assert type(more) is np.ndarray and np.array_equal(more[1:], 2 * WHOLE[1:] + 5) and more[0, 0] == 9
