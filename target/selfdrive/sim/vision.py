@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
@@ -28,7 +29,8 @@ class Pictures:
     `frames` is a folder of a user's own frames; None: a rendered road with these `marks` (left and right
     both solid, or the right one dashed), kept in `cache`. `translation` is how a frame is moved to the
     car's offset and heading: by the ground's homography, or shifted as a whole, as in the paper. With
-    `forget` a picture is looked at also where `cache` tells what was seen in it; what is seen is the same.
+    `forget`, and always by code that acts at some times only, a picture is looked at also where `cache` tells
+    what was seen in it; what is seen is the same.
     """
 
     detector: str = PAPER
@@ -95,14 +97,14 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
 def _detector(pictures: Pictures, library) -> LaneDetector:
     from selfdrive.sim.detection_memory import DetectionMemory
     from selfdrive.sim.image_library import cache_folder
-    from selfdrive.sim.remembering_detector import RememberingDetector
+    from selfdrive.sim.remembering_detector import RememberingDetector, sees_alike
 
     if pictures.detector == PAPER:
         from selfdrive.visiond.paper_detector import PaperDetector as Detector
     else:
         from selfdrive.visiond.robust_detector import RobustDetector as Detector
     detector = Detector(library.model)
-    if pictures.forget:
+    if pictures.forget or not sees_alike(Path(selfdrive.__path__[0])):
         return detector
     memory = DetectionMemory(cache_folder(pictures.cache))
     return RememberingDetector(detector, (pictures.detector, library.model), memory)

@@ -1,13 +1,76 @@
-"""The manifest's `reads_itself` against what the detections' memory depends on."""
+"""Files whose content the detections' memory depends on, and mutants of them."""
 
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.detection_memory import FILE
+from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.remembering_detector import SEEING
+from selfdrive.sim.road_renderer import RoadRenderer
 
+from mutator import mutant
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
 from mutator.sources import matches
+from mutator.trigger import at_time
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[4]
+DRIVE = (
+    "import json, sys; from selfdrive.sim.run import main; from selfdrive import _fi\n"
+    "assert main(sys.argv[1:]) == 0; print(json.dumps(_fi.report()['injections']))"
+)
+Drive = Callable[..., tuple[str, str]]
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Drive:
+    """Drives a mutant for a second, on three frames: its record with the trace's digest, its counts. The
+    fault is in `function` of a file, after the assignment of `name`, and acts from `time_s` on.
+    """
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    values = {"files": "*.png", "width": 640, "rows": 480, "fx_px": 309.4, "fy_px": 344.2, "cx_px": 317.9}
+    values |= {"cy_px": 256.5, "height_m": 2.18, "pitch_deg": 14, "spacing_m": SPACING}
+    (frames / "camera.yaml").write_text(json.dumps({"schema": "camera/1", "name": "three"} | values))
+    renderer = RoadRenderer(CameraModel(), "solid", 0, periods=1)
+    for number in range(3):
+        cv2.imwrite(str(frames / f"{number}.png"), renderer.grey(number * SPACING))
+    workspace = Workspace.find(root=ROOT)
+    manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
+
+    def driven(place: tuple[str, str, str], time_s: float, *more: str) -> tuple[str, str]:
+        path, function, name = place
+        anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name=name)
+        location = FaultLocation(path=path, function=function, anchor=anchor)
+        params = (("by", -1000.0), ("target", name))
+        injection = Injection(location=location, model="offset", params=params)
+        fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+        made = mutant.build(manifest, models, fault, at_time(time_s))
+        tree, out = tmp_path / made.id, tmp_path / "out"
+        mutant.write_tree(manifest, made, tree)
+        command = [
+            sys.executable,
+            "-c",
+            DRIVE,
+            "--scenario",
+            str(workspace.scenario("S1")),
+            "--out",
+            str(out),
+        ]
+        command += ["--pictures", "--frames", str(frames), "--cache", str(tmp_path / "cache")]
+        command += ["--max-steps", "100", *more]
+        env = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+        return (out / "record.json").read_text(), done.stdout
+
+    return driven
 
 
 def test_the_manifest_names_every_file_that_sees() -> None:
@@ -26,3 +89,20 @@ def test_the_manifest_names_every_file_that_sees() -> None:
         "selfdrive/sim/simulator.py",
     ):
         assert not matches(path, manifest.reads_itself)
+
+
+def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive, tmp_path: Path) -> None:
+    """A fault in a detector's code gives the same trace and the same counts without a memory, with one, and
+    after runs of itself and of the same fault at another time; nothing of it is kept.
+    """
+    place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
+    early, late = (drive(place, time_s, "--forget") for time_s in (0.3, 0.7))
+    assert early[0] != late[0] and '"count": 14' in early[1] and '"count": 6' in late[1]
+    assert [drive(place, time_s) for time_s in (0.3, 0.3, 0.7)] == [early, early, late]
+    assert not (tmp_path / "cache" / FILE).exists()
+
+
+def test_a_fault_elsewhere_leaves_the_memory_in_use(drive: Drive, tmp_path: Path) -> None:
+    """What a mutant's pristine detector saw is kept."""
+    drive(("selfdrive/controls/lib/latcontrol.py", "LatControl.plan", "factor"), 0.3)
+    assert (tmp_path / "cache" / FILE).exists()
