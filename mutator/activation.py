@@ -19,8 +19,8 @@ class Observed:
     before: tuple[int, ...]
 
     def step_of(self, observation: int) -> int:
-        """The step in which that observation was made; 0 for one made before the first step."""
-        return max(bisect_right(self.before, observation) - 1, 0)
+        """The step in which that observation was made; none is made before the first."""
+        return bisect_right(self.before, observation) - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

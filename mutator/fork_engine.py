@@ -129,7 +129,7 @@ class ForkEngine:
             "out": str(out),
             "log": str(folder / "log"),
             "report": str(folder / "report.json"),
-            "args": self._arguments(job, out),
+            "args": self._arguments(job, self._running().home if watch else out),  # begun as waiting ones are
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
             "steps": self._limits.steps,
@@ -208,9 +208,10 @@ class ForkEngine:
         try:
             changes = exchange(self._manifest, self._null, str(self._running().tree))
             null = replace(job, mutant=None)
-            execution = self._become(
-                self._at(job, 0, changes), null, folder, changes, _FROM_THE_START, watch=True
-            )
+            self._at(job, 0, changes)  # whether it can be begun, told in its own words
+            # From before its beginning: what it observed then, no fork of it would have.
+            first = self._running().first
+            execution = self._become(first, null, folder, changes, _FROM_THE_START, watch=True)
             if execution.status is Status.HARNESS_ERROR:
                 raise Lost(execution.detail)
             if execution.status is not Status.OK:
@@ -221,6 +222,8 @@ class ForkEngine:
             report = read_report(folder / "report.json")
             assert report is not None
             found = (tuple(map(tuple, report["seen"])), tuple(report["before"]))
+            if found[0] and found[1][:1] != (0,):
+                raise Refused("it observes before its first step")
             write_atomic(known, marshal.dumps(found))
             return Observed(values=found[0], before=found[1])
         except NotExchangeable as why:

@@ -237,9 +237,10 @@ class Process:
             probe.limit(job["steps"])
             if job["observed"]:  # what it would know had it been there from the beginning
                 probe._run.observed, probe._run.t = job["observed"], job["t"]
+            seen = transplant.record(probe) if job["watch"] else None
             run = self.begin(job["args"]) if self.run is None else self.run
-            if job["watch"]:
-                report |= watched(run, probe)
+            if seen is not None:
+                report |= {"seen": seen, "before": watched(run, seen)}
             while not run.done:
                 run.step()
             run.write(Path(job["out"]))
@@ -252,13 +253,13 @@ class Process:
         return report
 
 
-def watched(run: Any, probe: Any) -> dict[str, Any]:
-    """Drive the run to its end; all that its probe observed, and how much it had before each step."""
-    before, seen = [], transplant.record(probe)
+def watched(run: Any, seen: list[Any]) -> list[int]:
+    """Drive the run to its end; how much its probe had observed (`seen`) before each step."""
+    before = []
     while not run.done:
         before.append(len(seen))
         run.step()
-    return {"seen": seen, "before": before}
+    return before
 
 
 def fork() -> int:

@@ -1,4 +1,4 @@
-"""`plan`, `run`, `merge`, `report` and `clean`: campaigns and their run folders."""
+"""`plan` and `run`: campaigns."""
 
 import shlex
 import sys
@@ -23,7 +23,7 @@ from mutator.cli.options import (
     with_place,
 )
 from mutator.cli.progress import duration
-from mutator.errors import MutatorError
+from mutator.cli.run_folders import show_counts
 
 if TYPE_CHECKING:
     from mutator.campaign_run import Summary
@@ -39,9 +39,6 @@ def register(app: typer.Typer) -> None:
     """Add the verbs to the command line."""
     app.command("plan", epilog=PLAN_EXAMPLES)(plan)
     app.command("run", epilog=RUN_EXAMPLES)(run)
-    app.command("merge", epilog=MERGE_EXAMPLES)(merge)
-    app.command("report", epilog=REPORT_EXAMPLES)(report)
-    app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
 
 PLAN_EXAMPLES = """\b
@@ -210,116 +207,3 @@ def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspa
 def resume_command() -> str:
     """The command line that goes on: the same one."""
     return shlex.join(["mutator", *sys.argv[1:]])
-
-
-def show_counts(terminal: Terminal, run: Path) -> None:
-    """The table of results by fault type, and how the experiments ended."""
-    from mutator import tables
-
-    rows = tables.read_results(run / "results.csv")
-    hazards = tables.hazard_names(rows)
-    heads, lines = tables.count_table(tables.counts_by(rows, tables.by_fault_type), "fault type", hazards)
-    terminal.table(heads, lines, right=range(1, len(heads)), total=True)
-    endings = ", ".join(f"{name} {n}" for name, n in tables.outcome_counts(rows).items())
-    terminal.say(f"outcomes: {endings}")
-
-
-MERGE_EXAMPLES = """\b
-Examples:
-  mutator merge runs/part1 runs/part2 runs/part3 --out runs/whole
-"""
-
-
-def merge(
-    shards: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The run folder of each shard.")],
-    out: OutRun,
-    as_json: Json = False,
-) -> None:
-    """Merge the shards of a plan into one run folder.
-
-    It is the one that a single machine would have made: the same results, byte for byte.
-    """
-    from mutator import merge as merging
-    from mutator.runfolder import RunFolder
-
-    terminal = Terminal(as_json)
-    with terminal.wait("merging"):
-        results = merging.merge(shards, out)
-    planned = RunFolder.open(out).planned
-    if as_json:
-        terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
-    terminal.say(f"{planned} experiments of {len(shards)} shards: {short_path(results)}")
-    terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
-
-
-REPORT_EXAMPLES = """\b
-Examples:
-  mutator report runs/first
-  mutator report /data/paper --root ~/openpilot-faults
-"""
-
-
-@with_place
-def report(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")],
-    as_json: Json = False,
-    *,
-    place: Place,
-) -> None:
-    """Write the report of a run and print its path.
-
-    An unfinished run gets a report of what it has so far. What was published stands beside the results if
-    a library is found that cites it.
-    """
-    from mutator import report as reports
-    from mutator import results
-    from mutator.runfolder import RunFolder
-
-    terminal = Terminal(as_json)
-    folder = RunFolder.open(run)
-    results.build(folder.path)
-    with terminal.wait("writing the report"):  # it may drive a few experiments again
-        written = reports.write(folder.path, _library(place))
-    if as_json:
-        terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
-    show_counts(terminal, run)
-    terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
-
-
-def _library(place: Place) -> "Workspace | None":
-    """The workspace; None where none is named and none is found: a report can be written anywhere."""
-    try:
-        return place.workspace()
-    except MutatorError:
-        if place != Place():
-            raise
-        return None
-
-
-CLEAN_EXAMPLES = """\b
-Examples:
-  mutator clean runs/first
-  mutator clean runs/* --yes
-"""
-
-
-def clean(
-    runs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Run folders.")],
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
-) -> None:
-    """Delete run folders.
-
-    Anything that is no run folder, and a run under way, is left alone.
-    """
-    from mutator import runfolder
-
-    terminal = Terminal()
-    folders = [runfolder.RunFolder.open(path).path for path in runs]
-    if not yes:
-        if not sys.stdin.isatty():
-            raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
-        if not typer.confirm(f"delete {', '.join(map(short_path, folders))}?"):
-            return
-    for folder in folders:
-        runfolder.clean(folder)
-        terminal.say(f"deleted {short_path(folder)}")

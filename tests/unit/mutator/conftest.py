@@ -1,11 +1,15 @@
-"""A small foreign target with a library of its own, copied so that a test may change it."""
+"""A small foreign target with a library of its own, copied so that a test may change it; a fork engine on the
+toy target."""
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from mutator.workspace import Workspace
+
+from .fork_on_toy import Edit, Fork
 
 HERE = Path(__file__).parent
 CLONE = HERE.parents[2]
@@ -23,3 +27,24 @@ def toy(tmp_path: Path) -> Workspace:
 def clone() -> Workspace:
     """The workspace that ships: library, templates and target of this clone."""
     return Workspace.find(root=CLONE)
+
+
+@pytest.fixture
+def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
+    """A fork engine on the toy; files can be edited before it is first used."""
+    made = Fork(toycar, tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def edit(toycar: Workspace) -> Edit:
+    """Replaces text in a file of the toy."""
+
+    def replaced(name: str, old: str, new: str) -> None:
+        path = toycar.library.parent / name
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+
+    return replaced

@@ -55,7 +55,7 @@ def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
 
 def test_several_observations_in_a_step(probe) -> None:
     """Steps that observe never or often are told apart: the run is left before that of the observation."""
-    seen = Observed(values=SEEN.values, before=(1, 1, 3, 3, 6))
+    seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
     starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
     assert starts[4] == Start(step=3, observed=3, t=SEEN.values[2][0])

@@ -1,0 +1,84 @@
+"""A fork engine on the toy target, for tests."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from mutator import mutant
+from mutator.campaign import Limits
+from mutator.engine import Execution, Job, prepare_base
+from mutator.fork_engine import ForkEngine
+from mutator.fork_pool import Pool
+from mutator.manifest import TargetManifest
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Trigger
+from mutator.trigger import always
+from mutator.workspace import Workspace
+
+Edit = Callable[[str, str, str], None]
+LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
+
+
+class Fork:
+    """A fork engine on the toy; `manifest` is read when it is first needed, so files can be edited before."""
+
+    def __init__(self, toy: Workspace, folder: Path) -> None:
+        self.toy = toy
+        self.folder = folder
+        self.limits = LIMITS
+        self._engine: ForkEngine | None = None
+
+    @property
+    def engine(self) -> ForkEngine:
+        if self._engine is None:
+            self.manifest: TargetManifest = self.toy.manifest("toycar")
+            self.models = self.toy.fault_models()
+            base = prepare_base(self.manifest, self.folder / "base")
+            work = self.folder / "work"
+            work.mkdir()
+            null = mutant.build(self.manifest, self.models, None, always()).files
+            self._engine = ForkEngine(self.manifest, base, work, self.limits, null=null)
+            golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
+            self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
+        return self._engine
+
+    def job(self, trigger: Trigger, anchor: str = "gap", function: str = "Sensor.sense") -> Job:
+        _ = self.engine
+        place = FaultLocation(
+            path="toycar/sensing.py",
+            function=function,
+            anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name=anchor),
+        )
+        injection = Injection(location=place, model="offset", params=(("by", 20.0), ("target", anchor)))
+        fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+        built = mutant.build(self.manifest, self.models, fault, trigger)
+        scenario = self.toy.scenario("A")
+        return Job(
+            name="j", scenario=scenario, seed=7, files=built.files, mutant=built.id, golden=self.golden
+        )
+
+    def run(self, job: Job) -> Execution:
+        folder = self.folder / "work" / "job"
+        try:
+            return self.engine.execute(job, folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    @property
+    def pool(self) -> Pool:
+        pool = self.engine._pool
+        assert pool is not None
+        return pool
+
+    def processes(self) -> list[int]:
+        """Process ids of the server and all that came of it."""
+        return sorted(int(path.name) for path in Path("/proc").glob("[0-9]*") if self._is_ours(path))
+
+    def _is_ours(self, path: Path) -> bool:
+        try:
+            return str(self.folder).encode() in (path / "cmdline").read_bytes()
+        except OSError:
+            return False
+
+    def close(self) -> None:
+        if self._engine is not None:
+            self._engine.close()
