@@ -24,7 +24,8 @@ def merge(shards: Sequence[Path], out: Path) -> Path:
     """Merge the run folders `shards` into the new or empty folder `out`; returns its results.csv.
 
     MutatorError for a shard that is missing, given twice, unfinished, of another plan, or at work;
-    CheckFailed when the shards' fault-free runs differ, for then their machines are not alike.
+    CheckFailed when the proof of one failed, and when the shards' fault-free runs differ, for then their
+    machines are not alike.
     """
     if RunFolder.exists(out):
         raise MutatorError("holds a run", where=out, expected="a new folder", remedy="choose another --out")
@@ -93,7 +94,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_complete(folder: RunFolder) -> None:
-    """Every experiment of the share has a record that counts, and no other one has any."""
+    """Every experiment of the share has a record that counts, no other one any, and the proof is whole."""
     records = read_records(folder.path)
     done = {name for name, record in records.items() if _counts(record)}
     share = _share(folder)
@@ -110,6 +111,7 @@ def _check_complete(folder: RunFolder) -> None:
             expected="a finished shard",
             remedy="run it to its end with the command it was begun with",
         )
+    proof.judge(folder, records)
     if left := sum(len(piece.ids) for piece in proof.left(folder)):
         raise MutatorError(
             f"unfinished: {left} experiments of its proof are left to run",

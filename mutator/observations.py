@@ -178,17 +178,17 @@ class Summed:
     verdict: Verdict
 
 
-def judge(path: Path, runs: pd.DataFrame, missing: Sequence[str]) -> tuple[Summed, ...]:
+def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[Summed, ...]:
     """The observations of a file, put to a frame of results.
 
-    `missing`: fault types of the paper that the run does not have. MutatorError with file and line for a file
-    or a query that is wrong.
+    `lacks`: why these are not the paper's mixture of faults, if they are not. MutatorError with file and line
+    for a file or a query that is wrong.
     """
     model, source = read(path, Observations, SCHEMA)
     made = []
     for i, observation in enumerate(model.observations):
         claims = tuple(
-            _judged(f"{i + 1}.{k + 1}", claim, runs, missing, source, ("observations", i, "claims", k))
+            _judged(f"{i + 1}.{k + 1}", claim, runs, lacks, source, ("observations", i, "claims", k))
             for k, claim in enumerate(observation.claims)
         )
         needed = [one.verdict for one in claims if one.claim.needed]
@@ -208,7 +208,7 @@ def _judged(
     number: str,
     claim: Claim,
     runs: pd.DataFrame,
-    missing: Sequence[str],
+    lacks: Sequence[str],
     source: Source,
     keys: tuple[str | int, ...],
 ) -> Judged:
@@ -221,9 +221,8 @@ def _judged(
         for group, arguments in claim.calls()
     )
     verdict, why = together([one.verdict for one in answers]), ""
-    if claim.mixture and missing:
-        verdict = Verdict.UNTOLD
-        why = f"{len(missing)} of the paper's fault types are missing"
+    if claim.mixture and lacks:
+        verdict, why = Verdict.UNTOLD, "; ".join(lacks)
     published = claim.published()
     return Judged(
         number=number,

@@ -12,9 +12,9 @@ interval lies above x, and does not hold if it lies below; *below x* and *within
 likewise; with fewer than {FEWEST} runs it cannot be told. *some x*: it holds once one run shows it; *never
 x*: it does not hold once one run shows it; if none does, the opposite is said only if the interval ends at
 x or below. Where a claim has groups it must hold in each. A claim about all faults cannot be told from a
-run that lacks fault types of the paper. An observation holds if all claims that it rests on hold, does not
-hold if one of them does not, and cannot be told otherwise. The intervals take runs as independent, except
-where whole faults are resampled; they are the least uncertainty there is."""
+run that lacks fault types of the paper or is not complete. An observation holds if all claims that it rests
+on hold, does not hold if one of them does not, and cannot be told otherwise. The intervals take runs as
+independent, except where whole faults are resampled; they are the least uncertainty there is."""
 
 SESSION = """\
 from mutator.observations_measures import *

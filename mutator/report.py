@@ -119,16 +119,18 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
     from mutator.statistics.frame import load
 
     rows = tables.read_results(folder.path / "results.csv")
+    engine = report_engine.told(folder)
     frame = load(folder.path / "results.csv")
     statistics = sheets.run_sheets(folder, workspace)
     sheets.write(statistics, out)
-    observations = report_observations.told(folder, workspace, frame) if workspace else None
+    done = sum(row.status is not Status.HARNESS_ERROR for row in rows)
+    observations = report_observations.told(folder, workspace, frame, done) if workspace else None
     if observations:
         report_observations.write(observations, out)
     failed = [r for r in rows if r.status is not Status.OK]
     return Content(
         name=str(folder.head["campaign"]),
-        facts=_facts(folder, rows),
+        facts=_facts(folder, rows, engine),
         planned=_planned(folder),
         outcomes=tables.outcome_counts(rows),
         tables=_tables(rows),
@@ -138,7 +140,7 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
         failed=sorted(
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),
-        engine=report_engine.told(folder),
+        engine=engine,
         experiments=[_line(folder, row) for row in sorted(rows, key=_reading_order)],
     )
 
@@ -173,11 +175,12 @@ def _planned(folder: RunFolder) -> str:
     )
 
 
-def _facts(folder: RunFolder, rows: Sequence[Row]) -> list[tuple[str, str]]:
+def _facts(folder: RunFolder, rows: Sequence[Row], engine: "EngineTold | None") -> list[tuple[str, str]]:
     """What the results come from, and what they could be made again with."""
     head, versions = folder.head, folder.provenance
     facts = {
         "experiments": f"{len(rows)} of {folder.planned} planned",
+        **({"proof": engine.state} if engine else {}),
         "campaign": head["campaign"],
         "plan": head["plan"],
         "seed": head["seed"],

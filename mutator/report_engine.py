@@ -23,22 +23,23 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Told:
-    """A table of how many experiments were run how, and a sentence on the proof; `failed`: it found one that
-    is another one on the reference engine."""
+    """A table of how many experiments were run how; what their proof came to, as a sentence and in few words;
+    `failed`: it found an experiment that is another one on the reference engine."""
 
     heads: list[str]
     lines: list[list[str]]
     proof: str
+    state: str
     failed: bool
 
 
 def told(folder: RunFolder) -> Told | None:
-    """What the timings and `proof/` of a run folder say; None when its timings say nothing of engines."""
+    """What the timings and `proof/` of a run folder say; None when neither says anything of engines."""
     ways = _ways(folder)
-    if not ways:
+    if not ways and not (folder.path / proof.FOLDER).is_dir():
         return None
-    sentence, failed = _proof(folder)
-    return Told(heads=HEADS, lines=list(_lines(ways)), proof=sentence, failed=failed)
+    sentence, state, failed = _proof(folder)
+    return Told(heads=HEADS, lines=list(_lines(ways)), proof=sentence, state=state, failed=failed)
 
 
 def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
@@ -63,14 +64,17 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
             yield [f"{words}, for other reasons, which are in timings/", str(rest)]
 
 
-def _proof(folder: RunFolder) -> tuple[str, bool]:
-    """What is said of the proof, and whether it failed."""
+def _proof(folder: RunFolder) -> tuple[str, str, bool]:
+    """What is said of the proof, the same in few words, and whether it failed."""
     try:
         found = proof.judge(folder, read_records(folder.path))
     except CheckFailed as err:
-        return f"The proof failed, so nothing here is to be trusted: {err.got}.", True
+        said = f"The proof failed, so nothing here is to be trusted: {err.got}."
+        return said, f"FAILED: {err.got}", True
     if found is None:
-        return "All were run on the reference engine, so there is nothing to prove.", False
+        return "All were run on the reference engine, so there is nothing to prove.", "none needed", False
+    same = f"{found.same} of {found.sampled} same"
     if not found.whole:
-        return f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run.", False
-    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.", False
+        said = f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run."
+        return said, f"not finished: {same}", False
+    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.", same, False

@@ -1,6 +1,6 @@
 """The published observations in a run's report: found in the library, put to the results, written."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,9 +45,9 @@ class Told:
         return observations_page.session(self.ends)
 
 
-def told(folder: RunFolder, workspace: Workspace, frame: pd.DataFrame) -> Told | None:
+def told(folder: RunFolder, workspace: Workspace, frame: pd.DataFrame, done: int) -> Told | None:
     """The observations that the library cites, put to the results; None when it cites none, or when the run
-    has none of the published fault types."""
+    has none of the published fault types. `done`: experiments of the plan that were run."""
     references = workspace.library / "references"
     file = references / observations.FILE
     if not (file.is_file() and has_paper(references)):
@@ -57,11 +57,20 @@ def told(folder: RunFolder, workspace: Workspace, frame: pd.DataFrame) -> Told |
     if len(missing) == len(kinds):
         return None
     ends: Mapping[str, float] = sheets.run_ends(folder, workspace) or {}
+    runs, lacks = frame.assign(t_end=frame["scenario"].map(ends)), list(_lacks(folder, missing, done))
     return Told(
-        observations=observations.judge(file, frame.assign(t_end=frame["scenario"].map(ends)), missing),
+        observations=observations.judge(file, runs, lacks),
         coverage=_coverage(folder, frame, len(kinds), missing),
         ends=tuple(sorted(ends.items())),
     )
+
+
+def _lacks(folder: RunFolder, missing: list[str], done: int) -> Iterator[str]:
+    """Why the run is not the paper's mixture of faults. A shard is but a part of its plan, too."""
+    if missing:
+        yield f"{len(missing)} of the paper's fault types are missing"
+    if done < (planned := int(folder.head["experiments"])):
+        yield f"only {done} of the {planned} experiments of the plan have been run"
 
 
 def write(made: Told, out: Path) -> None:

@@ -17,9 +17,10 @@ actuator output then differed from the fault-free run. *Hazard, no alert*: no co
 
 def markdown(content: "Content") -> str:
     """The report as Markdown."""
-    parts = [f"# {content.name}", f"{_outcome_text(content)} {content.planned}"]
+    parts = [f"# {content.name}"]
     if content.engine and content.engine.failed:
         parts.append(f"**{content.engine.proof}**")
+    parts.append(f"{_outcome_text(content)} {content.planned}")
     if content.observations:
         parts += ["## The paper's observations", content.observations.coverage, content.observations.verdicts]
         parts.append("Their claims, rules, numbers and queries are in [observations.md](observations.md).")
@@ -120,13 +121,13 @@ code { font-size: .9em; }
 @media print { body { max-width: none; font-size: 10pt; } }
 </style>
 <h1>{{ content.name }}</h1>
+{% if content.engine and content.engine.failed %}
+<p class="hazard">{{ content.engine.proof }}</p>
+{% endif %}
 <p class="chips">{% for name, n in content.outcomes.items() %}
 <span class="{{ name }}">{{ n }} {{ name }}</span>
 {% endfor %}</p>
 <p>{{ content.planned }}</p>
-{% if content.engine and content.engine.failed %}
-<p class="hazard">{{ content.engine.proof }}</p>
-{% endif %}
 {% if content.observations %}
 <h2>The paper's observations</h2>
 <p>{{ content.observations.coverage }}</p>

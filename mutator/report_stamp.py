@@ -16,14 +16,15 @@ FILE = "made_from.json"
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """Digest of all that a report depends on: results, run.json, timings, proof, plots that it links, the
-    library's cited numbers, and mutator's own sources."""
+    """Digest of all that a report depends on: results, run.json, records, timings, proof, plots that it
+    links, the library's cited numbers, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
     own = [mutator.__version__, _files(Path(mutator.__file__).parent, "**/*.py")]
     results = [digest((run / name).read_bytes()) for name in (HEAD, "results.csv")]
-    engine = [_files(run / name, "*.jsonl") for name in ("timings", proof.FOLDER)]
+    # The records, too: what the proof compares is more of them than the results have.
+    engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", proof.FOLDER)]
     return digest([SCHEMA, own, results, engine, plots, references])
 
 

@@ -176,6 +176,22 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
     assert "report/REPORT.md" in answer.out
 
 
+def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path) -> None:
+    """It is written, with what failed on top, and the command ends with 1 and names the experiment."""
+    run = Path(shutil.copytree(run, tmp_path / "run"))
+    shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
+    path = next(path for path in sorted((run / "proof").iterdir()) if len(path.read_text().splitlines()) > 1)
+    head, first, *rest = path.read_text().splitlines()
+    wrong = json.loads(first) | {"trace_digest": "0" * 64}
+    path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
+    answer = cli("report", run)
+    assert answer.code == 1
+    assert f"experiment {wrong['experiment_id']} is another one" in answer.err
+    text = (run / "report/REPORT.md").read_text()
+    assert text.index("The proof failed") < text.index("12 experiments")
+    assert f"FAILED: experiment {wrong['experiment_id']}" in text
+
+
 def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
     """A report is written where no library is found; one that is named must be there."""
     assert cli("report", run).code == 0

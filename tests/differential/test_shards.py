@@ -131,6 +131,24 @@ def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path) ->
         merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
 
 
+@pytest.mark.parametrize("broken", ["1/2", "2/2"])
+def test_a_shard_whose_proof_failed_is_told(copies: Runs, tmp_path: Path, broken: str) -> None:
+    """One experiment that is another one on the reference engine, in whichever shard, and nothing is merged;
+    it is named, with the folder."""
+    for path in (copies["1/2"], copies["2/2"]):
+        shutil.copytree(path / "records", path / "proof")
+    path = next((copies[broken] / "proof").iterdir())
+    head, first, *rest = path.read_text().splitlines()
+    wrong = json.loads(first) | {"trace_digest": "0" * 64}
+    path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
+    with pytest.raises(CheckFailed, match=f"experiment {wrong['experiment_id']} is another one") as caught:
+        merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
+    assert str(copies[broken]) in str(caught.value)
+    assert not (tmp_path / "out").exists()
+    path.write_text("\n".join([head, first, *rest, ""]))
+    assert merge([copies["1/2"], copies["2/2"]], tmp_path / "out").is_file()
+
+
 def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> None:
     """The folder of another run is left as it is."""
     before = (runs["whole"] / "results.csv").read_bytes()

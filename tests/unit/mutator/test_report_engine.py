@@ -110,30 +110,36 @@ def record_ids(run: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("proven", "said"),
+    ("proven", "said", "state"),
     [
-        (4, "4 of 4 experiments came out the same on the reference engine, byte for byte."),
-        (3, "3 of 4 experiments came out the same on the reference engine, byte for byte. The rest"),
-        (None, "so there is nothing to prove."),
+        (4, "4 of 4 experiments came out the same on the reference engine, byte for byte.", "4 of 4 same"),
+        (
+            3,
+            "3 of 4 experiments came out the same on the reference engine, byte for byte. The rest",
+            "not finished: 3 of 4 same",
+        ),
+        (None, "so there is nothing to prove.", "none needed"),
     ],
 )
-def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str) -> None:
+def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
     """A whole proof, one with something left, and none."""
     told = report_engine.told(RunFolder.open(finish(proven)))
     assert told is not None
     assert said in told.proof
     assert told.proof.endswith(said) == (proven != 3)
+    assert told.state == state
     assert not told.failed
 
 
 def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
-    """Whoever reads the report of a run with a wrong record learns it first, in both forms; how experiments
-    were run is told further down, escaped."""
+    """Whoever reads the report of a run with a wrong record learns it first, in both forms, and again among
+    the facts; how experiments were run is told further down, escaped."""
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build(run)
     written = report.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
-        assert text.index("The proof failed") < text.index("By fault type")
+        assert text.index("The proof failed") < text.index("experiments are planned")
+        assert f"FAILED: experiment {record_ids(run)[0]} is another one" in text
         assert "How the experiments were run" in text
     assert "its golden run has &lt;two&gt; threads" in written.page.read_text()
 
@@ -146,6 +152,25 @@ def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
     assert before == report_stamp.made_from(RunFolder.open(run), None)
     write(run / "proof/0002-main.jsonl", SCHEMA, [])
     assert before != report_stamp.made_from(RunFolder.open(run), None)
+
+
+def test_a_report_is_made_from_its_records(finish: Finish) -> None:
+    """A trace digest, which the proof compares, is in no result; another one makes the report out of date."""
+    run = finish(4)
+    build(run)
+    results, before = (run / "results.csv").read_bytes(), report_stamp.made_from(RunFolder.open(run), None)
+    path = run / "records/0001-main.jsonl"
+    path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
+    build(run)
+    assert (run / "results.csv").read_bytes() == results
+    assert before != report_stamp.made_from(RunFolder.open(run), None)
+
+
+def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:
+    """A failed proof is no secret of a run whose timings say nothing of engines."""
+    told = report_engine.told(RunFolder.open(finish(4, lambda r: replace(r, tree="x"), ways=())))
+    assert told is not None
+    assert told.failed
 
 
 def test_runs_of_before_there_were_engines_say_nothing_of_them(finish: Finish) -> None:
