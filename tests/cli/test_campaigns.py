@@ -136,6 +136,13 @@ def test_other_choices_need_another_folder(cli: Cli, run: Path) -> None:
     assert "--limit" in answer.err
 
 
+def wait_for(folder: Path, files: str) -> None:
+    """Wait until there are such files in the folder, a minute at most."""
+    deadline = time.monotonic() + 60
+    while not any(folder.glob(files)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
 def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
     """Ctrl-C ends with 130, what is done, and the command that goes on; that command completes the run.
 
@@ -147,10 +154,9 @@ def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment, cwd=root
     ) as process:
-        deadline = time.monotonic() + 60
-        while not any((root / "runs/cut").glob("records/*.jsonl")) and time.monotonic() < deadline:
-            time.sleep(0.05)
+        wait_for(root / "runs/cut", "run.json")  # before the checks, so there is time for the second command
         second = mutator(root, *words)
+        wait_for(root / "runs/cut", "records/*.jsonl")
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     assert second.returncode == 2

@@ -329,6 +329,8 @@ def test_collecting_50000_experiments_is_cheap(toy: Workspace, tmp_path: Path) -
         folder=SimpleNamespace(path=tmp_path / "nowhere"),
         workspace=Workspace(library=tmp_path / "nowhere", templates=tmp_path / "nowhere"),
         pending=tuple(Pending(chunk, tuple(range(20))) for chunk in range(2500)),
+        proof=(),
+        engine="reference",
         worker_name=lambda name: name,
         problem="",
         interrupted=False,

@@ -71,7 +71,7 @@ def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -
         ("np.savez(to / \"log.npz\",", "np.savez(to / \"other.npz\",", "not a readable trace"),
         ("now = world.advance", "now = 0\n        now = world.advance", "matches 2 statements"),
         ("(to / \"said.json\")", "names = sorted(__import__('os').listdir(Path(__file__).parent))\n"
-         "    said['files'] = len([n for n in names if n.endswith('.py')])\n    (to / \"said.json\")",
+         "        said['files'] = len([n for n in names if n.endswith('.py')])\n        (to / \"said.json\")",
          "the probe alone changes what the target does"),
     ],
     ids=["hash order", "random", "hazard", "import", "no trace", "anchor", "sees the probe"],
