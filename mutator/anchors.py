@@ -15,6 +15,7 @@ import libcst as cst
 from libcst.metadata import CodeRange, MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
+from mutator.interrupts import held
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.shape_errors import suggestion
 from mutator.statements import Function, Statement, collect
@@ -68,6 +69,7 @@ class ParsedFile:
         return self._sites[key]
 
 
+@held()
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse one file of the target; MutatorError when it is no Python, or was instrumented before."""
     where = root / path

@@ -27,6 +27,7 @@ from mutator.chunks import Pending, pending
 from mutator.engine import prepare_base
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.ids import digest
+from mutator.interrupts import terminable
 from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
 from mutator.model import Record, Status
@@ -34,7 +35,6 @@ from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
 from mutator.provenance import check_sources, sources
 from mutator.records import Progress, Tail, label, read_records
 from mutator.runfolder import RunFolder
-from mutator.worker import terminable
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130

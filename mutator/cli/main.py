@@ -20,6 +20,7 @@ from mutator.cli import campaigns, experiments, faults, library, run_folders, st
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
+from mutator.interrupts import terminable
 
 EXIT_INTERRUPTED = 130
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
@@ -96,7 +97,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Not `app()`: it would answer errors, interruptions and closed pipes in its own way.
         command = get_command(app)
         words = list(sys.argv[1:] if argv is None else argv)
-        with command.make_context("mutator", words or ["--help"]) as ctx:
+        with terminable(), command.make_context("mutator", words or ["--help"]) as ctx:
             command.invoke(ctx)
         return EXIT_OK
     except typer.Exit as e:
