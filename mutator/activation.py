@@ -3,20 +3,31 @@
 Until then a run is the golden run, so that is what its probe observes, double for double.
 """
 
+import math
 from bisect import bisect_right
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from types import CodeType
 from typing import Any
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)  # looked up by identity: there are thousands
+@dataclass(frozen=True, kw_only=True, eq=False)  # looked up by identity: there are thousands
 class Observed:
     """What a probe observes in a golden run: `values` are the arguments of `observe`, in order; `before` how
-    many there were before each step."""
+    many there were before each step; `libraries` are modules that the run imports on its way."""
 
     values: tuple[tuple[float, float, float, float], ...]
     before: tuple[int, ...]
+    libraries: tuple[str, ...] = ()
+
+    @cached_property
+    def truths(self) -> list[tuple[float, ...]]:
+        """What a condition is asked about in each observation: the values, time headway (s), closing speed
+        (m/s)."""
+        return [
+            (t, d_rel, v_ego, v_lead, d_rel / v_ego if v_ego > 0.0 else math.inf, v_ego - v_lead)
+            for t, d_rel, v_ego, v_lead in self.values
+        ]
 
     def step_of(self, observation: int) -> int:
         """The step in which that observation was made; none is made before the first."""
@@ -45,12 +56,13 @@ def _without_texts(probe: CodeType) -> CodeType:
 
 @lru_cache(maxsize=64)  # faults share their triggers: contexts of the hazard analysis
 def _first_active(probe: CodeType, seen: Observed) -> Start | None:
+    """As `observe` of the probe decides it, before it has decided anything else: armed, and the condition
+    holds. Asking `observe` itself takes six times as long."""
     module: dict[str, Any] = {"__name__": "_fi"}
     exec(probe, module)
-    observe = module["observe"]
-    for number, values in enumerate(seen.values):
-        observe(*values)
-        if module["_run"].active:
+    holds, armed_t = module["_condition"], module["ARMED_AFTER_S"] - module["_TINY"]
+    for number, truth in enumerate(seen.truths):
+        if truth[0] >= armed_t and holds(*truth):
             step = seen.step_of(number)
             done = seen.before[step]
             return Start(step=step, observed=done, t=seen.values[done - 1][0] if done else None)

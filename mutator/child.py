@@ -16,6 +16,7 @@ import resource
 import runpy
 import signal
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ def main(job_file: str) -> int:
         run_module(job["module"], job["args"])
     except BaseException as err:
         report |= describe(err, job["tree"], probe)
-    report["outside"] = imported_elsewhere(job["package"], job["tree"])
+    report["outside"] = imported_elsewhere(job["package"], job["tree"], sys.modules)
     report["files"] = tree_files(job["tree"])
     report["probe"] = probe.report() if probe else None
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
@@ -100,14 +101,29 @@ def place(err: BaseException, tree: str) -> str:
     return found
 
 
-def imported_elsewhere(package: str, tree: str) -> list[str]:
-    """Files of the package that were imported from outside the tree."""
+def imported_elsewhere(package: str, tree: str, names: Iterable[str]) -> list[str]:
+    """Files of the package that were imported from outside the tree, among the modules of these names."""
     found = []
-    for name in sorted(name for name in sys.modules if name.partition(".")[0] == package):
+    for name in sorted(name for name in names if name.partition(".")[0] == package):
         file = getattr(sys.modules[name], "__file__", None)
         if file and not file.startswith(tree + os.sep):
             found.append(file)
     return found
+
+
+def imported_since(name: str) -> list[str]:
+    """The modules that were imported after that one, newest first, and itself."""
+    names = []
+    for newer in reversed(sys.modules):
+        names.append(newer)
+        if newer == name:
+            break
+    return names
+
+
+def libraries(known: set[str], package: str) -> list[str]:
+    """Modules that were imported beside the `known` ones, in that order, but for those of the package."""
+    return [name for name in sys.modules if name not in known and name.partition(".")[0] != package]
 
 
 def tree_files(tree: str) -> dict[str, str]:
@@ -122,8 +138,12 @@ def tree_files(tree: str) -> dict[str, str]:
 
 
 def places(tree: str) -> list[str]:
-    """Every folder and file of the tree."""
-    return [f"{folder}/{name}" for folder, _, files in os.walk(tree) for name in ("", *files)]
+    """Every folder and file of the tree, but for bytecode: that is checked by its source's hash when used."""
+    found = []
+    for folder, _, files in os.walk(tree):
+        if Path(folder).name != "__pycache__":
+            found += [f"{folder}/{name}" for name in ("", *files)]
+    return found
 
 
 def stamp(places: list[str]) -> list[tuple[int, int, int]]:

@@ -109,7 +109,9 @@ class ForkEngine:
     def _at(self, job: Job, step: int, changes: Exchange) -> Waiting:
         pool = self._running()
         golden = Golden(key=_key(job), arguments=self._arguments(job, pool.home))
-        return pool.before(step, golden, _needed(changes), self._patience_s)
+        seen = self._seen.get(_key(job))
+        libraries = seen.libraries if isinstance(seen, Observed) else ()
+        return pool.before(step, golden, [*libraries, *_needed(changes)], self._patience_s)
 
     def _arguments(self, job: Job, out: Path) -> list[str]:
         return list(
@@ -133,7 +135,6 @@ class ForkEngine:
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
             "steps": self._limits.steps,
-            "wall_s": self._limits.wall_s,
             "probe_name": f"{self._manifest.package}._fi",
             "probe": changes.probe,
             "functions": [(f.module, f.path, f.old, f.new) for f in changes.functions],
@@ -141,7 +142,8 @@ class ForkEngine:
             "t": start.t,
             "watch": watch,
         }
-        said, _ = waiting.ask({"do": "mutant", "job": request}, self._patience_s)
+        asked = {"do": "mutant", "job": marshal.dumps(request), "wall_s": self._limits.wall_s}
+        said, _ = waiting.ask(asked, self._patience_s)
         if said["threads"] != 1:
             raise Refused(f"it has {said['threads']} threads, and only one can be forked")
         ended = Ended(
@@ -202,8 +204,8 @@ class ForkEngine:
     def _watch(self, job: Job, golden: Path) -> Observed:
         known = self._work / f"observed-{content_id(_key(job))}"  # shared by the workers of a session
         if known.is_file():
-            values, before = marshal.loads(known.read_bytes())
-            return Observed(values=values, before=before)
+            values, before, libraries = marshal.loads(known.read_bytes())
+            return Observed(values=values, before=before, libraries=libraries)
         folder = self._work / f"{os.getpid()}-watch-{content_id(_key(job))}"
         try:
             changes = exchange(self._manifest, self._null, str(self._running().tree))
@@ -221,11 +223,15 @@ class ForkEngine:
                     raise Refused(f"its {name} is another one when it is driven step by step")
             report = read_report(folder / "report.json")
             assert report is not None
-            found = (tuple(map(tuple, report["seen"])), tuple(report["before"]))
+            found = (
+                tuple(map(tuple, report["seen"])),
+                tuple(report["before"]),
+                tuple(report["libraries"]),
+            )
             if found[0] and found[1][:1] != (0,):
                 raise Refused("it observes before its first step")
             write_atomic(known, marshal.dumps(found))
-            return Observed(values=found[0], before=found[1])
+            return Observed(values=found[0], before=found[1], libraries=found[2])
         except NotExchangeable as why:
             raise Refused(f"its observation cannot be put into it: {why}") from None
         finally:

@@ -19,7 +19,7 @@ import socket
 import struct
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -78,6 +78,7 @@ class Process:
         self.life = os.pipe()  # never written to: its end tells the others that the first process is gone
         self.places = child.places(start["tree"])
         self.stamp = child.stamp(self.places)
+        self.outside: list[str] = []  # files of the package that were imported from elsewhere
         self.begin: Any = None
         self.run: Any = None
         self.step = 0
@@ -93,7 +94,7 @@ class Process:
         answers: dict[str, Callable[..., dict[str, Any] | None]] = {
             "branch": self.branch,
             "advance": self.advance,
-            "load": load,
+            "load": self.load,
             "mutant": self.mutant,
         }
         with suppress(Over):
@@ -171,18 +172,28 @@ class Process:
         gc.freeze()
         return {"step": self.step}
 
-    def mutant(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Fork a child that goes on as a mutant, and wait for it; how it ended."""
+    def load(self, modules: list[str]) -> dict[str, Any]:
+        """Load what mutants will import; what cannot be loaded is theirs to complain about."""
+        for name in modules:
+            with suppress(Exception):
+                importlib.import_module(name)
+        self.outside = self.elsewhere(sys.modules)
+        gc.freeze()
+        return {"threads": threads()}
+
+    def mutant(self, job: bytes, wall_s: float) -> dict[str, Any]:
+        """Fork a child that goes on as a mutant, and wait for it; how it ended. The child reads the job: what
+        this process writes to, it must copy after each fork."""
         began = time.monotonic()
         count = threads()
         if count != 1:
             return {"threads": count}
         parent, pid = os.getpid(), fork()
         if not pid:
-            self.become(job, parent)
+            self.become(marshal.loads(job), parent)
         handle = os.pidfd_open(pid)
         try:
-            out_of_wall = not self.wait(handle, job["wall_s"])
+            out_of_wall = not self.wait(handle, wall_s)
         finally:
             os.close(handle)
             for kill in (os.killpg, os.kill):  # it may not have come to have a group yet
@@ -212,13 +223,17 @@ class Process:
         child.limit_resources(job)
         os.chdir(job["out"])
         report = self.finish(job)
-        report["outside"] = child.imported_elsewhere(self.start["package"], self.start["tree"])
+        report["outside"] = self.outside + self.elsewhere(child.imported_since(job["probe_name"]))
         report["touched"] = self.touched()
         report["threads"] = threads()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(0)
+
+    def elsewhere(self, names: Iterable[str]) -> Any:
+        """Files of the package that modules of these names were imported from, other than the tree's."""
+        return child.imported_elsewhere(self.start["package"], self.start["tree"], names)
 
     def touched(self) -> bool:
         """Whether the tree is another one than it was."""
@@ -230,7 +245,7 @@ class Process:
     def finish(self, job: dict[str, Any]) -> dict[str, Any]:
         """Drive the run to its end as the mutant; the report on it."""
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
-        probe = None
+        probe, known = None, set(sys.modules) if job["watch"] else set()
         try:
             probe = transplant.install(job["probe_name"], job["probe"])
             transplant.exchange(job["functions"], probe)
@@ -240,10 +255,12 @@ class Process:
             seen = transplant.record(probe) if job["watch"] else None
             run = self.begin(job["args"]) if self.run is None else self.run
             if seen is not None:
-                report |= {"seen": seen, "before": watched(run, seen)}
+                report |= {"seen": seen, "before": transplant.watched(run, seen)}
             while not run.done:
                 run.step()
             run.write(Path(job["out"]))
+            if seen is not None:
+                report["libraries"] = child.libraries(known, self.start["package"])
         except transplant.Unfit as why:
             report |= {"ended": "unfit", "error": str(why)}
         except BaseException as err:
@@ -251,15 +268,6 @@ class Process:
         if probe is not None:
             report["probe"] = probe.report()
         return report
-
-
-def watched(run: Any, seen: list[Any]) -> list[int]:
-    """Drive the run to its end; how much its probe had observed (`seen`) before each step."""
-    before = []
-    while not run.done:
-        before.append(len(seen))
-        run.step()
-    return before
 
 
 def fork() -> int:
@@ -273,17 +281,6 @@ def fork() -> int:
 def threads() -> int:
     """Threads of this process, those of libraries included."""
     return len(list(Path("/proc/self/task").iterdir()))
-
-
-def load(modules: list[str]) -> dict[str, Any]:
-    """Load what mutants will import; what cannot be loaded is theirs to complain about."""
-    for name in modules:
-        try:
-            importlib.import_module(name)
-        except Exception:
-            continue
-    gc.freeze()
-    return {"threads": threads()}
 
 
 def reap() -> None:

@@ -83,3 +83,12 @@ def record(probe: Any) -> list[tuple[float, float, float, float]]:
 
     probe.observe = observe_and_keep
     return seen
+
+
+def watched(run: Any, seen: list[Any]) -> list[int]:
+    """Drive the run to its end; how much its probe had observed (`seen`) before each step."""
+    before = []
+    while not run.done:
+        before.append(len(seen))
+        run.step()
+    return before

@@ -65,9 +65,9 @@ class Recorder:
 
     def trace(self) -> dict[str, np.ndarray]:
         """Every channel's array."""
-        table = np.array(self._rows).reshape(-1, len(CHANNELS)).T
+        table = np.asarray(self._rows).reshape(-1, len(CHANNELS)).T.copy()  # of its own: rows may be added
         return {
-            name: column.astype(np.int32 if name in INTEGER_CHANNELS else np.float64)
+            name: column.astype(np.int32) if name in INTEGER_CHANNELS else column
             for name, column in zip(CHANNELS, table, strict=True)
         }
 

@@ -6,7 +6,6 @@ whole: where there is one, the run was finished and the trace beside it is its o
 """
 
 import argparse
-import io
 import json
 import sys
 from collections.abc import Sequence
@@ -14,11 +13,10 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
+from selfdrive.sim.trace_file import pieces
 from selfdrive.sim.vision import DEFAULT_CACHE, DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
 
 EXIT_INPUT = 2
@@ -90,15 +88,16 @@ def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) ->
 
 def write(result: SimulationResult, folder: Path) -> None:
     """Write trace.npz and record.json into `folder`, which is made if need be."""
-    buffer = io.BytesIO()
-    np.savez(buffer, **result.trace)
-    trace = buffer.getvalue()
-    record = {**result.record, "trace_digest": sha256(trace).hexdigest()}
+    trace, digest = pieces(result.trace), sha256()
+    for piece in trace:
+        digest.update(piece)
+    record = {**result.record, "trace_digest": digest.hexdigest()}
     with writing(folder, expected="a writable folder", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         part, final = folder / "record.json.part", folder / "record.json"
         final.unlink(missing_ok=True)
-        (folder / "trace.npz").write_bytes(trace)
+        with (folder / "trace.npz").open("wb") as file:
+            file.writelines(trace)
         part.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n")
         part.replace(final)
 

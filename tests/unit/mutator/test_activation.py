@@ -1,6 +1,7 @@
 """Where a mutant leaves its golden run: asked of its own probe."""
 
 import math
+import random
 import types
 
 import pytest
@@ -51,6 +52,34 @@ def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
     if start:
         assert start.observed == step
         assert start.t == (SEEN.values[step - 1][0] if step else None)
+
+
+@pytest.mark.parametrize("hold", [Hold.WHILE, Hold.TO_END])
+@pytest.mark.parametrize("armed_after_s", [0.0, 0.1, 1.0])
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "t >= 0.4 and v_ego > 0.0",
+        "hwt < 1.5",
+        "rs > 2.0 and d_rel / v_lead < 3.0",
+        "d_rel < 0.0 or hwt > 9.0",
+    ],
+)
+def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: float, hold: Hold) -> None:
+    """For whatever a car does, standing still among it, the step is the first that `observe` calls active."""
+    draw = random.Random(condition)
+    code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
+    for _ in range(10):
+        truth = [tuple(draw.choice((0.0, draw.uniform(0, 40))) for _ in range(3)) for _ in range(40)]
+        values = tuple((0.05 * i, *others) for i, others in enumerate(truth))
+        module: dict = {}
+        exec(code, module)
+        active = []
+        for one in values:
+            module["observe"](*one)
+            active.append(module["_run"].active)
+        start = first_active(code, Observed(values=values, before=tuple(range(40))))
+        assert (start.step if start else None) == (active.index(True) if True in active else None)
 
 
 def test_several_observations_in_a_step(probe) -> None:

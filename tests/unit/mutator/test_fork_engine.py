@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator.activation import Observed
 from mutator.engine import How
 from mutator.model import Status, Trigger
 from mutator.trigger import at_time
@@ -53,6 +54,16 @@ def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
     for step in range(3, 100, 9):
         fork.run(fork.job(at_time(0.05 * step)))
     assert len(fork.processes()) <= 10
+
+
+def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
+    """What a run imports on its way to its end is found, and is there in each process that waits."""
+    fork.run(fork.job(at_time(2.0)))
+    (seen,) = fork.engine._seen.values()
+    assert isinstance(seen, Observed)
+    assert "zipfile" in seen.libraries  # with which it writes its trace
+    assert not any(name.startswith("toycar") for name in seen.libraries)
+    assert all(set(seen.libraries) <= waiting.loaded for waiting in fork.pool._waiting if waiting.step)
 
 
 def test_a_never_active_fault_is_not_run(fork: Fork) -> None:

@@ -54,14 +54,17 @@ def test_same_bytes_whatever_ran_before(run):
 def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
     """The record stands for a whole run: with the disk full half way, none is left, old or new."""
     folder = run("a")
-    write = Path.write_bytes
+    opened = Path.open
 
-    def full_disk(path, data):
-        write(path, data[:100])
+    def full_disk(path, mode="r", *more, **options):
+        if mode != "wb":
+            return opened(path, mode, *more, **options)
+        with opened(path, mode) as file:
+            file.write(b"PK")
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Path, "write_bytes", full_disk)
+        patched.setattr(Path, "open", full_disk)
         arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(folder), "--max-steps", "1"]
         assert main(arguments) == 2
     assert f"error: {folder}: No space left on device" in capsys.readouterr().err

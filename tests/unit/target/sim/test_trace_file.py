@@ -1,0 +1,30 @@
+"""The trace's file."""
+
+import io
+
+import numpy as np
+import pytest
+from selfdrive.sim.trace_file import pieces
+
+
+@pytest.mark.parametrize("rows", [0, 1, 3000])
+def test_the_bytes_are_those_of_savez(rows):
+    """Floats, integers, values of special kinds and columns of a table give the file that numpy writes."""
+    values = np.random.default_rng(rows).normal(size=(rows, 3))
+    values[1:2] = [np.nan, -0.0, np.inf]
+    trace = {
+        "t": np.arange(float(rows)),
+        "apart": values[:, 1],
+        "alert": np.arange(rows, dtype=np.int32),
+        "a_long_name": values[:, 2].copy(),
+    }
+    expected = io.BytesIO()
+    np.savez(expected, **trace)
+    assert b"".join(pieces(trace)) == expected.getvalue()
+
+
+def test_a_trace_without_channels_is_an_empty_archive():
+    """No channels give what numpy writes for none."""
+    expected = io.BytesIO()
+    np.savez(expected)
+    assert b"".join(pieces({})) == expected.getvalue()
