@@ -9,10 +9,10 @@ the overhead is more than its goal.
 
 import argparse
 import json
-import resource
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -34,7 +34,7 @@ from mutator.workspace import Workspace  # noqa: E402
 GOAL_MS = 5.0
 END_S, LAST_STEPS, STEP_S = 30.0, 10, 0.01
 SCENARIO = "S1"
-FEW = 5  # experiments that show what is done once
+FEW = 5  # experiments that come first and are not counted: they do what is done once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,13 +44,6 @@ class Cost:
     worker: float
     children: float
     server: float
-
-    def __sub__(self, other: "Cost") -> "Cost":
-        return Cost(
-            worker=self.worker - other.worker,
-            children=self.children - other.children,
-            server=self.server - other.server,
-        )
 
 
 def late(workspace: Workspace, count: int) -> list[Experiment]:
@@ -87,28 +80,40 @@ class Bench:
         return whole.cpu_s - short.cpu_s
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
-        """What an engine of their own takes for the experiments; all of them must be forked."""
+        """What the experiments cost an engine, but for the first `FEW`, which do what is done once; all of
+        them must be forked."""
         null = mutant.build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda scenario, changes: self.folder / "golden" / "out")
         runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
-        records = LineWriter(self.folder / f"{len(experiments)}.jsonl", {"schema": SCHEMA})
-        before, began, children = _ended(), process_time(), 0.0
-        for finished in runner.run(experiments):
-            assert finished.how == "fork" and finished.mutant, finished.record
-            (self.folder / "patch").write_bytes(finished.mutant.patch_bytes)
-            records.append(asdict(finished.record))
-            children += finished.cpu_s
-        worker = process_time() - began
+        records = LineWriter(self.folder / "records.jsonl", {"schema": SCHEMA})
+
+        def run(some: Sequence[Experiment]) -> float:
+            children = 0.0
+            for finished in runner.run(some):
+                assert finished.how == "fork" and finished.mutant, finished.record
+                (self.folder / "patch").write_bytes(finished.mutant.patch_bytes)
+                records.append(asdict(finished.record))
+                children += finished.cpu_s
+            return children
+
+        run(experiments[:FEW])
+        before, began = self._server(), process_time()
+        children = run(experiments[FEW:])
+        worker, after = process_time() - began, self._server()
+        assert before.keys() <= after.keys()  # the time of one that ended would be lost
         records.close()
-        engine.close()  # only then are its processes counted
-        return Cost(worker=worker, children=children, server=_ended() - before - children)
+        engine.close()
+        return Cost(worker=worker, children=children, server=sum(after.values()) - sum(before.values()))
 
-
-def _ended() -> float:
-    """CPU time (s) of the processes that this one waited for."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    def _server(self) -> dict[str, float]:
+        """CPU time (s) of each process of the fork server, those it waited for left out."""
+        found = {}
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                if str(self.work).encode() in (process / "cmdline").read_bytes():
+                    found[process.name] = int((process / "schedstat").read_text().split()[0]) / 1e9
+        return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -121,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(workspace, Path(folder))
         driving = bench.golden()
-        cost = bench.cost(known) - bench.cost(known[-FEW:])  # without what is done once
+        cost = bench.cost(known)
     count = options.experiments
     facts = {name: 1e3 * seconds / count for name, seconds in asdict(cost).items()}
     total = sum(facts.values())
