@@ -1,0 +1,32 @@
+"""What the HTML pages share: their CSS and JavaScript as files of this package, and data carried in a page.
+
+The scripts are plain ones, in the order that a page names them; each declares one constant of its own name.
+"""
+
+import base64
+import gzip
+import json
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+
+@cache
+def asset(name: str) -> str:
+    """The text of a file of this folder, ready for a `<style>` or `<script>` element."""
+    text = files(__package__).joinpath(name).read_text(encoding="utf-8")
+    if "</script" in text or "</style" in text:
+        raise ValueError(f"{name} would end the element it is put into")
+    return text
+
+
+def packed(value: Any) -> str:
+    """`value` as JSON, compressed, in base64: the same text each time; `Packed.unpack` in packed.js reads it."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    # mtime 0: a page is the same each time it is made
+    return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode("ascii")
+
+
+def embedded(value: Any, name: str) -> str:
+    """A script element with the id `name` that carries `value`; `Packed.read(name)` gives it back."""
+    return f'<script type="application/octet-stream+gzip" id="{name}">{packed(value)}</script>'

@@ -1,0 +1,120 @@
+"use strict";
+// Unified diffs made readable: one column or two, Python in colours, the tags of injected lines dimmed.
+//
+// renderDiff(element, patchText, {mode: "unified" | "split"}) replaces what is in `element`.
+
+const Diff = (() => {
+  const { el } = Dom;
+  const KEYWORDS = new Set(
+    ("and as assert async await break class continue def del elif else except finally for from global if import in is " +
+      "lambda nonlocal not or pass raise return try while with yield True False None self").split(" "));
+  // In this order: holes of a shape, the tag of an injected line, comment, strings (whole or to the line's end), number, word.
+  const TOKENS =
+    /(⟨[^⟩]*⟩)|(#\s*fi:\S+.*$)|(#.*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"?|'(?:\\.|[^'\\])*'?))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/g;
+  const CLASSES = [null, "hole", "tag", "comment", "string", "number", "word"];
+
+  /** The files of a patch: [{path, isNew, hunks: [{head, lines: [{sign, text, old, new}]}]}]. */
+  function parse(patch) {
+    const files = [];
+    let file = null, hunk = null, left = 0, right = 0;
+    for (const line of patch.split("\n")) {
+      if (line.startsWith("diff --git ")) {
+        file = { path: line.split(" b/").pop(), isNew: false, hunks: [] };
+        files.push(file);
+        hunk = null;
+      } else if (!file) continue;
+      else if (line.startsWith("@@")) {
+        const [, a, b] = /^@@ -(\d+)\S* \+(\d+)/.exec(line) || [null, 1, 1];
+        left = Number(a);
+        right = Number(b);
+        hunk = { head: line, lines: [] };
+        file.hunks.push(hunk);
+      } else if (!hunk) {
+        if (line.startsWith("new file")) file.isNew = true;
+      } else if (/^[-+ ]/.test(line)) {
+        const sign = line[0];
+        const old = sign === "+" ? null : left++, now = sign === "-" ? null : right++;
+        hunk.lines.push({ sign, text: line.slice(1), old, new: now });
+      }
+    }
+    return files;
+  }
+
+  /** A line of Python as a list of texts and coloured elements. */
+  function coloured(text) {
+    const parts = [];
+    let end = 0;
+    for (const found of text.matchAll(TOKENS)) {
+      const kind = CLASSES[found.slice(1).findIndex((g) => g !== undefined) + 1];
+      const name = kind === "word" ? word(found[0]) : kind;
+      if (!name) continue;
+      if (found.index > end) parts.push(text.slice(end, found.index));
+      parts.push(el(name === "hole" ? "mark.hole" : `span.py-${name}`, {}, found[0]));
+      end = found.index + found[0].length;
+    }
+    if (end < text.length) parts.push(text.slice(end));
+    return parts;
+  }
+
+  const word = (text) => (text.startsWith("@") ? "decorator" : KEYWORDS.has(text) ? "keyword" : null);
+  const CHANGE = { "+": "added", "-": "removed", " ": "same" };
+
+  // Numbers and signs stand in attributes, shown by CSS: what is copied is source alone.
+  const number = (n) => el("td.no", { "data-n": n ?? "" });
+  const code = (line) =>
+    line
+      ? el(`td.code.${CHANGE[line.sign]}`, { "data-sign": line.sign }, el("code", {}, coloured(line.text)))
+      : el("td.code.none");
+
+  const unifiedRow = (line) => el(`tr.${CHANGE[line.sign]}`, {}, number(line.old), number(line.new), code(line));
+  const splitRow = ([a, b]) => el("tr", {}, number(a && a.old), code(a), number(b && b.new), code(b));
+
+  /** Lines of a hunk side by side: removed ones against the added ones that follow them. */
+  function pairs(lines) {
+    const made = [];
+    for (let i = 0; i < lines.length; ) {
+      if (lines[i].sign === " ") {
+        made.push([lines[i], lines[i++]]);
+        continue;
+      }
+      const gone = [], come = [];
+      while (i < lines.length && lines[i].sign === "-") gone.push(lines[i++]);
+      while (i < lines.length && lines[i].sign === "+") come.push(lines[i++]);
+      for (let k = 0; k < Math.max(gone.length, come.length); k++) made.push([gone[k] || null, come[k] || null]);
+    }
+    return made;
+  }
+
+  function table(file, mode) {
+    const split = mode === "split";
+    const body = file.hunks.map((hunk) => [
+      el("tr.hunk", {}, el("td", { colspan: split ? 4 : 3 }, hunk.head)),
+      split ? pairs(hunk.lines).map(splitRow) : hunk.lines.map(unifiedRow),
+    ]);
+    return el(`table.diff.${split ? "split" : "unified"}`, { "aria-label": `Changes of ${file.path}` }, el("tbody", {}, body));
+  }
+
+  /** Show `patch` in `element`, in place of what is there. */
+  function render(element, patch, { mode = "unified" } = {}) {
+    const files = parse(patch);
+    element.replaceChildren(
+      ...files.map((file) =>
+        el("section.file", {}, el("h4.path", {}, file.path, file.isNew ? " (new file)" : ""),
+          el("div.scroll", { tabindex: 0, role: "region", "aria-label": file.path }, table(file, mode)))));
+    if (!files.length) element.append(el("p.quiet", {}, "No change of the source."));
+  }
+
+  /** The injected lines alone, without their tags: [{path, lines}]. The probe's own lines are left out. */
+  function injected(patch) {
+    return parse(patch).filter((file) => !file.isNew).map((file) => ({
+      path: file.path,
+      lines: file.hunks.flatMap((h) => h.lines)
+        .filter((l) => l.sign === "+" && !/#\s*fi:(probe|observe)\b/.test(l.text))
+        .map((l) => l.text.replace(/\s*#\s*fi:\S+\s*$/, "")),
+    })).filter((file) => file.lines.length);
+  }
+
+  return { parse, render, coloured, injected };
+})();
+
+const renderDiff = Diff.render;

@@ -1,0 +1,49 @@
+"use strict";
+// Elements made in one expression; text is always text, never markup.
+
+const Dom = (() => {
+  /** An element: `el("a.link", {href, onclick}, "text", child, [more])`. Null attributes and children are left out. */
+  function el(what, attributes = {}, ...children) {
+    const [tag, ...classes] = what.split(".");
+    const made = document.createElement(tag);
+    if (classes.length) made.className = classes.join(" ");
+    for (const [name, value] of Object.entries(attributes)) {
+      if (value === null || value === undefined || value === false) continue;
+      if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+      else made.setAttribute(name, value === true ? "" : value);
+    }
+    made.append(...children.flat(Infinity).filter((c) => c !== null && c !== undefined && c !== false));
+    return made;
+  }
+
+  /** The same for SVG. */
+  function svg(tag, attributes = {}, ...children) {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    made.append(...children.flat(Infinity));
+    return made;
+  }
+
+  /** A button that copies `text`, and says so. */
+  function copyButton(text, label = "Copy") {
+    const button = el("button.copy", { type: "button", onclick: copy }, label);
+    async function copy() {
+      try {
+        await navigator.clipboard.writeText(text);
+        button.textContent = "Copied";
+      } catch {
+        button.textContent = "Press Ctrl+C";
+        select(button.parentElement.querySelector("code"));
+      }
+      setTimeout(() => (button.textContent = label), 1500);
+    }
+    return button;
+  }
+
+  /** Select the text of an element: what is left where a page may not copy. */
+  function select(element) {
+    if (element) getSelection().selectAllChildren(element);
+  }
+
+  return { el, svg, copyButton };
+})();

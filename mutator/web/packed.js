@@ -1,0 +1,24 @@
+"use strict";
+// Data carried in a page: JSON, compressed with gzip, in base64, in a script element (web/__init__.py: embedded).
+
+const Packed = (() => {
+  const read_ = new Map(); // element id -> promise of its value
+
+  /** The value of a packed text. */
+  async function unpack(text) {
+    const bytes = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return JSON.parse(await new Response(stream).text());
+  }
+
+  /** The value that the element `id` carries, unpacked once; null when the page has no such element. */
+  function read(id) {
+    if (!read_.has(id)) {
+      const element = document.getElementById(id);
+      read_.set(id, element ? unpack(element.textContent) : Promise.resolve(null));
+    }
+    return read_.get(id);
+  }
+
+  return { unpack, read };
+})();
