@@ -1,11 +1,10 @@
-"""The report of a run: REPORT.md, and one HTML page that needs nothing but its figures, patches and plots.
+"""The report of a run: REPORT.md, and one HTML page that needs no other file.
 
 Written from results.csv and the run folder, so it can be made again at any time, the same each time; the
 published numbers and observations that results stand beside come from the library.
 """
 
-import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from mutator.figures.figures import Drawing
+    from mutator.report_browse import Browse
     from mutator.report_engine import Told as EngineTold
     from mutator.report_observations import Told
     from mutator.statistics.sheet import Sheet
@@ -48,16 +48,6 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """One experiment in the page: its row, and where its diff, plot and stills are seen from the report."""
-
-    row: Row
-    patch: str | None
-    plot: str | None
-    stills: tuple[tuple[str, str], ...]  # (time, link)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
     """What both forms of the report say."""
 
@@ -73,7 +63,7 @@ class Content:
     figures: "tuple[Drawing, ...]"  # written as files that the report shows
     failed: list[Row]  # runs that did not end well, harness errors first
     engine: "EngineTold | None"  # None: nothing was written down of how experiments were run
-    experiments: list[Line]
+    browse: "Browse"  # the experiments themselves
 
 
 def ensure(run: Path, workspace: "Workspace | None") -> Report:
@@ -102,8 +92,8 @@ def write(run: Path, workspace: "Workspace | None") -> Report:
     content = _content(folder, out, workspace)
     text, hypertext = _files(out)
     write_atomic(text, markdown(content).encode())
-    write_atomic(hypertext, page(content).encode())
-    rows = len(content.experiments)
+    write_atomic(hypertext, page(content, out).encode())
+    rows = sum(content.outcomes.values())
     report_stamp.write(out, made_from, rows)
     return Report(markdown=text, page=hypertext, rows=rows)
 
@@ -114,7 +104,7 @@ def _files(out: Path) -> tuple[Path, Path]:
 
 def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Content:
     """What the report says; its tables and figures are written."""
-    from mutator import report_engine, report_observations
+    from mutator import report_browse, report_engine, report_observations
     from mutator.statistics import sheets
     from mutator.statistics.frame import load
 
@@ -141,7 +131,7 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
             failed, key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id)
         ),
         engine=engine,
-        experiments=[_line(folder, row) for row in sorted(rows, key=_reading_order)],
+        browse=report_browse.browse(folder, rows, out, workspace),
     )
 
 
@@ -206,29 +196,3 @@ def _tables(rows: Sequence[Row]) -> list[Table]:
         heads, lines = tables.count_table(counts, head, hazards)
         made.append(Table(title=title, heads=heads, lines=lines))
     return made
-
-
-def _reading_order(row: Row) -> tuple[str, ...]:
-    return (row.module, row.fault_type, row.scenario, row.method, row.trigger, row.experiment_id)
-
-
-def _line(folder: RunFolder, row: Row) -> Line:
-    out = folder.path / FOLDER
-    plots, name = folder.path / "plots", row.experiment_id
-    return Line(
-        row=row,
-        patch=_link(folder.patch(name), out),
-        plot=_link(plots / f"{name}.svg", out),
-        stills=tuple(_stills(plots.glob(f"{name}-*s.jpg"), name, out)),
-    )
-
-
-def _stills(files: Iterable[Path], name: str, seen_from: Path) -> Iterator[tuple[str, str]]:
-    """What is shown of each still, and its link; earliest first."""
-    for file in sorted(files, key=lambda file: (len(file.name), file.name)):
-        if link := _link(file, seen_from):
-            yield file.stem.removeprefix(f"{name}-").replace("s", " s"), link
-
-
-def _link(file: Path, seen_from: Path) -> str | None:
-    return Path(os.path.relpath(file, seen_from)).as_posix() if file.exists() else None

@@ -16,16 +16,18 @@ FILE = "made_from.json"
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """Digest of all that a report depends on: results, run.json, records, timings, proof, plots that it
-    links, the library's cited numbers, and mutator's own sources."""
+    """Digest of all that a report depends on: results, run.json, records, timings, proof, pictures
+    and series that it shows, the library's cited numbers, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
-    own = [mutator.__version__, _files(Path(mutator.__file__).parent, "**/*.py")]
+    sources = Path(mutator.__file__).parent
+    own = [mutator.__version__, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
     results = [digest((run / name).read_bytes()) for name in (HEAD, "results.csv")]
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", proof.FOLDER)]
-    return digest([SCHEMA, own, results, engine, plots, references])
+    series = sorted(path.name for path in (run / "report" / "series").glob("*"))
+    return digest([SCHEMA, own, results, engine, plots, series, references])
 
 
 def read(out: Path) -> dict[str, Any]:

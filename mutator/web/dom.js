@@ -24,12 +24,12 @@ const Dom = (() => {
     return made;
   }
 
-  /** A button that copies `text`, and says so. */
+  /** A button that copies what `text()` gives, and says so. */
   function copyButton(text, label = "Copy") {
     const button = el("button.copy", { type: "button", onclick: copy }, label);
     async function copy() {
       try {
-        await navigator.clipboard.writeText(text);
+        await navigator.clipboard.writeText(text());
         button.textContent = "Copied";
       } catch {
         button.textContent = "Press Ctrl+C";

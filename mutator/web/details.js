@@ -1,0 +1,35 @@
+"use strict";
+// Diff, spec and trigger of each experiment, put together from what they share (report_browse.py: details).
+
+class Details {
+  static #made = null;
+
+  /** The details that the page carries, unpacked once. */
+  static read() {
+    Details.#made ??= Packed.read("details").then((data) => new Details(data));
+    return Details.#made;
+  }
+
+  constructor(data) {
+    this.data = data;
+    // the members of a shape come in the order of the rows
+    const seen = new Uint32Array(data.shapes.length);
+    this.member = data.shape.map((shape) => (shape < 0 ? -1 : seen[shape]++));
+  }
+
+  /** The diff of a row, its values put into the holes of its shape; null: it has none. */
+  patch(row) {
+    const shape = this.data.shapes[this.data.shape[row]];
+    if (!shape) return null;
+    const values = shape.values.map((hole) => hole[this.member[row]]);
+    return shape.parts.map((part, i) => part + (i < shape.places.length ? values[shape.places[i]] : "")).join("");
+  }
+
+  spec(row) {
+    return this.data.specs[this.data.spec[row]] ?? null;
+  }
+
+  setting(row) {
+    return this.data.settings[this.data.setting[row]] ?? null;
+  }
+}

@@ -1,0 +1,219 @@
+"use strict";
+// One experiment opened beside the table: what happened, plots, what was changed, and how to do it again.
+
+class Experiment {
+  /** `move(by)` goes on in the table, `close()` shuts this. */
+  constructor(place, table, state, facts, actions) {
+    Object.assign(this, { place, table, state, facts, actions });
+    this.mode = innerWidth > 1100 ? "split" : "unified";
+    this.row = -1;
+  }
+
+  get isOpen() {
+    return !this.place.hidden;
+  }
+
+  /** Show the experiment of the state, or nothing. */
+  async show() {
+    const id = this.state.experiment, row = id ? this.table.find(id) : -1;
+    document.body.classList.toggle("has-experiment", Boolean(id));
+    if (!id) {
+      this.place.hidden = true;
+      this.row = -1;
+      return;
+    }
+    if (row >= 0 && row === this.row && this.isOpen) return;
+    const wasOpen = this.isOpen;
+    this.row = row;
+    this.place.hidden = false;
+    if (row < 0) this.#none(id);
+    else this.#fill(row);
+    this.place.scrollTop = 0;
+    if (!wasOpen) this.place.querySelector("h2").focus({ preventScroll: true });
+    if (row >= 0) await this.#fillLate(row);
+  }
+
+  text(name) {
+    return this.table.text(this.row, name);
+  }
+
+  #buttons() {
+    const { el } = Dom;
+    const button = (text, name, todo) => el("button", { type: "button", "aria-label": name, title: name, onclick: todo }, text);
+    return el("div.buttons", {},
+      button("↑", "Previous experiment (k)", () => this.actions.move(-1)),
+      button("↓", "Next experiment (j)", () => this.actions.move(1)),
+      button("Close", "Close (Esc)", () => this.actions.close()));
+  }
+
+  #none(id) {
+    const { el } = Dom;
+    this.place.replaceChildren(el("header", {}, el("h2", { tabindex: -1 }, "No such experiment"), this.#buttons()),
+      el("p", {}, "This report has none whose id begins with ", el("code", {}, id), "."));
+  }
+
+  #fill(row) {
+    const { el } = Dom;
+    const id = this.text("experiment_id"), value = `${this.text("value")} ${this.text("unit")}`.replace(/ -?$/, "");
+    const section = (title, name) => el(`section.${name}`, {}, el("h3", {}, title), el("div.content", {}, el("p.quiet", {}, "…")));
+    this.place.replaceChildren(
+      el("header", {},
+        el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, `${this.text("kind")}/${this.text("variant")} ${value}`),
+          el("p.under", {}, Grid.ending(this.text("ending")), ` in ${this.text("scenario")}, ${this.text("method")}, trigger ${this.text("trigger")} `)),
+        this.#buttons()),
+      el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
+      this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
+      el("section.happened", {}, el("h3", {}, "What happened"), this.#events()),
+      section("Golden against faulty", "plots-of"),
+      section("What was changed", "change"),
+      section("Injected lines alone", "snippet"),
+      section("The fault's spec, its value drawn", "spec"),
+      section("Pictures", "pictures"),
+      el("section.again", {}, el("h3", {}, "Do it again"), this.#commands()),
+      el("details", {}, el("summary", {}, "All results"), this.#results()));
+  }
+
+  #link() {
+    return `${location.href.split("#")[0]}#e=${this.text("experiment_id")}`;
+  }
+
+  #events() {
+    const { el } = Dom;
+    const at = (name) => this.table.number(this.row, name), begin = at("t_activation");
+    const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in all)`],
+      ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
+      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, `hazard ${hazard}`])]
+      .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
+    if (!happened.length) return el("p", {}, "The fault was never active, and nothing came of it.");
+    const reaction = at("reaction_time");
+    return el("div", {}, el("table.events", {}, el("thead", {}, el("tr", {}, ["time [s]", "from activation [s]", "what"].map((t) => el("th", { scope: "col" }, t)))),
+      el("tbody", {}, happened.map(([t, what]) => el("tr", {}, el("td.time", {}, t.toFixed(2)),
+        el("td.time", {}, Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)}`), el("td", {}, what))))),
+      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time, from the first alert to the first hazard: ${reaction.toFixed(2)} s.`));
+  }
+
+  command(text) {
+    const { el } = Dom;
+    return el("div.command", {}, el("code", {}, text), Dom.copyButton(() => text));
+  }
+
+  #commands() {
+    const { el } = Dom;
+    const id = this.text("experiment_id"), run = this.facts.run();
+    return el("div", {}, el("p", {}, "Drive it again and compare it with its record; then watch it step by step:"),
+      this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`),
+      el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try()));
+  }
+
+  /** `mutator try` of this fault; a time for what was triggered at random. */
+  #try() {
+    const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
+    const quoted = (text) => (/^[\w./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
+    const when = /^\w+$/.test(this.text("trigger")) ? this.text("trigger") : this.text("condition").replace(/^t >= ([\d.]+)$/, "$1");
+    const parts = ["mutator try", quoted(this.text("kind")), "--scenario", quoted(this.text("scenario"))];
+    if (this.text("variant")) parts.push("--variant", quoted(this.text("variant")));
+    if (isNumber) parts.push("--value", value);
+    if (when) parts.push("--trigger", quoted(when));
+    if (this.text("reading") && this.text("reading") !== "as_described") parts.push("--reading", quoted(this.text("reading")));
+    return parts.join(" ");
+  }
+
+  #results() {
+    const { el } = Dom;
+    return el("div.scroll", {}, el("table", {}, el("tbody", {}, [...this.table.columns.keys()].map((name) =>
+      el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, this.text(name)))))));
+  }
+
+  #content(name) {
+    return this.place.querySelector(`section.${name} .content`);
+  }
+
+  /** What is unpacked when it is first needed: diff, spec, pictures, series. */
+  async #fillLate(row) {
+    const id = this.text("experiment_id");
+    const [details, media, series] = await Promise.all([Details.read(), Packed.read("media"), Series.inPage(id)]);
+    if (this.row !== row) return; // another one was opened meanwhile
+    this.#change(details.patch(row));
+    const spec = details.spec(row);
+    this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
+    this.#pictures(id, media && media[id]);
+    if (series) Series.show(this.#content("plots-of"), series);
+    else this.#noSeries(id, this.facts.onDemand.has(id));
+  }
+
+  #change(patch) {
+    const { el } = Dom;
+    const place = this.#content("change"), snippet = this.#content("snippet");
+    if (patch === null) {
+      place.replaceChildren(el("p.quiet", {}, "There is no diff: it has not run, or its mutant could not be made."));
+      snippet.parentElement.remove();
+      return;
+    }
+    const shown = el("div");
+    const button = (mode, title) => el("button", { type: "button", "aria-pressed": String(this.mode === mode), onclick: () => {
+      this.mode = mode;
+      this.#change(patch);
+      this.#content("change").querySelector('[aria-pressed="true"]').focus();
+    } }, title);
+    place.replaceChildren(el("div.buttons", { role: "group", "aria-label": "How the diff is shown" },
+      button("unified", "Unified"), button("split", "Side by side"), Dom.copyButton(() => patch, "Copy diff")), shown,
+      el("p.quiet", {}, "Not shown: the probe, a file that every mutant gets."));
+    renderDiff(shown, patch, { mode: this.mode });
+    const lines = Diff.injected(patch);
+    snippet.replaceChildren(...lines.map(({ path, lines: code }) => el("div", {}, el("p.quiet", {}, path),
+      el("pre", {}, el("code", {}, dedented(code).map((line) => [...Diff.coloured(line), "\n"]))))));
+  }
+
+  #spec(spec, setting) {
+    const { el } = Dom;
+    const rows = [["condition", this.text("condition")], ["how long", setting.hold + (setting.hold_s === null ? "" : ` ${setting.hold_s} s`)],
+      ["not before", `${setting.armed_after_s} s`], ["changes of the scenario", setting.changes.join(", ") || "none"], ["seed", this.text("seed")]];
+    return el("div", {}, el("pre", {}, el("code", {}, spec)),
+      el("table", {}, el("tbody", {}, rows.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value))))));
+  }
+
+  #pictures(id, kept) {
+    const { el } = Dom;
+    const place = this.#content("pictures");
+    if (!kept && !this.facts.filmed) {
+      place.parentElement.remove(); // a target without a camera
+      return;
+    }
+    const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");
+    const t = Number.isNaN(hazard) ? (Number.isNaN(begin) ? 10 : begin + 2) : hazard;
+    const run = this.facts.run(), separator = run.includes("\\") ? "\\" : "/";
+    place.replaceChildren(
+      ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden beside faulty at ${time} s`, loading: "lazy" }), el("figcaption", {}, `${time} s`))),
+      ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden beside faulty", loading: "lazy" })
+        : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden beside faulty" })),
+      el("p", {}, kept ? "More pictures, or a film:" : "Pictures and films are made on request, and are here once the report is written again:"),
+      this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
+  }
+
+  #noSeries(id, isThere) {
+    const { el } = Dom;
+    const place = this.#content("plots-of");
+    const said = el("p", { role: "status" });
+    const load = async () => {
+      try {
+        const series = await Series.load(id);
+        if (this.text("experiment_id") === id) Series.show(place, series);
+      } catch {
+        said.textContent = `There is no series/${id}.js beside this page yet.`;
+      }
+    };
+    if (isThere) {
+      load();
+      return;
+    }
+    place.replaceChildren(el("p", {}, "This page carries the plots of a few experiments only. This command makes those of this one:"),
+      this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
+      el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " once it has run."), said);
+  }
+}
+
+/** Lines without the indentation that all of them have. */
+function dedented(lines) {
+  const depth = Math.min(...lines.filter((l) => l.trim()).map((l) => l.length - l.trimStart().length));
+  return lines.map((line) => line.slice(depth));
+}

@@ -1,0 +1,70 @@
+"use strict";
+// The filters above the table: one fold-out for each facet, with counts; what is chosen, each with a way out.
+
+class Filters {
+  constructor(place, chips, table, state) {
+    this.chips = chips;
+    this.state = state;
+    this.facets = table.facets.map((facet) => this.#facet(facet)).filter(Boolean);
+    place.append(...this.facets.map((f) => f.element));
+    document.addEventListener("click", (event) => this.#closeOthers(event.target));
+    place.addEventListener("keydown", (event) => {
+      const open = event.key === "Escape" && event.target.closest("details[open]");
+      if (!open) return;
+      open.open = false;
+      open.querySelector("summary").focus();
+      event.stopPropagation();
+    });
+  }
+
+  #closeOthers(target) {
+    for (const { element } of this.facets) if (!element.contains(target)) element.open = false;
+  }
+
+  #facet(facet) {
+    const { el } = Dom;
+    if (facet.values.length < 2) return null; // nothing to choose
+    const options = facet.values.map((value) => {
+      const box = el("input", { type: "checkbox", onchange: () => this.state.toggle(facet.name, value) });
+      const count = el("span.count");
+      return { value, box, count, element: el("label.option", {}, box, el("span", {}, value), count) };
+    });
+    const badge = el("b.badge");
+    const element = el("details.facet", { "data-facet": facet.name },
+      el("summary", {}, facet.title, " ", badge),
+      el("fieldset", {}, el("legend.visually-hidden", {}, facet.title), options.map((o) => o.element)));
+    return { facet, options, badge, element };
+  }
+
+  /** Show what is chosen, and the counts of `filter`. */
+  show(counts) {
+    for (const { facet, options, badge, element } of this.facets) {
+      const chosen = this.state.chosen.get(facet.name) || new Set();
+      badge.textContent = chosen.size ? String(chosen.size) : "";
+      element.classList.toggle("in-use", chosen.size > 0);
+      options.forEach(({ value, box, count, element: option }, i) => {
+        box.checked = chosen.has(value);
+        const number = counts.get(facet.name)[i];
+        count.textContent = number.toLocaleString("en");
+        option.classList.toggle("empty", number === 0);
+      });
+    }
+    this.#showChips();
+  }
+
+  #showChips() {
+    const { el } = Dom;
+    const chip = (title, value, drop) =>
+      el("button.chip", { type: "button", onclick: drop, "aria-label": `Remove filter ${title}: ${value}` },
+        el("span.quiet", {}, `${title}: `), value, el("span", { "aria-hidden": "true" }, " ✕"));
+    const made = [];
+    if (this.state.query) made.push(chip("text", this.state.query, () => this.state.set({ query: "" })));
+    for (const { name, title } of Rows.FACETS) {
+      for (const value of this.state.chosen.get(name) || []) {
+        made.push(chip(title.toLowerCase(), value, () => this.state.toggle(name, value)));
+      }
+    }
+    if (made.length > 1) made.push(el("button.clear", { type: "button", onclick: () => this.state.clear() }, "Clear all"));
+    this.chips.replaceChildren(...made);
+  }
+}

@@ -1,0 +1,152 @@
+"use strict";
+// The table of experiments: of however many rows only those that are seen are in the page.
+
+class Grid {
+  static ROW_PX = 30;
+  static SPARE = 8; // rows kept ready above and below
+  static PRINTED = 500; // rows that paper gets
+
+  /** Column, title, width in px, and how a cell is filled; `narrow`: also on a telephone. */
+  static COLUMNS = [
+    { name: "kind", title: "fault type", px: 210, narrow: true },
+    { name: "variant", title: "variant", px: 110 },
+    { name: "value", title: "value", px: 88, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
+    { name: "scenario", title: "scenario", px: 82, narrow: true },
+    { name: "method", title: "method", px: 82 },
+    { name: "trigger", title: "trigger", px: 100 },
+    { name: "ending", title: "outcome", px: 126, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
+    { name: "t_activation", title: "activated", px: 88, time: true },
+    { name: "t_manifest", title: "manifested", px: 98, time: true },
+    { name: "hazards", title: "hazards", px: 86 },
+    { name: "t_hazard", title: "first hazard", px: 104, time: true },
+    { name: "alerts", title: "alerts", px: 140, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
+    { name: "t_alert", title: "first alert", px: 92, time: true },
+    { name: "reaction_time", title: "reaction", px: 82, time: true },
+    { name: "experiment_id", title: "experiment", px: 100, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
+  ];
+
+  /** How an experiment ended, as a word on its colour. */
+  static ending(text) {
+    return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
+  }
+
+  constructor(place, table, state) {
+    this.place = place;
+    this.table = table;
+    this.state = state;
+    this.rows = [];
+    this.current = 0; // place in `rows` of the row that has the keyboard
+    this.#build();
+    place.addEventListener("scroll", () => this.#soon(), { passive: true });
+    new ResizeObserver(() => this.#soon()).observe(place);
+  }
+
+  #build() {
+    const { el } = Dom;
+    this.heads = Grid.COLUMNS.map((column) => {
+      const button = el("button", { type: "button", onclick: () => this.#sortBy(column.name) }, column.title, el("span.arrow", { "aria-hidden": "true" }));
+      return el(`th.${column.narrow ? "narrow" : "wide"}`, { scope: "col", style: `width: ${column.px}px`, "data-column": column.name }, button);
+    });
+    this.body = el("tbody");
+    const width = Grid.COLUMNS.reduce((sum, column) => sum + column.px, 0);
+    this.element = el("table.grid", { "aria-label": "Experiments", style: `--width: ${width}px` },
+      el("thead", {}, el("tr", { "aria-rowindex": 1 }, this.heads)), this.body);
+    this.body.addEventListener("click", (event) => {
+      const row = event.target.closest("tr[data-at]");
+      if (row) this.open(Number(row.dataset.at));
+    });
+    this.place.replaceChildren(this.element);
+  }
+
+  #sortBy(name) {
+    const by = this.state.sort;
+    this.state.set({ sort: by === name ? `-${name}` : by === `-${name}` ? "" : name });
+  }
+
+  /** Show these rows; `experiment` has the keyboard, if it is among them. */
+  show(rows) {
+    this.rows = rows;
+    const opened = this.state.experiment ? this.rows.indexOf(this.table.find(this.state.experiment)) : -1;
+    if (opened >= 0) this.current = opened;
+    this.current = Math.max(0, Math.min(this.current, rows.length - 1));
+    this.element.setAttribute("aria-rowcount", String(rows.length + 1));
+    const by = this.state.sort.replace("-", "");
+    for (const head of this.heads) {
+      const isBy = head.dataset.column === by;
+      const way = isBy ? (this.state.sort.startsWith("-") ? "descending" : "ascending") : "none";
+      head.setAttribute("aria-sort", way);
+      head.querySelector(".arrow").textContent = isBy ? (way === "ascending" ? " ▲" : " ▼") : "";
+    }
+    this.draw();
+  }
+
+  #soon() {
+    this.waiting ??= requestAnimationFrame(() => {
+      this.waiting = null;
+      this.draw();
+    });
+  }
+
+  /** Put the rows that are seen into the page. */
+  draw(all = false) {
+    const { el } = Dom;
+    const top = this.place.scrollTop, seen = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
+    const first = all ? 0 : Math.max(0, Math.floor(top / Grid.ROW_PX) - Grid.SPARE);
+    const last = all ? Math.min(this.rows.length, Grid.PRINTED) : Math.min(this.rows.length, first + seen + 2 * Grid.SPARE);
+    const hadFocus = this.body.contains(document.activeElement);
+    const space = (count) =>
+      count > 0 ? el("tr.space", { "aria-hidden": "true", style: `height: ${count * Grid.ROW_PX}px` }, el("td", { colspan: Grid.COLUMNS.length })) : null;
+    const shown = [];
+    for (let at = first; at < last; at++) shown.push(this.#row(at));
+    this.body.replaceChildren(...[space(first), ...shown, all ? null : space(this.rows.length - last)].filter(Boolean));
+    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: Grid.COLUMNS.length }, "No experiment fits these filters.")));
+    if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
+  }
+
+  #row(at) {
+    const { el } = Dom;
+    const row = this.rows[at], id = this.table.text(row, "experiment_id");
+    const isCurrent = at === this.current, isOpen = id === this.state.experiment;
+    const cells = Grid.COLUMNS.map((column) => {
+      const classes = `td.${column.narrow ? "narrow" : "wide"}${column.time ? ".time" : ""}`;
+      if (!column.time) return el(classes, {}, column.cell ? column.cell(this.table, row) : this.table.text(row, column.name));
+      const value = this.table.number(row, column.name);
+      return el(classes, {}, Number.isNaN(value) ? "" : value.toFixed(2));
+    });
+    return el("tr", { "data-at": at, "aria-rowindex": at + 2, tabindex: isCurrent ? 0 : -1, class: isOpen ? "open" : null,
+      "aria-selected": String(isOpen), title: this.table.text(row, "detail") || null }, cells);
+  }
+
+  #element(at) {
+    return this.body.querySelector(`tr[data-at="${at}"]`);
+  }
+
+  /** Open the experiment at a place of the table. */
+  open(at, options) {
+    if (at < 0 || at >= this.rows.length) return;
+    this.current = at;
+    this.state.set({ experiment: this.table.text(this.rows[at], "experiment_id") }, options);
+  }
+
+  /** Give the keyboard to the row so many further on; the open experiment follows. */
+  move(by) {
+    if (!this.rows.length) return;
+    this.current = Math.max(0, Math.min(this.rows.length - 1, this.current + by));
+    this.reveal();
+    if (this.state.experiment) this.open(this.current, { replace: true });
+    else this.focus();
+  }
+
+  /** Scroll so that the current row is seen. */
+  reveal() {
+    const head = this.element.tHead.offsetHeight, top = this.current * Grid.ROW_PX;
+    const room = this.place.clientHeight - head - Grid.ROW_PX;
+    if (top < this.place.scrollTop) this.place.scrollTop = top;
+    else if (top > this.place.scrollTop + room) this.place.scrollTop = top - room;
+    this.draw();
+  }
+
+  focus() {
+    this.#element(this.current)?.focus({ preventScroll: true });
+  }
+}

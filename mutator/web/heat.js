@@ -1,0 +1,107 @@
+"use strict";
+// Fault type x scenario: a count of a count in each cell, as text and as colour. A cell filters.
+
+class HeatMap {
+  static ROW = "kind";
+  static COLUMN = "scenario";
+
+  constructor(place, picker, table, state) {
+    this.place = place;
+    this.table = table;
+    this.state = state;
+    const find = (name) => table.facets.find((f) => f.name === name);
+    this.rows = find(HeatMap.ROW);
+    this.columns = find(HeatMap.COLUMN);
+    this.measures = HeatMap.measures(table);
+    picker.append(...this.measures.map((m) => Dom.el("option", { value: m.name }, m.title)));
+    picker.addEventListener("change", () => state.set({ heat: picker.value === this.measures[0].name ? "" : picker.value }));
+    this.picker = picker;
+  }
+
+  /** What can be shown: how many of which rows. */
+  static measures(table) {
+    const has = (name) => (row) => table.text(row, name) !== "";
+    const isActive = has("t_activation"), isHazard = has("hazards"), isAlert = has("alerts"), all = () => true;
+    const made = [
+      { name: "hazards", title: "hazards / activated", part: isHazard, of: isActive },
+      { name: "hazards-injected", title: "hazards / injected", part: isHazard, of: all },
+      { name: "activated", title: "activated / injected", part: isActive, of: all },
+      { name: "manifested", title: "manifested / activated", part: has("t_manifest"), of: isActive },
+      { name: "alerts", title: "alerts / activated", part: isAlert, of: isActive },
+      { name: "silent", title: "hazards without an alert / hazards", part: (row) => !isAlert(row), of: isHazard },
+    ];
+    if (table.checked.length < 2) return made;
+    const each = table.checked.map((hazard) => ({
+      name: hazard, title: `${hazard} / activated`, of: isActive, part: has(`t_${hazard.toLowerCase()}`),
+    }));
+    return [...made, ...each];
+  }
+
+  /** Count `rows` and show them. */
+  show(rows) {
+    const measure = this.measures.find((m) => m.name === this.state.heat) || this.measures[0];
+    this.picker.value = measure.name;
+    if (!this.rows || !this.columns) return;
+    const width = this.columns.values.length + 1, height = this.rows.values.length + 1;
+    const part = new Uint32Array(width * height), of = new Uint32Array(width * height);
+    for (const row of rows) {
+      if (!this.table.usable(row) || !measure.of(row)) continue;
+      const [y] = this.rows.members[this.rows.codes[row]], [x] = this.columns.members[this.columns.codes[row]];
+      const isPart = measure.part(row);
+      // last row and column: all of them
+      for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) {
+        of[at]++;
+        if (isPart) part[at]++;
+      }
+    }
+    this.#draw(measure, part, of, width, height);
+  }
+
+  #draw(measure, part, of, width, height) {
+    const { el } = Dom;
+    const kinds = [...this.rows.values, null], scenarios = [...this.columns.values, null];
+    const focused = this.place.contains(document.activeElement) ? document.activeElement.dataset.at : null;
+    const cell = (y, x) => {
+      const at = y * width + x, n = part[at], all = of[at], rate = all ? n / all : 0;
+      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`;
+      const what = all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "none to count";
+      const isChosen = this.#isChosen(HeatMap.ROW, kinds[y]) && this.#isChosen(HeatMap.COLUMN, scenarios[x]);
+      return el("td", {}, el("button.cell", {
+        type: "button", "data-at": `${y},${x}`, "aria-pressed": String(isChosen && this.#isAny), style: `--rate: ${rate.toFixed(3)}`,
+        class: `cell${all ? "" : " nothing"}${rate > 0.55 ? " strong" : ""}`,
+        title: `${where}\n${measure.title}: ${what}`, "aria-label": `${where}: ${measure.title} ${what}`,
+        onclick: () => this.#choose(kinds[y], scenarios[x], isChosen && this.#isAny),
+      }, all ? `${n}/${all}` : "·"));
+    };
+    const head = el("tr", {}, el("td"), scenarios.map((s) => el("th", { scope: "col" }, s || "all")));
+    const body = kinds.map((kind, y) =>
+      el("tr", {}, el("th", { scope: "row" }, kind || "all"), scenarios.map((_, x) => cell(y, x))));
+    this.place.replaceChildren(el("table.heat", { "aria-label": `${measure.title} by fault type and scenario` },
+      el("thead", {}, head), el("tbody", {}, body)));
+    if (focused) this.place.querySelector(`[data-at="${focused}"]`)?.focus();
+  }
+
+  get #isAny() {
+    return this.state.chosen.has(HeatMap.ROW) || this.state.chosen.has(HeatMap.COLUMN);
+  }
+
+  /** Whether exactly `value` is chosen of a facet; null: nothing is. */
+  #isChosen(name, value) {
+    const chosen = this.state.chosen.get(name);
+    return value === null ? !chosen : Boolean(chosen) && chosen.size === 1 && chosen.has(value);
+  }
+
+  #choose(kind, scenario, wasChosen) {
+    const values = (value) => (wasChosen || value === null ? [] : [value]);
+    this.state.choose({ [HeatMap.ROW]: values(kind), [HeatMap.COLUMN]: values(scenario) });
+  }
+
+  /** `30 % (18 to 45)`: the rate and its 95 % Wilson interval. */
+  static interval(n, all) {
+    const z = 1.959964, p = n / all, scale = 1 + (z * z) / all;
+    const middle = (p + (z * z) / (2 * all)) / scale;
+    const half = (z / scale) * Math.sqrt((p * (1 - p)) / all + (z * z) / (4 * all * all));
+    const percent = (x) => (100 * Math.min(1, Math.max(0, x))).toFixed(1);
+    return `${percent(p)} % (${percent(middle - half)} to ${percent(middle + half)})`;
+  }
+}

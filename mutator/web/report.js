@@ -1,0 +1,117 @@
+"use strict";
+// The browsable part of the report: its parts made, tied to the state, and the keyboard.
+
+const Report = (() => {
+  const find = (id) => document.getElementById(id);
+
+  /** The run folder as a command names it: where this page was opened from, if that is a disk. */
+  function runFolder() {
+    const path = decodeURIComponent(location.pathname);
+    const found = location.protocol === "file:" && /^(.*)\/report\/[^/]*$/.exec(path);
+    if (!found) return "DIR";
+    return /^[\w./-]+$/.test(found[1]) ? found[1] : `'${found[1].replaceAll("'", "'\\''")}'`;
+  }
+
+  async function start() {
+    const data = await Packed.read("table");
+    const given = JSON.parse(find("facts").textContent);
+    const facts = { run: runFolder, filmed: given.filmed, onDemand: new Set(given.series) };
+    const table = new Rows.Table(data);
+    let drawn = null;
+    const state = new State(() => update());
+    const heat = new HeatMap(find("heat"), find("measure"), table, state);
+    const filters = new Filters(find("facets"), find("chips"), table, state);
+    const grid = new Grid(find("grid"), table, state);
+    const experiment = new Experiment(find("experiment"), table, state, facts, { move: (by) => grid.move(by), close });
+    const search = find("search");
+
+    /** Show the state. Rows are found and sorted again only when what they depend on has changed. */
+    function update() {
+      const key = JSON.stringify([state.query, [...state.chosen].map(([n, v]) => [n, [...v]]), state.sort, state.heat]);
+      if (key !== drawn) {
+        drawn = key;
+        const { rows, apart, counts } = table.filter(state.query, state.chosen, [HeatMap.ROW, HeatMap.COLUMN]);
+        const sorted = state.sort ? table.sort(rows, state.sort.replace("-", ""), state.sort.startsWith("-")) : rows;
+        grid.show(sorted);
+        heat.show(apart);
+        filters.show(counts);
+        find("found").textContent = state.isFiltered
+          ? `${rows.length.toLocaleString("en")} of ${table.count.toLocaleString("en")} experiments`
+          : `${table.count.toLocaleString("en")} experiments`;
+        if (search.value !== state.query) search.value = state.query;
+      } else grid.show(grid.rows);
+      experiment.show();
+    }
+
+    function close() {
+      state.set({ experiment: "" });
+      grid.reveal();
+      grid.focus();
+    }
+
+    let typing = null;
+    search.addEventListener("input", () => {
+      clearTimeout(typing);
+      typing = setTimeout(() => state.set({ query: search.value.trim() }, { replace: true }), 120);
+    });
+    find("search").parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
+    keyboard({ state, grid, experiment, search, close });
+    links(state);
+    addEventListener("beforeprint", () => grid.draw(true));
+    addEventListener("afterprint", () => grid.draw());
+    update();
+    if (state.experiment) grid.reveal();
+    document.documentElement.dataset.ready = "yes";
+  }
+
+  /** Links to filters work as a change of state, links to sections leave it alone. */
+  function links(state) {
+    document.addEventListener("click", (event) => {
+      const link = event.target.closest('a[href^="#"]');
+      if (!link || event.ctrlKey || event.metaKey || event.shiftKey) return;
+      const to = link.getAttribute("href").slice(1);
+      if (to.includes("=")) {
+        event.preventDefault();
+        history.pushState(null, "", `#${to}`);
+        dispatchEvent(new PopStateEvent("popstate"));
+        find("experiments").scrollIntoView();
+      } else if (find(to)) {
+        event.preventDefault();
+        find(to).scrollIntoView();
+      }
+    });
+  }
+
+  function keyboard({ grid, experiment, search, close }) {
+    const help = find("help");
+    find("open-help").addEventListener("click", () => help.showModal());
+    const keys = {
+      j: () => grid.move(1), k: () => grid.move(-1), "/": () => search.focus(), "?": () => help.showModal(),
+    };
+    const inTable = {
+      ArrowDown: () => grid.move(1), ArrowUp: () => grid.move(-1), PageDown: () => grid.move(12), PageUp: () => grid.move(-12),
+      Home: () => grid.move(-Infinity), End: () => grid.move(Infinity), Enter: () => grid.open(grid.current), " ": () => grid.open(grid.current),
+    };
+    document.addEventListener("keydown", (event) => {
+      if (help.open || event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
+      const { target, key } = event;
+      const isTyping = target.matches("input[type=search], select, textarea");
+      const isRow = target.matches("#grid tr") || target === find("grid");
+      const isPanel = target.closest("#experiment") && !target.closest("button, a, summary, .scroll");
+      if (key === "Escape" && isTyping) target.blur();
+      else if (key === "Escape" && experiment.isOpen) close();
+      else if (!isTyping && keys[key]) keys[key]();
+      else if (isRow && inTable[key]) inTable[key]();
+      else if (isPanel && (key === "ArrowLeft" || key === "ArrowRight")) grid.move(key === "ArrowLeft" ? -1 : 1);
+      else return;
+      event.preventDefault();
+    });
+  }
+
+  return { start };
+})();
+
+Report.start().catch((error) => {
+  document.getElementById("found").textContent = `The list of experiments cannot be shown here: ${error.message}`;
+  throw error;
+});

@@ -1,0 +1,153 @@
+"use strict";
+// The results as columns: what is found, counted and sorted, for 100,000 experiments between two key strokes.
+
+const Rows = (() => {
+  /** What can be filtered by: column, title, and for cells with several values what stands between them. */
+  const FACETS = [
+    { name: "kind", title: "Fault type" },
+    { name: "module", title: "Module" },
+    { name: "scenario", title: "Scenario" },
+    { name: "method", title: "Method" },
+    { name: "trigger", title: "Trigger" },
+    { name: "outcome", title: "Outcome", none: "no outcome" },
+    { name: "status", title: "Status" },
+    { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
+    { name: "alerts", title: "Alert", between: ";", none: "no alert" },
+  ];
+  const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
+    "ending", "hazards", "alerts", "detail"];
+
+  /** A column: `text(row)`, `number(row)` (NaN: empty), and `words` with `codes` where it has a dictionary. */
+  function column(data) {
+    const { name, words, codes, texts, numbers } = data;
+    if (numbers) {
+      const values = Float64Array.from(numbers, (n) => (n === null ? NaN : Number(n)));
+      return { name, values, number: (row) => values[row], text: (row) => (numbers[row] === null ? "" : String(numbers[row])) };
+    }
+    if (texts) return { name, texts, number: () => NaN, text: (row) => texts[row] };
+    return { name, words, codes: Uint32Array.from(codes), number: (row) => parseFloat(words[codes[row]]), text: (row) => words[codes[row]] };
+  }
+
+  /** A facet's values, and for each word of its column which of them it has. */
+  function facet(of, columns) {
+    const found = columns.get(of.name);
+    if (!found || !found.words) return null;
+    const split = found.words.map((word) => (word ? (of.between ? word.split(of.between) : [word]) : [of.none || ""]));
+    const values = [...new Set(split.flat())].sort((a, b) => a.localeCompare(b, "en", { numeric: true }));
+    const at = new Map(values.map((value, i) => [value, i]));
+    return { ...of, codes: found.codes, values, at, members: split.map((s) => [...new Set(s)].map((v) => at.get(v))) };
+  }
+
+  class Table {
+    constructor(data) {
+      this.count = data.count;
+      this.checked = data.checked; // hazards that were looked for
+      this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
+      this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
+      this.byId = null;
+      const status = this.columns.get("status");
+      const unusable = status && status.words ? status.words.map((w) => w === "harness_error" || w === "invalid_mutant") : [];
+      // What says nothing about its fault is in no count.
+      this.usable = (row) => !status || !unusable[status.codes[row]];
+    }
+
+    text(row, name) {
+      const found = this.columns.get(name);
+      return found ? found.text(row) : "";
+    }
+
+    number(row, name) {
+      const found = this.columns.get(name);
+      return found ? found.number(row) : NaN;
+    }
+
+    /** The row of an experiment, or of the only one whose id begins so; -1: none. */
+    find(id) {
+      const ids = this.columns.get("experiment_id");
+      this.byId ??= new Map(Array.from({ length: this.count }, (_, row) => [ids.text(row), row]));
+      if (this.byId.has(id)) return this.byId.get(id);
+      const begun = id.length >= 4 ? [...this.byId.keys()].filter((key) => key.startsWith(id)) : [];
+      return begun.length === 1 ? this.byId.get(begun[0]) : -1;
+    }
+
+    /** For each word or row of a searched column whether it has `token`; as a function of the row. */
+    #has(name, token) {
+      const found = this.columns.get(name);
+      if (!found) return null;
+      if (found.words) {
+        const hit = found.words.map((word) => word.toLowerCase().includes(token));
+        return hit.includes(true) ? (row) => hit[found.codes[row]] : null;
+      }
+      if (name === "experiment_id" && !/^[0-9a-f]+$/.test(token)) return null;
+      return (row) => found.text(row).toLowerCase().includes(token);
+    }
+
+    /** Which rows have all words of `query`, in whatever column; null: no query. */
+    #searched(query) {
+      const tokens = query.toLowerCase().split(/\s+/).filter(Boolean);
+      if (!tokens.length) return null;
+      const tests = tokens.map((token) => SEARCHED.map((name) => this.#has(name, token)).filter(Boolean));
+      const found = new Uint8Array(this.count);
+      for (let row = 0; row < this.count; row++) {
+        found[row] = tests.every((any) => any.some((has) => has(row))) ? 1 : 0;
+      }
+      return found;
+    }
+
+    /**
+     * The rows that `query` and `chosen` (facet name -> set of values) leave.
+     * `counts` says of each facet's values how many rows there would be, the other facets as they are chosen;
+     * `apart` are the rows that fail at most in the facets of `free`: what a map over these counts.
+     */
+    filter(query, chosen, free = []) {
+      const found = this.#searched(query);
+      const tests = this.facets.map((f) => {
+        const wanted = chosen.get(f.name);
+        if (!wanted || !wanted.size) return null;
+        return Uint8Array.from(f.members, (has) => (has.some((value) => wanted.has(f.values[value])) ? 1 : 0));
+      });
+      const counts = this.facets.map((f) => new Uint32Array(f.values.length));
+      const isFree = this.facets.map((f) => free.includes(f.name));
+      const rows = [], apart = [];
+      for (let row = 0; row < this.count; row++) {
+        if (found && !found[row]) continue;
+        let failed = 0, where = -1, failedFixed = 0;
+        for (let i = 0; i < tests.length; i++) {
+          if (tests[i] && !tests[i][this.facets[i].codes[row]]) {
+            failed++;
+            where = i;
+            if (!isFree[i]) failedFixed++;
+          }
+        }
+        if (!failedFixed) apart.push(row);
+        if (!failed) rows.push(row);
+        if (failed > 1) continue;
+        for (let i = 0; i < counts.length; i++) {
+          if (failed && i !== where) continue;
+          for (const value of this.facets[i].members[this.facets[i].codes[row]]) counts[i][value]++;
+        }
+      }
+      return { rows, apart, counts: new Map(this.facets.map((f, i) => [f.name, counts[i]])) };
+    }
+
+    /** `rows` by a column: words by their alphabet, numbers by size, what is empty last; equal ones as they were. */
+    sort(rows, name, descending) {
+      const found = this.columns.get(name);
+      if (!found) return rows;
+      const turn = descending ? -1 : 1;
+      const key = new Float64Array(this.count);
+      if (found.values) key.set(found.values);
+      else {
+        const texts = found.words || found.texts;
+        const order = texts.map((_, i) => i).sort((a, b) => texts[a].localeCompare(texts[b], "en", { numeric: true }));
+        const rank = new Float64Array(texts.length);
+        order.forEach((at, i) => (rank[at] = texts[at] === "" ? NaN : i));
+        for (let row = 0; row < this.count; row++) key[row] = rank[found.words ? found.codes[row] : row];
+      }
+      const empty = (row) => Number.isNaN(key[row]);
+      return [...rows].sort((a, b) => empty(a) - empty(b) || (empty(a) ? a - b : turn * (key[a] - key[b]) || a - b));
+    }
+  }
+
+  return { Table, FACETS };
+})();

@@ -1,0 +1,171 @@
+"use strict";
+// Golden against faulty on one time axis: a panel for each channel, marks of what happened when, and beneath
+// each panel a strip of how much the two differ. Series are in the page, or in series/<experiment>.js beside it.
+
+const Series = (() => {
+  const { el, svg } = Dom;
+  const LEFT = 62, RIGHT = 10, HEIGHT = 78, STRIP = 7, GAP = 4, LABELS = 40, AXIS = 24; // px
+  const waiting = new Map(); // experiment -> what to do with its series, once its script has run
+
+  /** The series that the page carries of an experiment; null: none. */
+  const inPage = (id) => Packed.read(`series-${id}`);
+
+  /** Load the file of an experiment's series; rejects where there is none. */
+  function load(id) {
+    return new Promise((resolve, reject) => {
+      const script = el("script", { src: `series/${id}.js` });
+      waiting.set(id, (text) => resolve(Packed.unpack(text)));
+      script.addEventListener("error", () => reject(new Error(`no file series/${id}.js`)));
+      script.addEventListener("load", () => script.remove());
+      document.head.append(script);
+    });
+  }
+
+  /** What such a file calls. */
+  function loaded(id, text) {
+    waiting.get(id)?.(text);
+    waiting.delete(id);
+  }
+
+  /** Round numbers to label an axis from `low` to `high` with, about `count` of them. */
+  function ticks(low, high, count) {
+    const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
+    const step = power * ([1, 2, 5, 10].find((m) => m * power >= rough) || 10);
+    const made = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) made.push(Number((k * step).toPrecision(12)));
+    return made;
+  }
+
+  /** A line through [times, values], broken where there is no value. */
+  function path([times, values], x, y) {
+    let d = "", isDown = false;
+    for (let i = 0; i < times.length; i++) {
+      if (values[i] === null) isDown = false;
+      else {
+        d += `${isDown ? "L" : "M"}${x(times[i]).toFixed(1)},${y(values[i]).toFixed(1)}`;
+        isDown = true;
+      }
+    }
+    return d;
+  }
+
+  function range(channel) {
+    const values = [...channel.golden[1], ...channel.faulty[1]].filter((v) => v !== null);
+    let low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
+    if (!(low <= high)) [low, high] = [0, 1];
+    // a narrower range would show rounding as something
+    const least = Math.max(1e-6, Math.abs(high) * 1e-3);
+    const margin = Math.max((high - low) * 0.08, least);
+    return [low - margin, high + margin];
+  }
+
+  function panel(channel, data, x, width) {
+    const [low, high] = range(channel);
+    const y = (v) => 4 + ((high - v) / (high - low)) * (HEIGHT - 8);
+    const right = width - RIGHT, below = HEIGHT + GAP;
+    const parts = [svg("rect", { x: LEFT, y: 0, width: right - LEFT, height: HEIGHT, class: "ground" })];
+    if (data.active) {
+      const [from, to] = data.active.map(x);
+      parts.push(svg("rect", { x: from, y: 0, width: Math.max(1, to - from), height: HEIGHT, class: "active" }));
+    }
+    for (const tick of ticks(low, high, 3)) {
+      parts.push(svg("line", { x1: LEFT, x2: right, y1: y(tick), y2: y(tick), class: "rule" }));
+      parts.push(svg("text", { x: LEFT - 6, y: y(tick) + 3.5, "text-anchor": "end" }, String(tick)));
+    }
+    parts.push(svg("path", { d: path(channel.golden, x, y), class: "golden" }));
+    parts.push(svg("path", { d: path(channel.faulty, x, y), class: "faulty" }));
+    parts.push(svg("rect", { x: LEFT, y: below, width: right - LEFT, height: STRIP, class: "strip" }));
+    const wide = (x(channel.until) - LEFT) / channel.strip.length;
+    [...channel.strip].forEach((level, i) => {
+      if (level === "0") return;
+      const opacity = (0.25 + (0.75 * level) / 9).toFixed(2);
+      parts.push(svg("rect", { x: LEFT + i * wide, y: below, width: wide + 0.3, height: STRIP, class: "gap", opacity }));
+    });
+    return svg("g", {}, parts);
+  }
+
+  const KINDS = ["trigger", "manifest", "alert", "hazard"];
+
+  function marks(data, x, width, height) {
+    return data.marks.map(([kind, t, label], i) => {
+      const at = x(t), isLate = at > width - 130;
+      return svg("g", { class: `mark ${KINDS.includes(kind) ? kind : ""}` },
+        svg("line", { x1: at, x2: at, y1: LABELS - 6, y2: height - AXIS }),
+        svg("text", { x: at + (isLate ? -3 : 3), y: 9 + 12 * (i % 3), "text-anchor": isLate ? "end" : "start" }, `${label} ${t.toFixed(2)}`));
+    });
+  }
+
+  /** The value of a line at a time: that of the last point before it. */
+  function at([times, values], t) {
+    let low = 0, high = times.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (times[middle] <= t) low = middle;
+      else high = middle - 1;
+    }
+    return values[low];
+  }
+
+  function drawing(data, channels, width) {
+    const step = HEIGHT + GAP + STRIP + 18, height = LABELS + channels.length * step + AXIS;
+    const x = (t) => LEFT + ((t - data.start) / (data.end - data.start || 1)) * (width - LEFT - RIGHT);
+    const names = channels.map((c) => c.name).join(", ");
+    const made = svg("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", class: "plot", "aria-label": `Golden and faulty run: ${names}` });
+    channels.forEach((channel, i) => {
+      const unit = channel.unit && channel.unit !== "-" ? ` [${channel.unit}]` : "";
+      const largest = channel.largest ? `largest difference ${channel.largest}` : "no difference";
+      const g = svg("g", { transform: `translate(0,${LABELS + i * step + 12})` },
+        svg("text", { x: LEFT, y: -4, class: "name" }, `${channel.name}${unit}`),
+        svg("text", { x: width - RIGHT, y: -4, "text-anchor": "end", class: "said" }, largest),
+        panel(channel, data, x, width));
+      made.append(g);
+    });
+    for (const tick of ticks(data.start, data.end, Math.max(3, width / 110))) {
+      made.append(svg("text", { x: x(tick), y: height - 8, "text-anchor": "middle" }, `${tick} s`));
+    }
+    made.append(...marks(data, x, width, height));
+    const cursor = svg("line", { y1: LABELS, y2: height - AXIS, class: "cursor", visibility: "hidden" });
+    made.append(cursor);
+    return { element: made, cursor, time: (px) => data.start + ((px - LEFT) / (width - LEFT - RIGHT)) * (data.end - data.start), x };
+  }
+
+  /** Draw `channels` of `data` into `place`, as wide as it is, with a line under the pointer and what it says. */
+  function draw(place, data, channels) {
+    const told = el("p.readout", { "aria-live": "off" });
+    const room = el("div");
+    place.append(room, told);
+    let shown = null;
+    const render = () => {
+      const width = Math.max(280, Math.floor(place.clientWidth));
+      if (shown?.width === width) return;
+      shown = { width, ...drawing(data, channels, width) };
+      room.replaceChildren(shown.element);
+    };
+    render();
+    room.addEventListener("pointermove", (event) => {
+      const t = shown.time(event.clientX - shown.element.getBoundingClientRect().left);
+      if (t < data.start || t > data.end) return;
+      for (const name of ["x1", "x2"]) shown.cursor.setAttribute(name, shown.x(t));
+      shown.cursor.setAttribute("visibility", "visible");
+      const value = (v) => (v === null ? "-" : Number(v.toPrecision(4)));
+      told.textContent = `${t.toFixed(2)} s: ` + channels.map((c) => `${c.name} ${value(at(c.golden, t))} → ${value(at(c.faulty, t))}`).join(", ");
+    });
+    new ResizeObserver(render).observe(place);
+  }
+
+  /** Show a series in `place`: what differs, and behind a fold what does not. */
+  function show(place, data) {
+    const differ = data.channels.filter((c) => c.largest), same = data.channels.filter((c) => !c.largest);
+    const legend = el("p.legend", {}, el("span.key.golden"), "golden (no fault)", el("span.key.faulty"), "faulty",
+      data.active ? [el("span.key.active"), "fault active, first to last"] : null, el("span.key.gap"), "difference");
+    place.replaceChildren(legend);
+    const first = differ.length ? differ : same.slice(0, 3), rest = differ.length ? same : same.slice(3);
+    if (!differ.length) place.append(el("p.quiet", {}, "No channel differs from the golden run."));
+    draw(place.appendChild(el("div.plots")), data, first);
+    if (!rest.length) return;
+    const fold = place.appendChild(el("details", {}, el("summary", {}, `${rest.length} channels without a difference`)));
+    fold.addEventListener("toggle", () => draw(fold.appendChild(el("div.plots")), data, rest), { once: true });
+  }
+
+  return { inPage, load, loaded, show };
+})();

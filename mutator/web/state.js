@@ -1,0 +1,96 @@
+"use strict";
+// What is shown, kept in the address behind #, so that it can be shared and Back goes back:
+// #e=EXPERIMENT&q=words&kind=radar%2Fchaff&scenario=S1,S2&sort=-t_hazard&heat=warned
+
+class State {
+  /** `changed(state)` is called after every change, whoever made it. */
+  constructor(changed) {
+    this.changed = changed;
+    this.#read();
+    addEventListener("popstate", () => this.#came());
+  }
+
+  /** A link to a section (#tables) is none of ours: it leaves the state as it is. */
+  static isOurs(fragment) {
+    return fragment === "" || fragment.includes("=");
+  }
+
+  #came() {
+    if (!State.isOurs(location.hash.slice(1))) return;
+    this.#read();
+    this.changed(this);
+  }
+
+  #read() {
+    const fragment = location.hash.slice(1);
+    const given = new Map();
+    for (const part of State.isOurs(fragment) ? fragment.split("&") : []) {
+      const [name, value = ""] = part.split("=");
+      try {
+        given.set(name, value.split(",").map(decodeURIComponent));
+      } catch {
+        // a link cut short in its middle: what can be read of it counts
+      }
+    }
+    const one = (name, otherwise) => (given.get(name) || [otherwise])[0];
+    this.experiment = one("e", "");
+    this.query = one("q", "");
+    this.sort = one("sort", "");
+    this.heat = one("heat", "");
+    this.chosen = new Map();
+    for (const { name } of Rows.FACETS) if (given.has(name)) this.chosen.set(name, new Set(given.get(name)));
+  }
+
+  /** The fragment of this state; with `experiment` of the same with that one opened. */
+  fragment(experiment = this.experiment) {
+    const parts = [];
+    const add = (name, values) => parts.push(`${name}=${values.map(encodeURIComponent).join(",")}`);
+    if (experiment) add("e", [experiment]);
+    if (this.query) add("q", [this.query]);
+    for (const { name } of Rows.FACETS) {
+      const values = this.chosen.get(name);
+      if (values && values.size) add(name, [...values].sort());
+    }
+    if (this.sort) add("sort", [this.sort]);
+    if (this.heat) add("heat", [this.heat]);
+    return parts.join("&");
+  }
+
+  /** Change something (`{query, sort, heat, experiment}`); `replace`: a step too small for Back. */
+  set(change, { replace = false } = {}) {
+    Object.assign(this, change);
+    this.#write(replace);
+  }
+
+  /** Choose exactly `values` of a facet; none: all. */
+  choose(facets, { replace = false } = {}) {
+    for (const [name, values] of Object.entries(facets)) {
+      if (values.length) this.chosen.set(name, new Set(values));
+      else this.chosen.delete(name);
+    }
+    this.#write(replace);
+  }
+
+  /** Choose a value of a facet, or choose it no more. */
+  toggle(name, value) {
+    const values = new Set(this.chosen.get(name) || []);
+    if (!values.delete(value)) values.add(value);
+    this.choose({ [name]: [...values] });
+  }
+
+  clear() {
+    this.chosen.clear();
+    this.query = "";
+    this.#write(false);
+  }
+
+  get isFiltered() {
+    return Boolean(this.query) || [...this.chosen.values()].some((values) => values.size);
+  }
+
+  #write(replace) {
+    const to = `#${this.fragment()}`;
+    if (to !== (location.hash || "#")) history[replace ? "replaceState" : "pushState"](null, "", to);
+    this.changed(this);
+  }
+}
