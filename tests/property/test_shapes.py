@@ -1,0 +1,68 @@
+"""Patches grouped by shape: whatever the values are, each patch is given back, and one label is one shape."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mutator.expand import expand
+from mutator.model import Fault, Hold, Trigger
+from mutator.mutant import build
+from mutator.review.groups import label, parameters, shapes
+from mutator.spec import READINGS
+from mutator.workspace import Workspace
+
+WORKSPACE = Workspace.find(root=Path(__file__).parents[2])
+NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 35.0, 1e22, 5e-324, math.nan, -math.inf])
+CONDITIONS = ["hwt <= 2.0 and rs > 0.0", "not hwt / 2.0 > 1.0", "abs(d_rel) < max(v_ego, 3.0)"]
+
+
+@cache
+def setting() -> tuple[object, object, list[Fault]]:
+    """Target, models, and one fault of each variant in both readings."""
+    manifest, models = WORKSPACE.manifest("openpilot"), WORKSPACE.fault_models()
+    found = {}
+    for reading in READINGS:
+        for spec in WORKSPACE.specs():
+            for fault in expand(spec, 1, reading, models=models, manifest=manifest):
+                found[reading, fault.spec] = fault
+    return manifest, models, list(found.values())
+
+
+@st.composite
+def alike(draw: st.DrawFn) -> list[tuple[Fault, Trigger]]:
+    """A fault with other numbers, as often as wanted, under contexts."""
+    fault = draw(st.sampled_from(setting()[2]))
+    found = []
+    for _ in range(draw(st.integers(1, 4))):
+        injections = []
+        for injection in fault.injections:
+            params = [(k, draw(NUMBERS) if isinstance(v, float) else v) for k, v in injection.params]
+            injections.append(replace(injection, params=tuple(params)))
+        condition = draw(st.sampled_from(CONDITIONS))
+        hold_s = draw(st.floats(0.0, 1e6))
+        trigger = Trigger(name="c", condition=condition, hold=Hold.FOR, hold_s=hold_s, armed_after_s=hold_s)
+        found.append((replace(fault, injections=tuple(injections)), trigger))
+    return found
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(alike(), min_size=1, max_size=3))
+def test_every_patch_is_given_back(families: list[list[tuple[Fault, Trigger]]]) -> None:
+    """The diff with holes, filled with a member's values, is that member's patch, byte for byte."""
+    manifest, models, _ = setting()
+    made = {}
+    for family in families:
+        for fault, trigger in family:
+            patch = build(manifest, models, fault, trigger).patch  # type: ignore[arg-type]
+            made[str(len(made))] = (fault, label(fault, trigger), patch)
+    found = shapes((key, name, patch) for key, (_, name, patch) in made.items())
+    assert len(found) == len({name for _, name, _ in made.values()})
+    for shape in found:
+        named = shape.named(parameters(made[key][0]) for key in shape.members)
+        assert len(set(named.holes)) == len(named.holes)
+        for i, key in enumerate(named.members):
+            assert named.patch(i) == made[key][2]

@@ -1,0 +1,113 @@
+"""Shapes of patches: what varies becomes a hole, what does not stays text."""
+
+from dataclasses import replace
+
+import pytest
+
+from mutator.expand import expand
+from mutator.model import Fault, Hold, Trigger
+from mutator.mutant import build
+from mutator.review.groups import Shape, cut, label, parameters, shapes
+from mutator.trigger import always, at_time
+from mutator.workspace import Workspace
+
+NEAR = Trigger(name="near", condition="hwt <= 2.0")
+FAR = replace(NEAR, name="far", condition="hwt > 2.0 and rs > 0.0")
+
+
+def faults(toy: Workspace, name: str, spec: str = "sensor/distance") -> list[Fault]:
+    manifest, models = toy.manifest("toycar"), toy.fault_models()
+    found = expand(toy.spec(spec), 7, models=models, manifest=manifest)
+    return [fault for fault in found if fault.spec == f"{spec}/{name}"]
+
+
+def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
+    manifest, models = toy.manifest("toycar"), toy.fault_models()
+    return shapes(
+        (f"{i}", label(fault, trigger), build(manifest, models, fault, trigger).patch)
+        for i, (fault, trigger) in enumerate(pairs)
+    )
+
+
+def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
+    """Faults of a variant share one diff with holes, which filled with their values is each one's patch."""
+    pairs = [(fault, trigger) for fault in faults(toycar, "longer") for trigger in (NEAR, FAR)]
+    (shape,) = grouped(toycar, pairs)
+    assert shape.members == tuple(str(i) for i in range(8))
+    manifest, models = toycar.manifest("toycar"), toycar.fault_models()
+    for i, pair in enumerate(pairs):
+        assert shape.patch(i) == build(manifest, models, *pair).patch
+
+
+def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
+    """The table has ids, the trigger's condition and the fault's parameter; what all share is text."""
+    pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
+    (shape,) = grouped(toycar, pairs)
+    named = shape.named(parameters(fault) for fault, _ in pairs)
+    assert named.holes == ("mutant", "id", "by")
+    assert "gap = gap ⟨by⟩  # fi:⟨id⟩" in named.diff
+    assert "gap = max(gap, 0.0)" in named.diff
+    assert [row[2] for row in named.values] == [f"- {-dict(parameters(f))['by']}" for f, _ in pairs]
+
+
+def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
+    """More and less are one diff: `+ 3.0` and `- 3.0` fill the same hole."""
+    first, second, *_ = faults(toycar, "longer")
+    (injection,) = second.injections
+    less = replace(second, injections=(replace(injection, params=(("by", -3.0), ("target", "gap"))),))
+    (shape,) = grouped(toycar, [(first, NEAR), (less, NEAR)])
+    assert shape.values[1][shape.holes.index("1")] == "- 3.0"
+
+
+def test_not_a_number_is_a_value(toycar: Workspace) -> None:
+    """A number that is none stands where numbers stand."""
+    first, second, *_ = faults(toycar, "longer")
+    (injection,) = second.injections
+    params = (("by", float("nan")), ("target", "gap"))
+    wrong = replace(second, injections=(replace(injection, params=params),))
+    (shape,) = grouped(toycar, [(first, NEAR), (wrong, NEAR)])
+    named = shape.named(map(parameters, (first, wrong)))
+    assert named.values[1][named.holes.index("by")] == "+ float('nan')"
+
+
+def test_what_must_be_in_common(toycar: Workspace) -> None:
+    """Another place, another model, bounds or none, another kind of trigger or hold: another shape."""
+    longer, nearer = faults(toycar, "longer")[0], faults(toycar, "nearer")[0]
+    shifted = faults(toycar, "shifted", "sensor/lane")[0]
+    silent = faults(toycar, "no_data", "sensor/silence")[0]
+    triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
+    pairs = [(f, NEAR) for f in (longer, nearer, shifted, silent)] + [(longer, t) for t in triggers[1:]]
+    assert len(grouped(toycar, pairs)) == len(pairs)
+
+
+def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
+    """A shape has the same id whichever faults it was made from."""
+    one, other, *_ = faults(toycar, "longer")
+    (first,), (second,) = grouped(toycar, [(one, NEAR)]), grouped(toycar, [(other, FAR)])
+    assert first.id == second.id
+    assert first.diff != second.diff  # of one member, everything is text
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        "",
+        "no diff at all\n",
+        "diff --git a/a.py b/a.py\n+a = '\0'  # fi:01234567\n",
+        "+x = 3.0  # fi:01234567",
+    ],
+)
+def test_any_text_is_given_back(patch: str) -> None:
+    """What is no patch of a mutant is a shape as well, of itself."""
+    (shape,) = shapes([("a", "", patch), ("b", "", patch)])
+    assert shape.patch(1) == patch
+
+
+def test_pristine_lines_are_never_cut() -> None:
+    """Numbers outside injected lines are the target's: patches that differ in them are not alike."""
+    patch = (
+        "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,2 @@\n x = 3\n+y = 4  # fi:01234567\n"
+    )
+    assert cut(patch).count("\0") == 2
+    assert cut(patch) != cut(patch.replace("x = 3", "x = 5"))
+    assert cut(patch) == cut(patch.replace("y = 4", "y = -5.5e-7"))
