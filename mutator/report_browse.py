@@ -21,7 +21,7 @@ from mutator import planfile, report_series
 from mutator.cli.diffs import readable
 from mutator.errors import MutatorError
 from mutator.ids import plain
-from mutator.model import Experiment, Fault
+from mutator.model import Anchor, Experiment, Fault
 from mutator.review.groups import Shape, shapes
 from mutator.runfolder import RunFolder
 from mutator.tables import Row
@@ -88,7 +88,9 @@ def reading_order(row: Row) -> tuple[str, ...]:
 
 def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     """The results, a column each, and those that are filtered by: `kind`, `ending`, `hazards`, `t_hazard`."""
-    columns: dict[str, list[str]] = {name: [line[name] for line in lines] for name in (lines[0] if lines else ())}
+    columns: dict[str, list[str]] = {
+        name: [line[name] for line in lines] for name in (lines[0] if lines else ())
+    }
     columns["kind"] = [f"{r.module}/{r.fault_type}" for r in rows]
     columns["ending"] = [r.ending for r in rows]
     columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
@@ -161,8 +163,21 @@ class _Codes:
 
 
 def _spec(fault: Fault) -> str:
-    """The fault with its value drawn, as YAML."""
-    return yaml.safe_dump(plain(fault), sort_keys=False, allow_unicode=True, width=100)
+    """The fault with its value drawn, in the words of a spec."""
+    told = {name: value for name, value in plain(fault).items() if value not in (None, [], "")}
+    told["injections"] = [
+        {
+            "at": {"file": i.location.path, "function": i.location.function, **_anchor(i.location.anchor)},
+            "model": i.model,
+            "params": dict(i.params),
+        }
+        for i in fault.injections
+    ]
+    return yaml.safe_dump(told, sort_keys=False, allow_unicode=True, width=100)
+
+
+def _anchor(anchor: Anchor) -> dict[str, Any]:
+    return {anchor.kind.value: anchor.name} | ({"nth": anchor.nth} if anchor.nth else {})
 
 
 def _setting(experiment: Experiment) -> str:

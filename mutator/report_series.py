@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 FOLDER = "series"
 SCHEMA = "report-series/1"
-BUCKETS = 480  # stretches of time, of which highest and lowest value are kept: a plot is about as many dots wide
+BUCKETS = (
+    480  # stretches of time, of which highest and lowest value are kept: a plot is about as many dots wide
+)
 STRIP = 160  # stretches of the strip of differences
 LEVELS = 9  # of it, above none
 DIGITS = 5  # of a value: more than a plot of any size shows
@@ -43,9 +45,9 @@ def chosen(rows: Sequence[Row]) -> list[str]:
             kind = ends.setdefault(f"{row.module}/{row.fault_type}", {})
             kind.setdefault(end or ("", row.ending), []).append(row.experiment_id)
     ranked = []
-    for kind, cells in ends.items():
+    for fault_type, cells in ends.items():
         by_weight = sorted(cells.items(), key=lambda cell: (not cell[0][0], -len(cell[1]), cell[0]))
-        ranked += [(rank, kind, min(ids)) for rank, (_, ids) in enumerate(by_weight)]
+        ranked += [(rank, fault_type, min(ids)) for rank, (_, ids) in enumerate(by_weight)]
     return [name for *_, name in sorted(ranked)[: min(CHOSEN, len(rows) // ONE_IN)]]
 
 
@@ -66,13 +68,18 @@ def carried(folder: RunFolder, workspace: "Workspace", names: Iterable[str]) -> 
 
 def keep(folder: RunFolder, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> Path:
     """Write the series of one experiment to where the page looks for it."""
-    from mutator.report import FOLDER as REPORT
-
-    path = folder.path / REPORT / FOLDER / f"{record.experiment_id}.js"
+    path = series_path(folder, record.experiment_id)
     path.parent.mkdir(parents=True, exist_ok=True)
     data = packed(series(manifest, golden, faulty, record))
     write_atomic(path, f'Series.loaded("{record.experiment_id}", "{data}");\n'.encode())
     return path
+
+
+def series_path(folder: RunFolder, experiment_id: str) -> Path:
+    """Where the page looks for the series of an experiment that it does not carry."""
+    from mutator.report import FOLDER as REPORT
+
+    return folder.path / REPORT / FOLDER / f"{experiment_id}.js"
 
 
 def kept(out: Path) -> list[str]:
@@ -121,8 +128,8 @@ def _line(t: np.ndarray, values: np.ndarray) -> list[list[float | None]]:
 
 
 def thinned(values: np.ndarray, buckets: int = BUCKETS) -> np.ndarray:
-    """Indices of the points that a plot needs: both ends, of each bucket the highest and the lowest, the edges
-    of gaps; of a level stretch its ends."""
+    """Indices of the points that a plot needs: both ends, of each bucket the highest and the lowest, the
+    edges of gaps; of a level stretch its ends."""
     count = len(values)
     points = {0, count - 1}
     if count <= 2 * buckets:
@@ -141,7 +148,8 @@ def thinned(values: np.ndarray, buckets: int = BUCKETS) -> np.ndarray:
 
 
 def _strip(golden: np.ndarray, faulty: np.ndarray) -> tuple[str, float]:
-    """Where the runs differ and how much: a digit for each stretch, 0 for none, 9 for the largest; and that."""
+    """Where the runs differ and how much: a digit for each stretch, 0 for none, 9 for the largest; which
+    that is."""
     same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))
     gap = np.abs(np.nan_to_num(faulty) - np.nan_to_num(golden))
     gap = np.where(same, 0.0, gap)

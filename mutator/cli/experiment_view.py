@@ -160,6 +160,18 @@ def draw(manifest: "TargetManifest", single: "Single", plot: Path) -> Path | Non
     return plot
 
 
+def keep_plot(manifest: "TargetManifest", single: "Single", folder: "RunFolder", plot: Path) -> Path | None:
+    """Draw into `plot`, and leave the series where the report's page finds them; None as `draw`."""
+    from mutator import report_series
+    from mutator.golden import load_trace
+
+    drawn = draw(manifest, single, plot)
+    if drawn:
+        golden, faulty = (load_trace(manifest, out) for out in (single.golden, single.faulty))
+        report_series.keep(folder, manifest, golden, faulty, single.record)
+    return drawn
+
+
 def show_single(terminal: Terminal, manifest: "TargetManifest", single: "Single", *, plot: Path) -> None:
     """Everything about an experiment that was just run alone."""
     patch = single.mutant.patch if single.mutant else ""

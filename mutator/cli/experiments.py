@@ -84,16 +84,17 @@ def show(
 def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | None:
     """The experiment's plot, drawn from its kept trace, or from one made now."""
     from mutator.cli import experiment_view as view
+    from mutator.report_series import series_path
     from mutator.single import rerun as run_again
 
     plot = plot_path(found.folder.path, found.experiment.id)
-    if plot.exists():
+    if plot.exists() and series_path(found.folder, found.experiment.id).exists():
         return plot
     with terminal.wait("no trace was kept: driving it again"):
         single, same = run_again(workspace, found.folder.path, found.experiment.id)
     if not same:
         terminal.note(DIFFERS)
-    return view.draw(workspace.manifest(found.plan.campaign.target), single, plot)
+    return view.keep_plot(workspace.manifest(found.plan.campaign.target), single, found.folder, plot)
 
 
 def _film(
@@ -147,7 +148,7 @@ def plot_path(run: Path, experiment_id: str) -> Path:
 RERUN_EXAMPLES = """\b
 Examples:
   mutator rerun 3f9a                    is the result the same again?
-  mutator rerun 3f9a --trace            the same, and keep its trace and plot
+  mutator rerun 3f9a --trace            the same, and keep its trace and plot, for the report's page, too
 """
 
 
@@ -178,7 +179,8 @@ def rerun(
     plot = None
     if trace:
         manifest = workspace.manifest(found.plan.campaign.target)
-        plot = view.draw(manifest, single, plot_path(found.folder.path, found.experiment.id))
+        drawn = plot_path(found.folder.path, found.experiment.id)
+        plot = view.keep_plot(manifest, single, found.folder, drawn)
     elif not kept_before:
         shutil.rmtree(single.faulty.parent)
     recorded = found.record is not None

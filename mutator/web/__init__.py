@@ -13,7 +13,7 @@ from typing import Any
 
 @cache
 def asset(name: str) -> str:
-    """The text of a file of this folder; CSS and JavaScript are ready for a `<style>` or `<script>` element."""
+    """The text of a file of this folder; CSS and JavaScript are ready for `<style>` and `<script>`."""
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not name.endswith(".html") and ("</script" in text or "</style" in text):
         raise ValueError(f"{name} would end the element it is put into")
@@ -21,7 +21,7 @@ def asset(name: str) -> str:
 
 
 def packed(value: Any) -> str:
-    """`value` as JSON, compressed, in base64: the same text each time; `Packed.unpack` in packed.js reads it."""
+    """`value` as JSON, compressed, in base64, the same text each time; packed.js reads it."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     # mtime 0: a page is the same each time it is made
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode("ascii")

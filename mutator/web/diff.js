@@ -10,7 +10,7 @@ const Diff = (() => {
       "lambda nonlocal not or pass raise return try while with yield True False None self").split(" "));
   // In this order: holes of a shape, the tag of an injected line, comment, strings (whole or to the line's end), number, word.
   const TOKENS =
-    /(⟨[^⟩]*⟩)|(#\s*fi:\S+.*$)|(#.*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"?|'(?:\\.|[^'\\])*'?))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/g;
+    /(⟨[^⟩]*⟩)|(#\s*fi:\S+.*$)|(#.*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/g;
   const CLASSES = [null, "hole", "tag", "comment", "string", "number", "word"];
 
   /** The files of a patch: [{path, isNew, hunks: [{head, lines: [{sign, text, old, new}]}]}]. */
@@ -38,6 +38,19 @@ const Diff = (() => {
       }
     }
     return files;
+  }
+
+  /** Whether each line of a hunk begins inside a docstring, which may have begun above the hunk. */
+  function prose(lines) {
+    const isOdd = (line) => (line.text.match(/"""/g) || []).length % 2 === 1;
+    const first = lines.find(isOdd);
+    // the first quotes open a docstring if words follow them, else they end one
+    let inside = Boolean(first) && !/^\s*[rRfFbB]*"""./.test(first.text);
+    return lines.map((line) => {
+      const before = inside;
+      if (isOdd(line)) inside = !inside;
+      return before;
+    });
   }
 
   /** A line of Python as a list of texts and coloured elements. */
@@ -85,23 +98,38 @@ const Diff = (() => {
     return made;
   }
 
-  function table(file, mode) {
+  function table(hunks, path, mode) {
     const split = mode === "split";
-    const body = file.hunks.map((hunk) => [
-      el("tr.hunk", {}, el("td", { colspan: split ? 4 : 3 }, hunk.head)),
-      split ? pairs(hunk.lines).map(splitRow) : hunk.lines.map(unifiedRow),
-    ]);
-    return el(`table.diff.${split ? "split" : "unified"}`, { "aria-label": `Changes of ${file.path}` }, el("tbody", {}, body));
+    const body = hunks.map((hunk) => {
+      const isProse = prose(hunk.lines);
+      const lines = hunk.lines.map((line, i) => ({ ...line, isProse: isProse[i] }));
+      return [el("tr.hunk", {}, el("td", { colspan: split ? 4 : 3 }, hunk.head)), split ? pairs(lines).map(splitRow) : lines.map(unifiedRow)];
+    });
+    const widths = split ? el("colgroup", {}, ["no", "half", "no", "half"].map((name) => el(`col.${name}`))) : null;
+    return el(`table.diff.${split ? "split" : "unified"}`, { "aria-label": `Changes of ${path}` }, widths, el("tbody", {}, body));
+  }
+
+  // What the probe needs to be called at all is the same in every mutant: it is there, behind a fold.
+  const PROBE = /#\s*fi:(probe|observe)\b/;
+  const changes = (hunk) => hunk.lines.filter((line) => line.sign !== " ");
+  const isProbe = (hunk) => changes(hunk).every((line) => PROBE.test(line.text));
+
+  function sections(files, mode, wanted) {
+    return files.map((file) => ({ ...file, hunks: file.hunks.filter(wanted) })).filter((file) => file.hunks.length).map((file) =>
+      el("section.file", {}, el("h4.path", {}, file.path, file.isNew ? " (new file)" : ""),
+        el("div.scroll", { tabindex: 0, role: "region", "aria-label": file.path }, table(file.hunks, file.path, mode))));
   }
 
   /** Show `patch` in `element`, in place of what is there. */
   function render(element, patch, { mode = "unified" } = {}) {
     const files = parse(patch);
-    element.replaceChildren(
-      ...files.map((file) =>
-        el("section.file", {}, el("h4.path", {}, file.path, file.isNew ? " (new file)" : ""),
-          el("div.scroll", { tabindex: 0, role: "region", "aria-label": file.path }, table(file, mode)))));
+    const shown = sections(files, mode, (hunk) => !isProbe(hunk)), folded = files.flatMap((f) => f.hunks).filter(isProbe).length;
+    element.replaceChildren(...shown);
     if (!files.length) element.append(el("p.quiet", {}, "No change of the source."));
+    if (!folded) return;
+    const fold = el("details", {}, el("summary.quiet", {}, `and ${folded} ${folded > 1 ? "places" : "place"} where the probe is called`));
+    fold.addEventListener("toggle", () => fold.append(...sections(files, mode, isProbe)), { once: true });
+    element.append(fold);
   }
 
   /** The injected lines alone, without their tags: [{path, lines}]. The probe's own lines are left out. */
@@ -109,7 +137,7 @@ const Diff = (() => {
     return parse(patch).filter((file) => !file.isNew).map((file) => ({
       path: file.path,
       lines: file.hunks.flatMap((h) => h.lines)
-        .filter((l) => l.sign === "+" && !/#\s*fi:(probe|observe)\b/.test(l.text))
+        .filter((l) => l.sign === "+" && !PROBE.test(l.text))
         .map((l) => l.text.replace(/\s*#\s*fi:\S+\s*$/, "")),
     })).filter((file) => file.lines.length);
   }

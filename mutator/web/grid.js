@@ -8,21 +8,21 @@ class Grid {
 
   /** Column, title, width in px, and how a cell is filled; `narrow`: also on a telephone. */
   static COLUMNS = [
-    { name: "kind", title: "fault type", px: 210, narrow: true },
-    { name: "variant", title: "variant", px: 110 },
-    { name: "value", title: "value", px: 88, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
-    { name: "scenario", title: "scenario", px: 82, narrow: true },
-    { name: "method", title: "method", px: 82 },
-    { name: "trigger", title: "trigger", px: 100 },
-    { name: "ending", title: "outcome", px: 126, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "t_activation", title: "activated", px: 88, time: true },
-    { name: "t_manifest", title: "manifested", px: 98, time: true },
-    { name: "hazards", title: "hazards", px: 86 },
-    { name: "t_hazard", title: "first hazard", px: 104, time: true },
-    { name: "alerts", title: "alerts", px: 140, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
-    { name: "t_alert", title: "first alert", px: 92, time: true },
-    { name: "reaction_time", title: "reaction", px: 82, time: true },
-    { name: "experiment_id", title: "experiment", px: 100, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
+    { name: "kind", title: "fault type", px: 200, narrow: true },
+    { name: "variant", title: "variant", px: 90 },
+    { name: "value", title: "value", px: 78, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
+    { name: "scenario", title: "scenario", px: 76, narrow: true },
+    { name: "method", title: "method", px: 74 },
+    { name: "trigger", title: "trigger", px: 92 },
+    { name: "ending", title: "outcome", px: 118, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
+    { name: "t_activation", title: "activated", px: 80, time: true },
+    { name: "t_manifest", title: "manifested", px: 88, time: true },
+    { name: "hazards", title: "hazards", px: 72 },
+    { name: "t_hazard", title: "hazard at", px: 80, time: true },
+    { name: "alerts", title: "alerts", px: 124, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
+    { name: "t_alert", title: "alert at", px: 70, time: true },
+    { name: "reaction_time", title: "reaction", px: 74, time: true },
+    { name: "experiment_id", title: "experiment", px: 84, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
   ];
 
   /** How an experiment ended, as a word on its colour. */
@@ -45,7 +45,7 @@ class Grid {
     const { el } = Dom;
     this.heads = Grid.COLUMNS.map((column) => {
       const button = el("button", { type: "button", onclick: () => this.#sortBy(column.name) }, column.title, el("span.arrow", { "aria-hidden": "true" }));
-      return el(`th.${column.narrow ? "narrow" : "wide"}`, { scope: "col", style: `width: ${column.px}px`, "data-column": column.name }, button);
+      return el(`th.${column.narrow ? "narrow" : "wide"}${column.time ? ".time" : ""}`, { scope: "col", style: `width: ${column.px}px`, "data-column": column.name }, button);
     });
     this.body = el("tbody");
     const width = Grid.COLUMNS.reduce((sum, column) => sum + column.px, 0);
