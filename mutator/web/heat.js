@@ -75,7 +75,7 @@ class HeatMap {
     };
     const head = el("tr", {}, el("td"), scenarios.map((s) => el("th", { scope: "col" }, s || "all")));
     const body = kinds.map((kind, y) =>
-      el("tr", {}, el("th", { scope: "row" }, kind || "all"), scenarios.map((_, x) => cell(y, x))));
+      el("tr", {}, el("th", { scope: "row" }, kind ? kind.split(/(?<=[/_])/).flatMap((part) => [part, el("wbr")]) : "all"), scenarios.map((_, x) => cell(y, x))));
     this.place.replaceChildren(el("table.heat", { "aria-label": `${measure.title} by fault type and scenario` },
       el("thead", {}, head), el("tbody", {}, body)));
     if (focused) this.place.querySelector(`[data-at="${focused}"]`)?.focus();

@@ -1,6 +1,9 @@
 """`mutator show --video` and `--still`, by the commands that the toy's manifest names."""
 
+import base64
+import gzip
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -61,11 +64,15 @@ def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
 
 
 def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
-    """It is kept beside the plots, and the page links it by its time."""
+    """It is kept beside the plots, and the page carries it with its time."""
     answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
     assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
     page = Path(cli("report", "runs/a", "--json").json["page"])
-    assert f'<a href="../plots/{name}-1.50s.jpg">1.50 s</a>' in page.read_text()
+    [data] = re.findall(r'id="media">([^<]*)</script>', page.read_text())
+    [[time, picture]] = json.loads(gzip.decompress(base64.b64decode(data)))[name]["stills"]
+    assert time == "1.50"
+    kept = Path("runs/a/plots") / f"{name}-1.50s.jpg"
+    assert base64.b64decode(picture.partition(",")[2]) == kept.read_bytes()
 
 
 def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:

@@ -1,13 +1,17 @@
 """The report of a run folder."""
 
+import base64
 import csv
+import gzip
 import json
+import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from mutator import report
+from mutator import planfile, report, report_page
 from mutator.columns import COLUMNS
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
@@ -51,29 +55,46 @@ OK = {
     "h3": "0",
 }
 NONE = {"outcome": "", "h1": "", "t_h1": "", "h2": "", "h3": ""}
+PATCH = """\
+diff --git a/pkg/_fi.py b/pkg/_fi.py
+new file mode 100644
+--- /dev/null
++++ b/pkg/_fi.py
+@@ -0,0 +1,1 @@
++HOLD = "while"
+diff --git a/pkg/radar.py b/pkg/radar.py
+--- a/pkg/radar.py
++++ b/pkg/radar.py
+@@ -1,2 +1,3 @@
+ d_rel = see()
++d_rel = d_rel + 35.0  # fi:0a1b2c3d
+ v_rel = 0
+"""
 BAD = OK | NONE | {"status": "harness_error", "detail": "the disk | is <gone>"}
 CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run folder with a hazard, a crash and a harness error; the hazard has its patch and plot."""
+    """A run folder with a hazard, a crash and a harness error; the hazard has its patch and a still."""
     (tmp_path / "run.json").write_text(json.dumps(HEAD))
     with (tmp_path / "results.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
         table.writeheader()
         for i, line in enumerate((OK, BAD, CRASHED)):
             table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
-    for file in ("patches/00/" + "0" * 16 + ".patch", "plots/" + "0" * 16 + ".svg"):
-        (tmp_path / file).parent.mkdir(parents=True)
-        (tmp_path / file).touch()
+    planfile.write(tmp_path, [], [])
+    (tmp_path / "patches/00").mkdir(parents=True)
+    (tmp_path / "patches/00" / ("0" * 16 + ".patch")).write_text(PATCH)
+    (tmp_path / "plots").mkdir()
+    (tmp_path / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
     return tmp_path
 
 
 class Page(HTMLParser):
     """Text and links of a page; fails on tags that are not closed in order."""
 
-    VOID = ("meta", "link", "br", "img")
+    VOID = ("meta", "link", "br", "img", "input")
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -114,13 +135,45 @@ def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
     assert "the disk | is <gone>" in page.texts
 
 
-def test_the_page_links_what_is_there_and_nothing_else(run: Path) -> None:
-    """Diff and plot of an experiment are linked when they exist; nothing comes from elsewhere."""
+def carried(page: Path, name: str) -> Any:
+    """What a page carries in the script element `name`."""
+    [text] = re.findall(rf'id="{name}">([^<]*)</script>', page.read_text())
+    return json.loads(gzip.decompress(base64.b64decode(text)))
+
+
+def test_the_page_needs_no_other_file(run: Path) -> None:
+    """Whatever it shows is in it: its links lead into itself, and nothing comes from elsewhere."""
     written = report.write(run, None)
     page = Page(written.page.read_text())
-    assert len(page.links) == 2
-    assert all((written.page.parent / link).is_file() for link in page.links)
-    assert "http" not in written.page.read_text()
+    assert page.links
+    assert all(link.startswith(("#", "data:")) for link in page.links)
+    assert "http" not in written.page.read_text().replace("http://www.w3.org/2000/svg", "")
+
+
+def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> None:
+    """All columns of the results, the diff without the probe, and the picture itself."""
+    page = report.write(run, None).page
+    table = carried(page, "table")
+    columns = {column["name"]: column for column in table["columns"]}
+    assert table["count"] == 3
+    assert {*COLUMNS, "variant", "detail"} < columns.keys()
+    ids = columns["experiment_id"]["texts"]
+    at = ids.index("0" * 16)
+    assert columns["t_h1"]["numbers"][at] == 18.25
+    details = carried(page, "details")
+    shape = details["shapes"][details["shape"][at]]
+    assert "".join(shape["parts"]) == PATCH[PATCH.index("diff --git a/pkg/radar.py") :]
+    [[time, picture]] = carried(page, "media")["0" * 16]["stills"]
+    assert time == "14.50"
+    assert base64.b64decode(picture.partition(",")[2]) == b"picture"
+
+
+def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page of 100,000 crashes does not list each; the rest is one filter away."""
+    monkeypatch.setattr(report_page, "PAGE_LISTED", 1)
+    text = report.write(run, None).page.read_text()
+    assert "1 more: " in text
+    assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
 
 
 def test_the_report_says_what_it_comes_from(run: Path) -> None:
@@ -160,9 +213,12 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
         other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
         csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="").writerow(other)
     written = report.write(run, None)
-    shown = [link for link in Page(written.page.read_text()).links if link.startswith("figures/")]
-    assert len(shown) == 6
-    assert all((run / "report" / link).is_file() for link in shown)
+    shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
+    files = sorted((run / "report" / "figures").glob("*.svg"))
+    assert sorted(base64.b64decode(link.partition(",")[2]) for link in shown) == sorted(
+        f.read_bytes() for f in files
+    )
+    assert len(shown) == 3
     assert written.markdown.read_text().count("](figures/") == 3
 
 
@@ -229,4 +285,5 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
     for text in (written.markdown.read_text(), " ".join(Page(written.page.read_text()).texts)):
         assert "No figure: the traces it needs cannot be had" in text
         assert "t_h1 > t_activation" in text
-    assert "action_" not in written.markdown.read_text() + written.page.read_text()
+    assert "action_" not in written.markdown.read_text()
+    assert "<figure" not in written.page.read_text().replace('el("figure"', "")

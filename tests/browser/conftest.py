@@ -1,0 +1,143 @@
+"""The report's page in the system's Chromium: a run of the toy with made-up records, and a browser to open it.
+
+Nothing is driven: what is tested is the page. Every test fails on an error in the browser's console.
+"""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mutator import report, report_series, results
+from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.mutant import build
+from mutator.plan import freeze, make_plan
+from mutator.records import SCHEMA, LineWriter
+from mutator.runfolder import RunFolder
+from mutator.workspace import Workspace
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A headless Chromium; without one, or without playwright, the tests are skipped."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (extra `test`)")
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f"no browser here: none of {', '.join(BROWSERS)} is on the PATH")
+    flags = [*FLAGS, "--no-sandbox"] if os.geteuid() == 0 else [*FLAGS]
+    with sync_api.sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=found, args=flags)
+        yield started
+        started.close()
+
+
+def record(experiment: Experiment, number: int) -> Record:
+    """A made-up record: every fifth experiment is not active, three of ten end in a hazard; one harness
+    error, one crash."""
+    status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
+    active = number % 5 > 0
+    hazard = status is Status.OK and number % 10 > 6
+    outcome = Outcome.HAZARD if hazard else Outcome.SDC if active else Outcome.NOT_ACTIVATED
+    return Record(
+        experiment_id=experiment.id,
+        status=status,
+        outcome=outcome if status is Status.OK else None,
+        detail="" if status is Status.OK else "<b>the disk</b> is gone",
+        tree="f" * 64,
+        activation=Activation(first=1.0 + number / 10, last=5.0, count=number) if active else None,
+        t_manifest=1.5 + number / 10 if active else None,
+        max_dev=(("gas", number / 7), ("brake", 0.0), ("wheel_turn", 0.0)),
+        hazards=(("H3", 4.0 + number / 10),) if hazard else (),
+        alerts=(("brake_hard", 3.0),) if hazard and number % 2 else (),
+        trace_digest="f" * 64,
+    )
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+    """A run folder of 24 experiments with its report; the series of the first is in a file of its own."""
+    folder = tmp_path_factory.mktemp("browser")
+    workspace = copy_toycar(folder)
+    plan = make_plan(workspace, "toy")
+    out = freeze(plan, folder / "run", workspace)
+    manifest, models = workspace.manifest("toycar"), workspace.fault_models()
+    lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    for number, experiment in enumerate(plan.experiments):
+        lines.append(asdict(record(experiment, number)))
+        patch = out.patch(experiment.id)
+        patch.parent.mkdir(parents=True, exist_ok=True)
+        patch.write_bytes(build(manifest, models, experiment.fault, experiment.trigger).patch_bytes)
+    lines.close()
+    results.build(out.path)
+    t = np.arange(0.0, 6.0, 0.05)
+    names = ("gas", "brake", "wheel_turn", "gap", "speed")
+    golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}
+    faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
+    report_series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7))
+    report.write(out.path, None)
+    return out.path
+
+
+class Page:
+    """An open report: playwright's page with the steps that several tests take."""
+
+    def __init__(self, page: Any, url: str) -> None:
+        self.page = page
+        self.url = url
+        self.errors: list[str] = []
+        page.on("console", lambda m: self.errors.append(m.text) if m.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def open(self, fragment: str = "") -> "Page":
+        self.page.goto("about:blank")
+        self.page.goto(f"{self.url}#{fragment}" if fragment else self.url)
+        self.page.wait_for_selector("html[data-ready]")
+        return self
+
+    @property
+    def fragment(self) -> str:
+        return str(self.page.evaluate("location.hash.slice(1)"))
+
+    @property
+    def found(self) -> str:
+        """What stands above the table: `24 experiments`."""
+        return str(self.page.inner_text("#found"))
+
+    def column(self, name: str) -> list[str]:
+        """The texts of a column, of the rows that are in the page."""
+        script = """name => {
+            const at = [...document.querySelectorAll('#grid th')].findIndex((th) => th.dataset.column === name);
+            return [...document.querySelectorAll('#grid tbody tr[data-at]')].map((tr) => tr.cells[at].innerText);
+        }"""
+        return list(self.page.evaluate(script, name))
+
+    def choose(self, facet: str, value: str) -> None:
+        self.page.click(f'[data-facet="{facet}"] > summary')
+        self.page.click(f'[data-facet="{facet}"] .option:has-text("{value}")')
+        self.page.keyboard.press("Escape")
+
+
+@pytest.fixture
+def page(browser: Any, run: Path) -> Iterator[Page]:
+    """The report on a wide screen."""
+    context = browser.new_context(viewport={"width": 1400, "height": 900}, reduced_motion="reduce")
+    context.set_default_timeout(20_000)
+    made = Page(context.new_page(), (run / "report" / "index.html").as_uri())
+    yield made.open()
+    context.close()
+    assert made.errors == []

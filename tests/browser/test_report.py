@@ -1,0 +1,187 @@
+"""The report's page as a reader uses it."""
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from .conftest import Page
+
+COUNT = 24
+
+
+@pytest.fixture(scope="module")
+def rows(run: Path) -> list[dict[str, str]]:
+    """results.csv."""
+    with (run / "results.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
+    """Two facets and a search narrow the table to what results.csv says; Back takes each step back."""
+    hazards = [row for row in rows if row["outcome"] == "hazard"]
+    page.choose("outcome", "hazard")
+    assert page.found == f"{len(hazards)} of {COUNT} experiments"
+    assert set(page.column("ending")) == {"hazard"}
+    page.choose("scenario", "B")
+    both = [row for row in hazards if row["scenario"] == "B"]
+    assert len(page.column("scenario")) == len(both) > 0
+    assert page.fragment == "scenario=B&outcome=hazard"
+    page.page.go_back()
+    page.page.wait_for_function(
+        "n => document.querySelectorAll('#grid tr[data-at]').length === n", arg=len(hazards)
+    )
+    page.page.fill("#search", hazards[0]["experiment_id"][:6])
+    page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length === 1")
+    page.page.click(".chips .clear")
+    assert page.found == f"{COUNT} experiments"
+
+
+def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: list[dict[str, str]]) -> None:
+    """Up, then down, then as it was; numbers by size."""
+    before = page.column("experiment_id")
+    times = sorted(f"{float(row['t_activation']):.2f}" for row in rows if row["t_activation"])
+    head = '#grid th[data-column="t_activation"]'
+    page.page.click(f"{head} button")
+    shown = page.column("t_activation")
+    assert [float(t) for t in shown if t] == sorted(map(float, times))
+    assert shown[len(times) :] == [""] * (COUNT - len(times))
+    assert page.page.get_attribute(head, "aria-sort") == "ascending"
+    page.page.click(f"{head} button")
+    assert [float(t) for t in page.column("t_activation") if t] == sorted(map(float, times), reverse=True)
+    page.page.click(f"{head} button")
+    assert page.column("experiment_id") == before
+
+
+def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run: Path) -> None:
+    """The injected lines of its patch, side by side and unified; the folder it was opened from is in the
+    commands; Back closes it."""
+    page.page.click("#grid tr[data-at] >> nth=0")
+    page.page.wait_for_selector("#experiment .diff")
+    name = page.fragment.removeprefix("e=")
+    patch = (run / "patches" / name[:2] / f"{name}.patch").read_text()
+    tagged = [line[1:] for line in patch.splitlines() if line.startswith("+") and "# fi:" in line]
+    injected = [line for line in tagged if "fi:probe" not in line and "fi:observe" not in line]
+    for mode in ("Side by side", "Unified"):
+        page.page.click(f"#experiment button:has-text('{mode}')")
+        added = page.page.eval_on_selector_all(
+            "#experiment .change .added code", "all => all.map((c) => c.textContent)"
+        )
+        assert added == injected
+    assert "_fi.active" in page.page.inner_text("#experiment .snippet pre")
+    assert "# fi:" not in page.page.inner_text("#experiment .snippet pre")
+    assert "after_assign:" in page.page.inner_text("#experiment .spec pre")
+    commands = page.page.eval_on_selector_all(
+        "#experiment .command code", "all => all.map((c) => c.textContent)"
+    )
+    assert f"mutator rerun {name} --run {run}" in commands
+    assert any(command.startswith("mutator try sensor/") for command in commands)
+    page.page.go_back()
+    page.page.wait_for_selector("#experiment", state="hidden")
+
+
+def test_series_are_loaded_from_their_file(page: "Page", run: Path) -> None:
+    """An experiment whose series is a file shows its plots, marks and strip; one without says the command."""
+    [file] = (run / "report" / "series").glob("*.js")
+    page.open(f"e={file.stem}")
+    page.page.wait_for_selector("#experiment .plot")
+    text = page.page.inner_text("#experiment .plots-of")
+    assert "largest difference 0.3" in text
+    assert "4 channels without a difference" in text
+    assert page.page.locator("#experiment .plot .mark.hazard").count() == 1
+    assert page.page.locator("#experiment .plot .gap").count() > 10
+    page.page.hover("#experiment .plot")
+    assert "→" in page.page.inner_text("#experiment .readout")
+    page.page.keyboard.press("j")
+    page.page.wait_for_selector("#experiment .plots-of .command")
+    assert "--trace" in page.page.inner_text("#experiment .plots-of .command")
+
+
+def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
+    """Its text is the counts, which follow the other filters; pressed again it lets go."""
+    cell = '#heat button[aria-label^="sensor/lane in B:"]'
+    here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
+    used = [row for row in here if row["status"] != "harness_error"]
+    active = [row for row in used if row["t_activation"]]
+    hazards = [row for row in active if row["outcome"] == "hazard"]
+    assert page.page.inner_text(cell) == f"{len(hazards)}/{len(active)}"
+    page.page.click(cell)
+    assert page.found == f"{len(here)} of {COUNT} experiments"
+    assert page.page.get_attribute(cell, "aria-pressed") == "true"
+    page.page.select_option("#measure", "activated")
+    assert page.page.inner_text(cell) == f"{len(active)}/{len(used)}"
+    assert page.fragment == "kind=sensor%2Flane&scenario=B&heat=activated"
+    page.page.click(cell)
+    assert page.found == f"{COUNT} experiments"
+
+
+def test_a_shared_link_shows_the_same(page: "Page") -> None:
+    """Filter, order and opened experiment come back from the address alone."""
+    page.choose("method", "guided")
+    page.page.click('#grid th[data-column="scenario"] button')
+    page.page.click("#grid tr[data-at] >> nth=2")
+    shown, fragment = page.column("experiment_id"), page.fragment
+    title = page.page.inner_text("#experiment h2")
+    page.open(fragment)
+    assert page.column("experiment_id") == shown
+    assert page.page.inner_text("#experiment h2") == title
+    page.open("e=0123456789abcdef")
+    assert "No such experiment" in page.page.inner_text("#experiment")
+
+
+def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
+    """`/` searches, j and k move, Enter opens, j goes on while it is open, Esc closes, ? helps."""
+    keys, focused = page.page.keyboard, "document.activeElement.dataset.at"
+    keys.press("/")
+    assert page.page.evaluate("document.activeElement.id") == "search"
+    keys.press("Escape")
+    keys.press("j")
+    assert page.page.evaluate(focused) == "1"
+    keys.press("ArrowDown")
+    keys.press("k")
+    keys.press("Enter")
+    first = page.fragment
+    assert first.startswith("e=")
+    keys.press("j")
+    assert page.fragment != first
+    keys.press("Escape")
+    assert page.fragment == ""
+    assert page.page.evaluate(focused) == "2"
+    keys.press("?")
+    assert page.page.is_visible("#help")
+    keys.press("Escape")
+    assert not page.page.is_visible("#help")
+
+
+def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]]) -> None:
+    """What a crashed run said is shown as it is."""
+    crashed = next(row["experiment_id"] for row in rows if row["status"] == "crashed")
+    page.open(f"e={crashed}")
+    assert page.page.inner_text("#experiment .detail") == "<b>the disk</b> is gone"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path, scheme: str) -> None:
+    """At 400 pixels nothing but tables is wider than the screen; an experiment fills it."""
+    context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
+    page = context.new_page()
+    page.goto((run / "report" / "index.html").as_uri())
+    page.wait_for_selector("html[data-ready]")
+    width = "document.documentElement.scrollWidth"
+    assert page.evaluate(width) == 400
+    page.click("#grid tr[data-at] >> nth=0")
+    page.wait_for_selector("#experiment .diff")
+    assert page.evaluate("document.querySelector('#experiment').clientWidth") == 400
+    assert page.evaluate("document.querySelector('#experiment').scrollWidth") == 400
+    context.close()
+
+
+def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
+    """Printing does not depend on how far the table was scrolled, and leaves out what is for a screen."""
+    page.page.emulate_media(media="print")
+    page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert len(page.column("experiment_id")) == COUNT
+    assert not page.page.is_visible("#facets")
+    page.page.evaluate("dispatchEvent(new Event('afterprint'))")
