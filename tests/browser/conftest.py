@@ -1,4 +1,4 @@
-"""The report's page in the system's Chromium: a run of the toy with made-up records, and a browser to open it.
+"""The report's page in the system's Chromium: a run of the toy with made-up records, a browser to open it.
 
 Nothing is driven: what is tested is the page. Every test fails on an error in the browser's console.
 """
@@ -121,10 +121,19 @@ class Page:
     def column(self, name: str) -> list[str]:
         """The texts of a column, of the rows that are in the page."""
         script = """name => {
-            const at = [...document.querySelectorAll('#grid th')].findIndex((th) => th.dataset.column === name);
-            return [...document.querySelectorAll('#grid tbody tr[data-at]')].map((tr) => tr.cells[at].innerText);
+            const heads = [...document.querySelectorAll('#grid th')];
+            const rows = [...document.querySelectorAll('#grid tr[data-at]')];
+            return rows.map((tr) => tr.cells[heads.findIndex((th) => th.dataset.column === name)].innerText);
         }"""
         return list(self.page.evaluate(script, name))
+
+    def texts(self, selector: str) -> list[str]:
+        """The texts of all elements that are selected."""
+        return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
+
+    def wait_for_rows(self, count: int) -> None:
+        script = "n => document.querySelectorAll('#grid tr[data-at]').length === n"
+        self.page.wait_for_function(script, arg=count)
 
     def choose(self, facet: str, value: str) -> None:
         self.page.click(f'[data-facet="{facet}"] > summary')

@@ -34,7 +34,7 @@ def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list
         "n => document.querySelectorAll('#grid tr[data-at]').length === n", arg=len(hazards)
     )
     page.page.fill("#search", hazards[0]["experiment_id"][:6])
-    page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length === 1")
+    page.wait_for_rows(1)
     page.page.click(".chips .clear")
     assert page.found == f"{COUNT} experiments"
 

@@ -1,0 +1,193 @@
+"""How large the report's page is and how fast it opens, for 1,000, 11,280 and 100,000 experiments.
+
+`python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, again with
+other seeds where more are wanted, with made-up records; their diffs are those of their mutants. The page is
+opened in the system's Chromium, headless; times are wall time in the browser, from the navigation on, best of
+several: until the table can be used, then for the first filter, sort, search and opened experiment. Exit code 1
+where 11,280 experiments do not open in time.
+"""
+
+import argparse
+import csv
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+from growth import record
+from markupsafe import Markup
+
+from mutator import report_browse, report_page, report_series, results, tables
+from mutator.cli.diffs import readable
+from mutator.columns import COLUMNS
+from mutator.model import Experiment, Record
+from mutator.mutant import build
+from mutator.plan import make_plan
+from mutator.report import Content
+from mutator.report_browse import Browse
+from mutator.review.groups import shapes
+from mutator.web import embedded
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[1]
+SIZES = (1_000, 11_280, 100_000)
+GOAL_SIZE, GOAL_MS = 11_280, 2_000.0
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = ("--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
+FLAGS += ("--disable-component-update", "--disable-sync")
+WATCH = """new MutationObserver(() => {
+    if (document.documentElement?.dataset.ready) window.readyAt ??= performance.now();
+}).observe(document, {attributes: true, subtree: true, attributeFilter: ["data-ready"]})"""
+SHOWN = "await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+TIMED = f"""async () => {{
+    const began = performance.now();
+    STEP;
+    {SHOWN};
+    return performance.now() - began;
+}}"""
+CLEARED = f"async () => {{ document.querySelector('#chips .clear, #chips .chip')?.click(); {SHOWN} }}"
+STEPS = {  # what a reader does first
+    "filter": "document.querySelector('#heat .cell:not(.nothing)').click()",
+    "sort": "document.querySelector('[data-column=t_hazard] button').click()",
+    "search": "const s = document.querySelector('#search'); s.value = 'chaff 35'; s.dispatchEvent(new Event('input'));"
+    " await new Promise((done) => setTimeout(done, 120))",
+    "experiment": "document.querySelector('#grid tr[data-at]').click();"
+    " while (!document.querySelector('#experiment .diff')) await new Promise((done) => setTimeout(done, 1))",
+}
+
+
+def experiments_of(workspace: Workspace, size: int) -> list[Experiment]:
+    """The paper's experiments, with other seeds where there are too few."""
+    planned = make_plan(workspace, "paper").experiments
+    return [replace(planned[i % len(planned)], seed=1 + i // len(planned)) for i in range(size)]
+
+
+def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator[tuple[str, str, str]]:
+    """The diffs without the probe: an experiment has the same with another seed."""
+    manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
+    known: dict[tuple[Any, ...], str] = {}
+    for experiment in experiments:
+        key = (experiment.fault.id, experiment.trigger)
+        if key not in known:
+            known[key] = readable(build(manifest, models, experiment.fault, experiment.trigger).patch)[0]
+        yield experiment.id, "", known[key]
+
+
+def made_series(workspace: Workspace, records: Sequence[Record]) -> Iterator[Markup]:
+    """As many series as a page carries, of traces that are as long as real ones."""
+    manifest = workspace.manifest("openpilot")
+    draw = np.random.default_rng(1)
+    channels = [channel.name for channel in (*manifest.compared, *manifest.plotted)]
+    for one in records[: report_series.CHOSEN]:
+        golden = {"t": np.arange(3000) / 100}
+        faulty = {"t": np.arange(3000) / 100}
+        for name in channels:
+            golden[name] = draw.normal(size=3000).cumsum().cumsum()
+            change = draw.normal(size=2000).cumsum().cumsum()  # as long as the fault is active
+            faulty[name] = golden[name] + np.concatenate((np.zeros(1000), change))
+        data = report_series.series(manifest, golden, faulty, one)
+        yield Markup(embedded(data, f"series-{one.experiment_id}"))
+
+
+def write(size: int, out: Path) -> dict[str, float]:
+    """Write the page of so many experiments; what it took and how large its parts are, KB."""
+    workspace = Workspace.find(root=ROOT)
+    experiments = experiments_of(workspace, size)
+    records = [record(experiment, number) for number, experiment in enumerate(experiments)]
+    made = [results.row(e, r) for e, r in zip(experiments, records, strict=True)]
+    with (out / "results.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, [*COLUMNS, "variant", "aim", "condition", "detail"], restval="")
+        writer.writeheader()
+        writer.writerows(made)
+    began = process_time()
+    rows = tables.read_results(out / "results.csv")
+    with (out / "results.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    table = embedded(report_browse.table(rows, lines), "table")
+    table_s = process_time() - began
+    details = report_browse.details(experiments, shapes(patches(workspace, experiments)), rows)
+    detail = embedded(details, "details")
+    series = list(made_series(workspace, records))
+    browse = Browse(
+        facts=Markup(json.dumps({"filmed": True, "series": []})),
+        scripts=(*map(Markup, (table, detail, embedded({}, "media"))), *series),
+        carried=len(series),
+        carried_kb=0,
+    )
+    content = Content(
+        name=f"{size} experiments",
+        facts=[],
+        planned="",
+        outcomes=tables.outcome_counts(rows),
+        tables=[],
+        observations=None,
+        statistics=(),
+        figures=(),
+        failed=[],
+        engine=None,
+        browse=browse,
+    )
+    page = report_page.page(content, out)
+    (out / "index.html").write_text(page)
+    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "series_kb": "".join(series)}
+    return {"table_s": table_s} | {name: len(text.encode()) / 1000 for name, text in sizes.items()}
+
+
+def opened(browser: Any, page_file: Path, repeat: int) -> dict[str, float]:
+    """The best times in ms: until the page is ready, and of each step after it."""
+    times: dict[str, list[float]] = {"open_ms": [], **{f"{name}_ms": [] for name in STEPS}}
+    for _ in range(repeat):
+        context = browser.new_context(viewport={"width": 1400, "height": 900})
+        page = context.new_page()
+        page.add_init_script(WATCH)
+        page.goto(page_file.as_uri())
+        page.wait_for_function("window.readyAt", timeout=120_000)
+        times["open_ms"].append(page.evaluate("window.readyAt"))
+        for name, step in STEPS.items():
+            times[f"{name}_ms"].append(page.evaluate(TIMED.replace("STEP", step)))
+            page.evaluate(CLEARED)
+        context.close()
+    return {name: min(values) for name, values in times.items()}
+
+
+def main() -> int:
+    from playwright.sync_api import sync_playwright
+
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
+    parser.add_argument("--repeat", type=int, default=5)
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    options = parser.parse_args()
+    browser_path = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
+    if browser_path is None:
+        parser.error("no Chromium on the PATH")
+    flags = [*FLAGS, "--no-sandbox"] if os.geteuid() == 0 else [*FLAGS]
+    found = {}
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
+        browser = playwright.chromium.launch(executable_path=browser_path, args=flags)
+        for size in options.sizes:
+            found[size] = write(size, Path(folder))
+            found[size] |= opened(browser, Path(folder) / "index.html", options.repeat)
+        browser.close()
+    names = list(next(iter(found.values())))
+    print("experiments " + " ".join(f"{name:>13}" for name in names))
+    for size, figures in found.items():
+        print(f"{size:>11,} " + " ".join(f"{figures[name]:13,.1f}" for name in names))
+    if options.json:
+        options.json.write_text(json.dumps(found, indent=1) + "\n")
+    late = found.get(GOAL_SIZE, {}).get("open_ms", 0.0) > GOAL_MS
+    if late:
+        print(f"{GOAL_SIZE} experiments do not open in {GOAL_MS / 1000} s")
+    return 1 if late else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
