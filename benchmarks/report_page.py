@@ -1,10 +1,10 @@
 """How large the report's page is and how fast it opens, for 1,000, 11,280 and 100,000 experiments.
 
-`python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, again with
+`python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, with
 other seeds where more are wanted, with made-up records; their diffs are those of their mutants. The page is
-opened in the system's Chromium, headless; times are wall time in the browser, from the navigation on, best of
-several: until the table can be used, then for the first filter, sort, search and opened experiment. Exit code 1
-where 11,280 experiments do not open in time.
+opened in the system's Chromium, headless; times are wall time in the browser, from the navigation on, best
+of several: until the table can be used, then for the first filter, sort, search and opened experiment. Exit
+code 1 where 11,280 experiments do not open in time.
 """
 
 import argparse
@@ -55,8 +55,8 @@ CLEARED = f"async () => {{ document.querySelector('#chips .clear, #chips .chip')
 STEPS = {  # what a reader does first
     "filter": "document.querySelector('#heat .cell:not(.nothing)').click()",
     "sort": "document.querySelector('[data-column=t_hazard] button').click()",
-    "search": "const s = document.querySelector('#search'); s.value = 'chaff 35'; s.dispatchEvent(new Event('input'));"
-    " await new Promise((done) => setTimeout(done, 120))",
+    "search": "const s = document.querySelector('#search'); s.value = 'chaff 35';"
+    " s.dispatchEvent(new Event('input')); await new Promise((done) => setTimeout(done, 120))",
     "experiment": "document.querySelector('#grid tr[data-at]').click();"
     " while (!document.querySelector('#experiment .diff')) await new Promise((done) => setTimeout(done, 1))",
 }

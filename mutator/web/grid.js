@@ -8,21 +8,21 @@ class Grid {
 
   /** Column, title, width in px, and how a cell is filled; `narrow`: also on a telephone. */
   static COLUMNS = [
-    { name: "kind", title: "fault type", px: 200, narrow: true },
-    { name: "variant", title: "variant", px: 90 },
+    { name: "kind", title: "fault type", px: 196, narrow: true },
+    { name: "variant", title: "variant", px: 86 },
     { name: "value", title: "value", px: 78, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
     { name: "scenario", title: "scenario", px: 76, narrow: true },
     { name: "method", title: "method", px: 74 },
-    { name: "trigger", title: "trigger", px: 92 },
-    { name: "ending", title: "outcome", px: 118, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "t_activation", title: "activated", px: 80, time: true },
-    { name: "t_manifest", title: "manifested", px: 88, time: true },
+    { name: "trigger", title: "trigger", px: 86 },
+    { name: "ending", title: "outcome", px: 112, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
+    { name: "t_activation", title: "activated", px: 76, time: true },
+    { name: "t_manifest", title: "manifested", px: 86, time: true },
     { name: "hazards", title: "hazards", px: 72 },
     { name: "t_hazard", title: "hazard at", px: 80, time: true },
-    { name: "alerts", title: "alerts", px: 124, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
+    { name: "alerts", title: "alerts", px: 108, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
     { name: "t_alert", title: "alert at", px: 70, time: true },
     { name: "reaction_time", title: "reaction", px: 74, time: true },
-    { name: "experiment_id", title: "experiment", px: 84, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
+    { name: "experiment_id", title: "experiment", px: 80, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
   ];
 
   /** How an experiment ended, as a word on its colour. */
@@ -95,11 +95,11 @@ class Grid {
     const last = all ? Math.min(this.rows.length, Grid.PRINTED) : Math.min(this.rows.length, first + seen + 2 * Grid.SPARE);
     const hadFocus = this.body.contains(document.activeElement);
     const space = (count) =>
-      count > 0 ? el("tr.space", { "aria-hidden": "true", style: `height: ${count * Grid.ROW_PX}px` }, el("td", { colspan: Grid.COLUMNS.length })) : null;
+      count > 0 ? el("tr.space", { "aria-hidden": "true", style: `height: ${count * Grid.ROW_PX}px` }, el("td")) : null;
     const shown = [];
     for (let at = first; at < last; at++) shown.push(this.#row(at));
     this.body.replaceChildren(...[space(first), ...shown, all ? null : space(this.rows.length - last)].filter(Boolean));
-    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: Grid.COLUMNS.length }, "No experiment fits these filters.")));
+    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, "No experiment fits these filters.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
   }
 

@@ -171,6 +171,7 @@ def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path
     page.wait_for_selector("html[data-ready]")
     width = "document.documentElement.scrollWidth"
     assert page.evaluate(width) == 400
+    assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # room for its words
     page.click("#grid tr[data-at] >> nth=0")
     page.wait_for_selector("#experiment .diff")
     assert page.evaluate("document.querySelector('#experiment').clientWidth") == 400
