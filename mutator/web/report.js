@@ -30,7 +30,7 @@ const Report = (() => {
       const key = JSON.stringify([state.query, [...state.chosen].map(([n, v]) => [n, [...v]]), state.sort, state.heat]);
       if (key !== drawn) {
         drawn = key;
-        const { rows, apart, counts } = table.filter(state.query, state.chosen, [HeatMap.ROW, HeatMap.COLUMN]);
+        const { rows, apart, counts } = table.filter(state.query, state.chosen, HeatMap.FREE);
         const sorted = state.sort ? table.sort(rows, state.sort.replace("-", ""), state.sort.startsWith("-")) : rows;
         grid.show(sorted);
         heat.show(apart);

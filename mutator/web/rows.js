@@ -17,15 +17,15 @@ const Rows = (() => {
   const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
     "ending", "hazards", "alerts", "detail"];
 
+  const number = (value) => (value === null ? NaN : Number(value)); // infinite ones are named
+
   /** A column: `text(row)`, `number(row)` (NaN: empty), and `words` with `codes` where it has a dictionary. */
-  function column(data) {
-    const { name, words, codes, texts, numbers } = data;
+  function column({ name, words, codes, texts, numbers }) {
     if (numbers) {
-      const values = Float64Array.from(numbers, (n) => (n === null ? NaN : Number(n)));
-      return { name, values, number: (row) => values[row], text: (row) => (numbers[row] === null ? "" : String(numbers[row])) };
+      return { name, numbers, number: (row) => number(numbers[row]), text: (row) => (numbers[row] === null ? "" : String(numbers[row])) };
     }
     if (texts) return { name, texts, number: () => NaN, text: (row) => texts[row] };
-    return { name, words, codes: Uint32Array.from(codes), number: (row) => parseFloat(words[codes[row]]), text: (row) => words[codes[row]] };
+    return { name, words, codes, number: () => NaN, text: (row) => words[codes[row]] };
   }
 
   /** A facet's values, and for each word of its column which of them it has. */
@@ -136,7 +136,7 @@ const Rows = (() => {
       if (!found) return rows;
       const turn = descending ? -1 : 1;
       const key = new Float64Array(this.count);
-      if (found.values) key.set(found.values);
+      if (found.numbers) for (let row = 0; row < this.count; row++) key[row] = found.number(row);
       else {
         const texts = found.words || found.texts;
         const order = texts.map((_, i) => i).sort((a, b) => texts[a].localeCompare(texts[b], "en", { numeric: true }));

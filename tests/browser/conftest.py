@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from mutator import report, report_series, results
+from mutator.figures import figures
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutant import build
 from mutator.plan import freeze, make_plan
@@ -89,7 +90,9 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}
     faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
     report_series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7))
-    report.write(out.path, None)
+    with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
+        patch.setattr(figures, "drawings", lambda frame: ())
+        report.write(out.path, None)
     return out.path
 
 

@@ -100,7 +100,7 @@ def test_series_are_loaded_from_their_file(page: "Page", run: Path) -> None:
 
 
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Its text is the counts, which follow the other filters; pressed again it lets go."""
+    """Its text is the counts, which no filter for results changes; pressed again it lets go."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
     used = [row for row in here if row["status"] != "harness_error"]
@@ -115,6 +115,11 @@ def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]
     assert page.fragment == "kind=sensor%2Flane&scenario=B&heat=activated"
     page.page.click(cell)
     assert page.found == f"{COUNT} experiments"
+    page.choose("outcome", "sdc")
+    assert page.page.inner_text(cell) == f"{len(active)}/{len(used)}"
+    page.choose("method", "guided")
+    guided = [row for row in used if row["method"] == "guided"]
+    assert page.page.inner_text(cell).endswith(f"/{len(guided)}")
 
 
 def test_a_shared_link_shows_the_same(page: "Page") -> None:
