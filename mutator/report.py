@@ -72,7 +72,7 @@ def ensure(run: Path, workspace: "Workspace | None") -> Report:
     markdown, page = _files(out)
     stamp = report_stamp.read(out)
     is_there = markdown.is_file() and page.is_file()
-    if is_there and stamp and stamp["made_from"] == report_stamp.made_from(folder, workspace):
+    if is_there and report_stamp.is_of(stamp, out, report_stamp.made_from(folder, workspace)):
         return Report(markdown=markdown, page=page, rows=stamp["rows"])
     return write(run, workspace)
 

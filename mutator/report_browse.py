@@ -50,7 +50,10 @@ class Browse:
 def browse(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "Workspace | None") -> Browse:
     """Of a run folder and the rows of its results.csv; the page will be in the folder `out`."""
     names = report_series.chosen(rows)
-    carried = report_series.carried(folder, workspace, names) if workspace else {}
+    carried = {}
+    if workspace:
+        carried = report_series.carried(folder, workspace, names)
+        report_series.keep_traces(folder, workspace, but=names)
     series = [Markup(embedded(data, f"series-{name}")) for name, data in carried.items()]
     data = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
     data["table"], data["details"] = tables_of(folder, rows)

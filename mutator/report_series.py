@@ -4,7 +4,8 @@ The page carries those of a few chosen experiments. Others are files, report/ser
 the page loads when such an experiment is opened; a script is what a page opened from a disk may load.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,12 +59,22 @@ def carried(folder: RunFolder, workspace: "Workspace", names: Iterable[str]) -> 
     """
     traces, made = Traces(workspace, folder), {}
     for name in names:
-        try:
+        with suppress(MutatorError, KeyError):  # sources have changed, say, or a plan lacks what results have
             golden, faulty = traces.of(name)
             made[name] = series(traces.manifest, golden, faulty, traces.record(name))
-        except (MutatorError, KeyError):  # sources have changed, say, or a plan lacks what results have
-            continue
     return made
+
+
+def keep_traces(folder: RunFolder, workspace: "Workspace", but: Container[str]) -> None:
+    """Write the series of each experiment whose trace is kept and that is not in `but`."""
+    traces = Traces(workspace, folder)
+    for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
+        if name in but or series_path(folder, name).exists():
+            continue
+        with suppress(MutatorError, KeyError):
+            if traces.is_kept(name):
+                golden, faulty = traces.of(name)
+                keep(folder, traces.manifest, golden, faulty, traces.record(name))
 
 
 def keep(folder: RunFolder, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> Path:

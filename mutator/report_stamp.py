@@ -17,7 +17,7 @@ FILE = "made_from.json"
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     """Digest of all that a report depends on: results, run.json, records, timings, proof, pictures
-    and series that it shows, the library's cited numbers, and mutator's own sources."""
+    that it shows, the library's cited numbers, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
@@ -26,8 +26,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     results = [digest((run / name).read_bytes()) for name in (HEAD, "results.csv")]
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", proof.FOLDER)]
-    series = sorted(path.name for path in (run / "report" / "series").glob("*"))
-    return digest([SCHEMA, own, results, engine, plots, series, references])
+    return digest([SCHEMA, own, results, engine, plots, references])
 
 
 def read(out: Path) -> dict[str, Any]:
@@ -38,9 +37,20 @@ def read(out: Path) -> dict[str, Any]:
         return {}
 
 
+def is_of(stamp: dict[str, Any], out: Path, made_from: str) -> bool:
+    """Whether the report in `out` with this stamp was made from `made_from` and knows its series."""
+    return bool(stamp) and (stamp["made_from"], stamp.get("series")) == (made_from, _series(out))
+
+
 def write(out: Path, made_from: str, rows: int) -> None:
     """Say what the report in `out` was made from and of how many experiments it tells; last of its files."""
-    write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "rows": rows})
+    stamp = {"schema": SCHEMA, "made_from": made_from, "rows": rows, "series": _series(out)}
+    write_json(out / FILE, stamp)
+
+
+def _series(out: Path) -> list[str]:
+    """The series beside the page. Writing a report writes some, so they are what it says of itself last."""
+    return sorted(path.name for path in (out / "series").glob("*.js"))
 
 
 def remove(out: Path) -> None:

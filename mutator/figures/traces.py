@@ -51,14 +51,14 @@ class Traces:
         golden = self.folder.golden(experiment.scenario, experiment.changes)
         if not golden.is_dir():
             golden = kept / "golden"
-        if not (golden.is_dir() and self._is_kept(experiment_id)):
+        if not (golden.is_dir() and self.is_kept(experiment_id)):
             single, same = rerun(self.workspace, self.folder.path, experiment_id)
             if not same:
                 raise MutatorError(f"{experiment_id} driven again is not what the campaign found")
             golden = single.golden
         return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
 
-    def _is_kept(self, experiment_id: str) -> bool:
+    def is_kept(self, experiment_id: str) -> bool:
         """Whether the trace of the campaign's run is there, not that of another state of the sources."""
         faulty = self.folder.path / "traces" / experiment_id / "faulty"
         if not (faulty / self.manifest.trace_file).is_file():

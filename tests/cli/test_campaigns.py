@@ -218,7 +218,7 @@ def test_the_page_needs_nothing_from_elsewhere(cli: Cli, run: Path) -> None:
 
 
 def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
-    """Diff, times and verdict are shown, and a plot is drawn where it says; the page can draw it, too."""
+    """Diff, times and verdict are shown, a plot is drawn where it says, and the page can draw one, too."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name)
     assert answer.code == 0
@@ -226,8 +226,11 @@ def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
         assert wanted in answer.out
     [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
     assert ET.parse(plot).getroot().tag.endswith("svg")
-    assert (run / "report" / "series" / f"{name}.js").is_file()
+    series = run / "report" / "series" / f"{name}.js"
+    kept = series.read_bytes()
+    shutil.rmtree(series.parent)
     assert f'"series": ["{name}"]' in Path(cli("report", run, "--json").json["page"]).read_text()
+    assert series.read_bytes() == kept
 
 
 def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:

@@ -259,11 +259,15 @@ def drawn_again(run: Path, workspace: Workspace | None) -> bool:
 
 
 def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
-    """It is written once; again when results, a plot, or the library it stands beside have changed."""
+    """It is written once; again when results, a plot, a series, or the library beside it have changed."""
     assert drawn_again(run, None)
     assert not drawn_again(run, None)
     (run / "plots" / ("2" * 16 + ".svg")).touch()
     assert drawn_again(run, None)
+    (run / "report/series").mkdir()
+    (run / "report/series" / ("2" * 16 + ".js")).touch()
+    assert drawn_again(run, None)
+    assert not drawn_again(run, None)
     results = run / "results.csv"
     results.write_text(results.read_text().replace("18.25", "18.26"))
     assert drawn_again(run, HERE)
