@@ -100,19 +100,19 @@ def paired(runs: pd.DataFrame, *, of: str) -> Found:
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     matched = compare.mcnemar(_query(compare.pairs(runs), of))
-    unlike = matched.guided_only + matched.random_only
+    unlike = matched.first_only + matched.second_only
     low = high = estimate = math.nan
     if unlike:
-        estimate = matched.guided_only / unlike
-        low, high = map(float, proportion_confint(matched.guided_only, unlike, 1 - CONFIDENCE, "beta"))
+        estimate = matched.first_only / unlike
+        low, high = map(float, proportion_confint(matched.first_only, unlike, 1 - CONFIDENCE, "beta"))
     return Found(
         estimate=estimate,
         low=low,
         high=high,
         n=unlike,
-        count=matched.guided_only,
-        said=f"hazard in the guided run only {matched.guided_only}, in the random one only "
-        f"{matched.random_only}, of {matched.pairs} pairs (McNemar p {matched.p:.2g})",
+        count=matched.first_only,
+        said=f"hazard in the guided run only {matched.first_only}, in the random one only "
+        f"{matched.second_only}, of {matched.pairs} pairs (McNemar p {matched.p:.2g})",
     )
 
 

@@ -13,6 +13,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from mutator.statistics.paired import Matched
+from mutator.statistics.paired import mcnemar as exact_mcnemar
 from mutator.statistics.share import CONFIDENCE
 from mutator.statistics.tally import Tally
 
@@ -57,21 +59,6 @@ class Pooled:
     p: float
     p_equal: float
     strata: int  # those with runs of both methods
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Matched:
-    """Pairs of a guided and a random run of one fault, scenario and context row, and the exact McNemar p."""
-
-    both: int
-    guided_only: int
-    random_only: int
-    neither: int
-    p: float
-
-    @property
-    def pairs(self) -> int:
-        return self.both + self.guided_only + self.random_only + self.neither
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,20 +140,8 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def mcnemar(paired: pd.DataFrame) -> Matched:
-    """Whether a hazard came in the guided run, the random one, both or neither (statsmodels, exact)."""
-    from statsmodels.stats.contingency_tables import mcnemar as exact_mcnemar
-
-    guided, random = paired["is_hazard_guided"], paired["is_hazard_random"]
-    both, neither = int((guided & random).sum()), int((~guided & ~random).sum())
-    guided_only, random_only = int((guided & ~random).sum()), int((~guided & random).sum())
-    test = exact_mcnemar([[both, guided_only], [random_only, neither]], exact=True)
-    return Matched(
-        both=both,
-        guided_only=guided_only,
-        random_only=random_only,
-        neither=neither,
-        p=min(1.0, float(test.pvalue)),
-    )
+    """Whether a hazard came in the guided run (the first), the random one (the second), both or neither."""
+    return exact_mcnemar(paired["is_hazard_guided"], paired["is_hazard_random"])
 
 
 def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:

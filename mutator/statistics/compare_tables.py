@@ -4,6 +4,7 @@ import pandas as pd
 
 from mutator.statistics import compare
 from mutator.statistics.compare import WHOLES, Whole
+from mutator.statistics.paired import Matched
 from mutator.statistics.paper import Paper
 from mutator.statistics.share import share
 from mutator.statistics.sheet import Cell, P, Sheet
@@ -95,6 +96,6 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def _cells(matched: compare.Matched) -> tuple[Cell, ...]:
-    counts = (matched.pairs, matched.both, matched.guided_only, matched.random_only, matched.neither)
+def _cells(matched: Matched) -> tuple[Cell, ...]:
+    counts = (matched.pairs, matched.both, matched.first_only, matched.second_only, matched.neither)
     return (*counts, P(matched.p))

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 
 from mutator.statistics import compare
-from mutator.statistics.compare import Matched, Stratum
+from mutator.statistics.compare import Stratum
 from mutator.statistics.compare_tables import kinds_sheet, overall_sheet, pairs_sheet
+from mutator.statistics.paired import Matched
 from mutator.statistics.paper import Paper, load_paper
 
 from .results_frame import results
@@ -85,7 +86,7 @@ def test_pairs_are_of_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> No
     """Every guided run meets its random partner by the name of the row; one without is left out."""
     found = compare.pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
-    assert compare.mcnemar(found) == Matched(both=1, guided_only=1, random_only=2, neither=1, p=1.0)
+    assert compare.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)
 
 
 def test_mcnemar_is_exact() -> None:

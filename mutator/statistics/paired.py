@@ -1,0 +1,128 @@
+"""Statistics of pairs: one thing seen twice, under a first and a second condition.
+
+Runs of one fault are alike, so a test that takes each pair for itself finds too much: the intervals of
+`rate_difference` draw whole faults anew instead. Nothing here is a formula of our own (scipy, statsmodels).
+"""
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mutator.statistics.share import CONFIDENCE
+
+RESAMPLES = 9999
+_SEED = 1  # of the resampling: the same results give the same interval
+_DIGITS = 9  # of a difference of times: floats apart, equal times are equal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Matched:
+    """Pairs in which something came both times, only the first, only the second, or neither time, and the
+    exact McNemar p that it is as likely the first as the second time."""
+
+    both: int
+    first_only: int
+    second_only: int
+    neither: int
+    p: float
+
+    @property
+    def pairs(self) -> int:
+        return self.both + self.first_only + self.second_only + self.neither
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """A rate or time the second time less that the first, with its interval. NaN: not defined."""
+
+    difference: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Times:
+    """Times of `n` pairs that have both, s: medians, and the median of the differences (second less first)
+    with its exact interval; `p` is Wilcoxon's that differences are as often and as far up as down."""
+
+    n: int
+    first: float
+    second: float
+    median: Difference
+    p: float
+
+
+def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
+    """Two flags of each pair compared (statsmodels, exact)."""
+    from statsmodels.stats.contingency_tables import (  # type: ignore[import-untyped]
+        mcnemar as exact_mcnemar,
+    )
+
+    both, neither = int((first & second).sum()), int((~first & ~second).sum())
+    first_only, second_only = int((first & ~second).sum()), int((~first & second).sum())
+    test = exact_mcnemar([[both, first_only], [second_only, neither]], exact=True)
+    return Matched(
+        both=both,
+        first_only=first_only,
+        second_only=second_only,
+        neither=neither,
+        p=min(1.0, float(test.pvalue)),
+    )
+
+
+def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
+    """The rate of a flag, second less first; its interval is the percentile bootstrap (scipy) over whole
+    clusters, NaN for fewer than two of them."""
+    from scipy.stats import DegenerateDataWarning, bootstrap  # type: ignore[import-untyped]
+
+    change = second.astype(int) - first.astype(int)
+    sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
+    data = (sums["sum"].to_numpy(), sums["count"].to_numpy())
+    seen = float(change.mean()) if len(change) else math.nan
+    if len(sums) < 2:
+        return Difference(difference=seen, low=math.nan, high=math.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DegenerateDataWarning)  # no pair differs, say: NaN says it
+        interval = bootstrap(
+            data,
+            _mean,
+            paired=True,
+            vectorized=True,
+            n_resamples=RESAMPLES,
+            batch=500,
+            confidence_level=CONFIDENCE,
+            method="percentile",
+            rng=np.random.default_rng(_SEED),
+        ).confidence_interval
+    return Difference(difference=seen, low=float(interval.low), high=float(interval.high))
+
+
+def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
+    return np.sum(changes, axis=axis) / np.sum(pairs, axis=axis)
+
+
+def times(first: pd.Series, second: pd.Series) -> Times:
+    """Times of the pairs that have both compared: medians, their difference (scipy: exact interval from the
+    order statistics), Wilcoxon's signed-rank test (scipy; NaN where no time differs)."""
+    from scipy.stats import quantile_test, wilcoxon
+
+    known = first.notna() & second.notna()
+    before, after = first[known], second[known]
+    if before.empty:
+        nan = math.nan
+        return Times(n=0, first=nan, second=nan, median=Difference(difference=nan, low=nan, high=nan), p=nan)
+    change = (after - before).round(_DIGITS)
+    interval = quantile_test(change.to_numpy(), p=0.5).confidence_interval(CONFIDENCE)
+    return Times(
+        n=len(change),
+        first=float(before.median()),
+        second=float(after.median()),
+        median=Difference(
+            difference=float(change.median()), low=float(interval.low), high=float(interval.high)
+        ),
+        p=float(wilcoxon(change.to_numpy()).pvalue) if change.any() else math.nan,
+    )
