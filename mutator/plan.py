@@ -265,14 +265,14 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dic
         "canary": canary,
         "canary_hazard": plan.campaign.canary.hazard,
         "sources": _sources(plan, workspace),
+        "target_files": manifest.tree.digests,
         "provenance": versions(),
         "chunks": chunks,
     }
 
 
 def _csv(plan: Plan) -> bytes:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, PLAN_COLUMNS, lineterminator="\n")
+    writer = csv.DictWriter(text := io.StringIO(), PLAN_COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(plan.rows())
     return text.getvalue().encode()

@@ -72,9 +72,7 @@ def rerun(
     The flag says whether the record equals the one of the campaign (true if there is none yet).
     """
     folder = RunFolder.open(run)
-    manifest = workspace.manifest(folder.head["target"])
-    scenarios = {scenario for scenario, _ in folder.head["goldens"]}
-    check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, scenarios))
+    manifest = manifest_of(workspace, folder)
     wanted = folder.find(experiment_id)
     experiment = next(e for e in planfile.read_all(folder.path) if e.id == wanted)
     golden = folder.golden(experiment.scenario, experiment.changes)
@@ -88,6 +86,14 @@ def rerun(
     )
     known = read_records(folder.path).get(wanted)
     return single, known is None or known == single.record
+
+
+def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
+    """The target of a run; MutatorError when it, templates or scenarios are no longer those of the run."""
+    manifest = workspace.manifest(folder.head["target"])
+    scenarios = {scenario for scenario, _ in folder.head["goldens"]}
+    check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, scenarios))
+    return manifest
 
 
 @contextmanager

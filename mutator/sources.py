@@ -39,6 +39,11 @@ class SourceTree:
             self._parsed[path] = parse_file(path, self.files[path], self.root)
         return self._parsed[path]
 
+    @property
+    def digests(self) -> dict[str, str]:
+        """The digest of each file, by path."""
+        return {path: ids.digest(data) for path, data in self.files.items()}
+
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
         """Digest of the tree with `changed` put in."""
         return _digest({**self._entries, **_entries(changed)})

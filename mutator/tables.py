@@ -6,7 +6,7 @@ says nothing about its fault: it is counted apart and is in no other number.
 
 import csv
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def read_results(path: Path) -> tuple[Row, ...]:
     """The rows of a results.csv in its order; MutatorError when there is none or it is not one."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            return tuple(_row(line) for line in csv.DictReader(file))
+            return tuple(row_from(line) for line in csv.DictReader(file))
     except FileNotFoundError:
         raise MutatorError(
             "no results here", where=path.parent, expected="a run folder", remedy="see `mutator run --help`"
@@ -160,7 +160,8 @@ def outcome_counts(rows: Iterable[Row]) -> dict[str, int]:
     return {name: seen[name] for name in order if seen[name]}
 
 
-def _row(line: dict[str, str]) -> Row:
+def row_from(line: Mapping[str, str]) -> Row:
+    """The row of a line of results.csv, by column; KeyError or ValueError when it is none."""
     # A hazard has a flag and a time of the same name: h1, t_h1.
     checked = [name for name in line if f"t_{name}" in line and line[name]]
     hazards = [(name.upper(), float(line[f"t_{name}"])) for name in checked if line[f"t_{name}"]]

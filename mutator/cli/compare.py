@@ -1,0 +1,150 @@
+"""`compare`: two runs of the same faults, and a gate on what got worse."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mutator.cli.console import Terminal, short_path
+from mutator.cli.options import Json, Only
+from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
+
+if TYPE_CHECKING:
+    from mutator.compare.comparison import Comparison, Finding, Gate
+    from mutator.statistics.sheet import Sheet
+
+NAMED = 20  # experiments that the terminal names; the written comparison has all
+GATES = "new-hazard, other-hazard, earlier-hazard, lost-alert, worse, new-crash, harness-error, unmatched"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    app.command("compare", epilog=EXAMPLES)(compare)
+
+
+EXAMPLES = """\b
+Examples:
+  mutator compare runs/before runs/after
+  mutator compare runs/paper runs/robust --only 'module == "vision_input"'
+  mutator compare runs/main runs/change --fail-on new-hazard,new-crash,harness-error
+
+With --fail-on, exit code 1 if anything of that kind is found (each is named), else 3 if experiments have no
+result in a run, for then nobody can say that nothing got worse.
+"""
+
+
+def compare(
+    run_a: Annotated[Path, typer.Argument(metavar="RUN_A", help="A run folder: before, or the one.")],
+    run_b: Annotated[Path, typer.Argument(metavar="RUN_B", help="Another: after, or the other.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Where to write; default: RUN_B/report/compare-<RUN_A>."),
+    ] = None,
+    only: Only = None,
+    fail_on: Annotated[
+        list[str] | None, typer.Option("--fail-on", metavar="KIND,...", help=f"Kinds: {GATES}.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Compare two runs, experiment by experiment.
+
+    Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
+    what got better, worse, newly hazardous, with paired statistics; a page, a table and CSV are written.
+    """
+    from mutator.compare import comparison as comparing
+    from mutator.compare import pages
+
+    terminal = Terminal(as_json)
+    gates = _gates(fail_on or [])
+    with terminal.wait("comparing"):
+        found = comparing.compare(run_a, run_b, only)
+        place = out or found.b.folder.path / "report" / f"compare-{found.a.name}"
+        written = pages.write(found, place)
+    failing = comparing.findings(found, gates)
+    if as_json:
+        terminal.emit(_as_json(found, failing) | {"page": str(written.page), "pairs_csv": str(written.pairs)})
+    else:
+        _show(terminal, found)
+        terminal.say(f"comparison: {short_path(written.markdown)} and {short_path(written.page)}")
+    _judge(terminal, found, gates, failing)
+
+
+def _gates(texts: list[str]) -> "list[Gate]":
+    from mutator.compare.comparison import Gate
+
+    names = [name.strip() for text in texts for name in text.split(",")]
+    known = [gate.value for gate in Gate]
+    if strangers := [name for name in names if name not in known]:
+        raise MutatorError(f"'{strangers[0]}'", where="--fail-on", expected=f"one of {', '.join(known)}")
+    return [Gate(name) for name in dict.fromkeys(names)]
+
+
+def _show(terminal: Terminal, found: "Comparison") -> None:
+    from mutator.compare import pages
+
+    differing = [(f.name, f.a, f.b) for f in found.facts if f.differs]
+    if differing:
+        terminal.table(["what differs", found.names.a, found.names.b], differing)
+        terminal.say(pages.files_text(found))
+        terminal.say()
+    endings, changes, rates, times = found.sheets
+    for sheet in (endings, changes, _in_all(rates), _in_all(times)):
+        terminal.say(sheet.title, style="bold")
+        terminal.table(
+            list(sheet.heads),
+            sheet.texts(),
+            right=range(1, len(sheet.heads)),
+            total=sheet is changes,
+        )
+        terminal.say()
+    terminal.say(pages.summary(found))
+    for remark in found.remarks:
+        terminal.say(remark)
+
+
+def _in_all(sheet: "Sheet") -> "Sheet":
+    """The lines of all fault types together, without the columns that say so."""
+    import dataclasses
+
+    keep = [i for i, head in enumerate(sheet.heads) if head not in ("fault type", "p, Holm")]
+    return dataclasses.replace(
+        sheet,
+        heads=tuple(sheet.heads[i] for i in keep),
+        lines=tuple(tuple(line[i] for i in keep) for line in sheet.lines if line[1] == "in all"),
+    )
+
+
+def _as_json(found: "Comparison", failing: "tuple[Finding, ...]") -> dict[str, object]:
+    from mutator.compare import pages
+    from mutator.compare.pairs import Change
+
+    return {
+        "run_a": str(found.a.folder.path),
+        "run_b": str(found.b.folder.path),
+        "pairs": len(found.pairs),
+        "changed": len(found.changed),
+        "changes": {change.value: len(found.having(change)) for change in Change},
+        "not_compared": dict(pages.reasons(found)),
+        "differs": [fact for fact in found.facts if fact.differs],
+        "files": found.files,
+        "remarks": list(found.remarks),
+        "tables": {s.name: [dict(zip(s.heads, line, strict=True)) for line in s.lines] for s in found.sheets},
+        "failing": failing,
+    }
+
+
+def _judge(
+    terminal: Terminal, found: "Comparison", gates: "list[Gate]", failing: "tuple[Finding, ...]"
+) -> None:
+    """The gate: exit 1 at what it fails on, 3 when results are missing."""
+    for finding in failing[:NAMED]:
+        terminal.complain(f"{finding.gate.value}: {finding.words} [{finding.experiment_id}]")
+    if more := failing[NAMED:]:
+        terminal.complain(f"and {len(more)} more")
+    if failing:
+        raise typer.Exit(EXIT_CHECK_FAILED)
+    if gates and found.incomplete:
+        terminal.complain(
+            f"{found.incomplete} experiments have no result in one of the runs; finish it first"
+        )
+        raise typer.Exit(EXIT_HARNESS_ERRORS)

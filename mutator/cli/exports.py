@@ -1,0 +1,56 @@
+"""`export`: a run for other tools."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mutator.cli.console import Terminal, short_path
+from mutator.cli.options import Json, Place, with_place
+from mutator.exports import Format
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    app.command("export", epilog=EXAMPLES)(export)
+
+
+EXAMPLES = """\b
+Examples:
+  mutator export runs/first --format mutation-elements   for the viewer of mutation testing reports
+  mutator export runs/first --format junit --out junit.xml
+  mutator export runs/first --format junit --failures hazard,crashed
+  mutator export runs/first --format parquet --out first.parquet
+"""
+
+
+@with_place
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    format: Annotated[Format, typer.Option(help="What to write.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Where to; default: a file in RUN/exports/.")
+    ] = None,
+    failures: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENDING,...",
+            help="JUnit: endings that are failures: hazard, sdc, masked, crashed, timeout. Default: none, "
+            "for a hazard is data.",
+        ),
+    ] = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Write a run for other tools: mutation report, JUnit, CSV, Parquet."""
+    from mutator import exports
+
+    terminal = Terminal(as_json)
+    workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None
+    endings = [name.strip() for name in failures.split(",")] if failures else []
+    with terminal.wait("writing"):
+        written = exports.export(run, format, out, workspace=workspace, failures=endings)
+    if as_json:
+        terminal.emit({"format": format.value, "file": str(written)})
+    terminal.say(f"{format.value}: {short_path(written)}")

@@ -1,0 +1,48 @@
+"use strict";
+/* Filters the table of changed experiments by text and by kinds of change; the choice is kept in the fragment. */
+(() => {
+  const table = document.getElementById("changed");
+  if (!table) return;
+  const words = document.getElementById("words");
+  const shown = document.getElementById("shown");
+  const buttons = [...document.querySelectorAll("button[data-change]")];
+  const rows = [...table.rows].slice(1).map((row) => ({
+    row, text: row.textContent.toLowerCase(), changes: row.dataset.changes.split(" "),
+  }));
+
+  /** Show the rows that have all chosen changes and all words. */
+  function filter() {
+    const chosen = buttons.filter((b) => b.getAttribute("aria-pressed") === "true").map((b) => b.dataset.change);
+    const parts = words.value.toLowerCase().split(/\s+/).filter(Boolean);
+    let count = 0;
+    for (const { row, text, changes } of rows) {
+      const fits = chosen.every((c) => changes.includes(c)) && parts.every((p) => text.includes(p));
+      row.hidden = !fits;
+      count += fits;
+    }
+    shown.textContent = `${count} of ${rows.length}`;
+    return new URLSearchParams({ ...(chosen.length && { c: chosen.join(",") }), ...(parts.length && { q: parts.join(" ") }) });
+  }
+
+  function changed() {
+    history.replaceState(null, "", `#${filter()}`);
+  }
+
+  function restore() {
+    const state = new URLSearchParams(location.hash.slice(1));
+    const chosen = (state.get("c") || "").split(",");
+    for (const b of buttons) b.setAttribute("aria-pressed", String(chosen.includes(b.dataset.change)));
+    words.value = state.get("q") || "";
+    filter();
+  }
+
+  for (const button of buttons) {
+    button.addEventListener("click", () => {
+      button.setAttribute("aria-pressed", String(button.getAttribute("aria-pressed") !== "true"));
+      changed();
+    });
+  }
+  words.addEventListener("input", changed);
+  addEventListener("hashchange", restore);
+  restore();
+})();

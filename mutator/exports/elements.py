@@ -1,0 +1,147 @@
+"""A run as a mutation testing report (the mutation-testing-elements schema, version 2).
+
+A mutant is a fault at its first location, with its value; the tests it is put to are drives: a scenario and a
+trigger. *Killed* means that a drive ended in a hazard: the hazard checks are what a fault-free drive passes.
+A high score therefore speaks against the controller, not for it; thresholds are set so that none is green.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mutator import __version__, planfile, single
+from mutator.anchors import ParsedFile, Site
+from mutator.fault_models import FaultModels
+from mutator.manifest import TargetManifest
+from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
+from mutator.mutant import injection_edit, injection_id
+from mutator.records import read_records
+from mutator.runfolder import RunFolder
+from mutator.splice import Edit
+from mutator.workspace import Workspace
+
+SCHEMA_VERSION = "2.0"
+
+
+def content(folder: RunFolder, workspace: Workspace) -> bytes:
+    """The report as JSON, the same bytes each time."""
+    manifest = single.manifest_of(workspace, folder)
+    return (
+        json.dumps(report(folder, manifest, workspace.fault_models()), ensure_ascii=False) + "\n"
+    ).encode()
+
+
+def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
+    """The report as plain data."""
+    records = read_records(folder.path)
+    drives: dict[str, list[Experiment]] = {}
+    for experiment in planfile.read_all(folder.path):
+        drives.setdefault(experiment.fault.id, []).append(experiment)
+    files: dict[str, dict[str, Any]] = {}
+    for experiments in drives.values():
+        fault = experiments[0].fault
+        file = manifest.tree.parsed(fault.injections[0].location.path)
+        source = file.data.decode(file.encoding)
+        entry = files.setdefault(file.path, {"language": "python", "source": source, "mutants": []})
+        entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
+    head = folder.head
+    config = {name: head[name] for name in ("campaign", "target", "seed", "reading", "plan", "sources")}
+    return {
+        "schemaVersion": SCHEMA_VERSION,
+        "thresholds": {"high": 100, "low": 0},
+        "framework": {"name": "mutator", "version": __version__},
+        "config": config,
+        "files": dict(sorted(files.items())),
+        "testFiles": _tests([e for group in drives.values() for e in group]),
+    }
+
+
+def _mutant(
+    manifest: TargetManifest,
+    models: FaultModels,
+    fault: Fault,
+    experiments: Sequence[Experiment],
+    records: Mapping[str, Record],
+) -> dict[str, Any]:
+    first, *others = fault.injections
+    file = manifest.tree.parsed(first.location.path)
+    site = file.resolve(first.location)
+    edit = injection_edit(file, models, first, injection_id(0, first))
+    value = f" {fault.value} {fault.unit}".removesuffix(" -") if fault.value is not None else ""
+    also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
+    told = f"{fault.spec}{value}, aims at {fault.aim}" + (f"; also at {', '.join(also)}" if also else "")
+    return {
+        "id": fault.id,
+        "mutatorName": first.model,
+        "description": told,
+        **_splice(file, site, edit),
+        **verdict(experiments, records),
+    }
+
+
+def _line(manifest: TargetManifest, injection: Injection) -> int:
+    return manifest.tree.parsed(injection.location.path).resolve(injection.location).first + 1
+
+
+def _splice(file: ParsedFile, site: Site, edit: Edit) -> dict[str, Any]:
+    """The anchored statement's whole lines (at a function's entry the line there), and what replaces them."""
+    first = min(site.first, edit.index, len(file.lines) - 1)
+    last = max(site.last, first + 1)
+    lines, at = file.lines[first:last], edit.index - first
+    wrapped = [edit.unit + line for line in lines[at : at + edit.reindent]]
+    new = [*lines[:at], *edit.lines, *wrapped, *lines[at + edit.reindent :]]
+    end = lines[-1].rstrip(b"\r\n").decode(file.encoding)
+    return {
+        "location": {
+            "start": {"line": first + 1, "column": 1},
+            "end": {"line": last, "column": len(end) + 1},
+        },
+        "replacement": b"".join(new).rstrip(b"\r\n").decode(file.encoding),
+    }
+
+
+def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
+    """Status of a fault over its drives, the reason, and which drives activated it and ended in a hazard."""
+    known = {e: records[e.id] for e in experiments if e.id in records}
+    of = {status: [r for r in known.values() if r.status is status] for status in Status}
+    hazardous = [e for e, r in known.items() if r.hazards]
+    active = [e for e, r in known.items() if r.activation]
+    drives = f"{len(experiments)} drives"
+    if hazardous:
+        names = sorted({name for e in hazardous for name, _ in known[e].hazards})
+        status, reason = "Killed", f"{', '.join(names)} in {len(hazardous)} of {drives}"
+    elif not known:
+        status, reason = "Pending", f"none of {drives} was run yet"
+    elif of[Status.INVALID_MUTANT]:
+        status, reason = "CompileError", of[Status.INVALID_MUTANT][0].detail
+    elif of[Status.CRASHED]:
+        status, reason = "RuntimeError", of[Status.CRASHED][0].detail
+    elif of[Status.TIMEOUT]:
+        status, reason = "Timeout", of[Status.TIMEOUT][0].detail
+    elif not of[Status.OK]:
+        status, reason = "Ignored", f"harness errors only: {of[Status.HARNESS_ERROR][0].detail}"
+    elif active:
+        differing = sum(r.outcome is Outcome.SDC for r in of[Status.OK])
+        status, reason = "Survived", f"no hazard; an actuator output differed in {differing} of {drives}"
+    else:
+        status, reason = "NoCoverage", f"active in none of {drives}"
+    return {
+        "status": status,
+        "statusReason": reason,
+        "coveredBy": [_test_id(e) for e in active],
+        "killedBy": [_test_id(e) for e in hazardous],
+        "testsCompleted": len(of[Status.OK]),
+    }
+
+
+def _test_id(experiment: Experiment) -> str:
+    return f"{experiment.scenario}/{experiment.method.value}/{experiment.trigger.name}"
+
+
+def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
+    """A file of tests for each scenario: its drives, by method and trigger."""
+    drives = {(e.scenario, _test_id(e)): f"{e.method.value}: {e.trigger.name}" for e in experiments}
+    files: dict[str, Any] = {}
+    for (scenario, name), text in sorted(drives.items()):
+        files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": text})
+    return files

@@ -1,0 +1,77 @@
+"""A run as JUnit XML: a suite for each fault type, a case for each experiment.
+
+A hazard is data, not a failure: every experiment with a result passes, whatever it found, unless its ending
+is among those that one wants to see as failures. A harness error, or a mutant that could not be made, is an
+error; what has not run yet, or was never active, is skipped.
+"""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Collection, Sequence
+
+from mutator import results, tables
+from mutator.columns import plan_row
+from mutator.compare.sides import words
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Outcome, Status
+from mutator.planfile import read_all
+from mutator.runfolder import RunFolder
+from mutator.tables import Row
+
+ENDINGS = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
+    """The XML, the same bytes each time. MutatorError for an ending that cannot be a failure."""
+    known = [ending.value for ending in ENDINGS]
+    if strangers := [name for name in failures if name not in known]:
+        raise MutatorError(f"'{strangers[0]}'", where="--failures", expected=f"one of {', '.join(known)}")
+    rows = {row.experiment_id: row for row in tables.read_results(results.ensure(folder.path))}
+    suites: dict[str, list[Experiment]] = {}
+    for experiment in read_all(folder.path):
+        cells = plan_row(experiment)
+        suites.setdefault(f"{cells['module']}/{cells['fault_type']}", []).append(experiment)
+    root = ET.Element("testsuites", name=str(folder.head["campaign"]))
+    for name in sorted(suites):
+        suite = ET.SubElement(root, "testsuite", name=name)
+        for experiment in suites[name]:
+            suite.append(_case(experiment, rows.get(experiment.id), failures))
+        _count(suite)
+    _count(root)
+    ET.indent(root)
+    data: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return data + b"\n"
+
+
+def _case(experiment: Experiment, row: Row | None, failures: Collection[str]) -> ET.Element:
+    case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=words(experiment))
+    facts = {"experiment": experiment.id, "ending": row.ending if row else "not run"}
+    if row:
+        facts |= {f"hazard {name} [s]": f"{t:.2f}" for name, t in row.hazards}
+        facts |= {"alerts": ", ".join(row.alerts)} if row.alerts else {}
+    told = ET.SubElement(case, "properties")
+    for name, value in facts.items():
+        ET.SubElement(told, "property", name=name, value=_clean(value))
+    if row is None:
+        ET.SubElement(case, "skipped", message="not run yet")
+    elif not row.usable:
+        ET.SubElement(case, "error", type=row.ending, message=_clean(row.detail))
+    elif row.ending == Outcome.NOT_ACTIVATED:
+        ET.SubElement(case, "skipped", message="the fault was never active")
+    elif row.ending in failures:
+        hazards = ", ".join(f"{name} at {t:.2f} s" for name, t in row.hazards)
+        ET.SubElement(case, "failure", type=row.ending, message=_clean(hazards or row.detail or row.ending))
+    return case
+
+
+def _count(element: ET.Element) -> None:
+    """The totals of a suite, or of all suites."""
+    element.set("tests", str(len(list(element.iter("testcase")))))
+    for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+        element.set(attribute, str(len(list(element.iter(tag)))))
+
+
+def _clean(text: str) -> str:
+    """The text without characters that XML cannot have."""
+    return _NO_XML.sub("?", text)
