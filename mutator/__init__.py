@@ -1,3 +1,22 @@
 """Compile-time fault injection for driving controllers: from fault specs to verdicts."""
 
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mutator.load import Run as Run
+    from mutator.load import load_run as load_run
+
 __version__ = "0.1.0"
+_LAZY = ("Run", "load_run")  # pandas is not paid for by who only wants the version
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        from mutator import load
+
+        return getattr(load, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

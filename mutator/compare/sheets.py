@@ -90,8 +90,8 @@ def rates_sheet(frame: pd.DataFrame, names: Names) -> Sheet:
         name="rates",
         title="What came in how many runs",
         note=f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
-        "(of 1), its interval resampled by fault (variant and value). p: McNemar's exact test of the pairs that "
-        "differ; p, Holm: adjusted over the fault types.",
+        "(of 1), its interval resampled by fault (variant and value). p: McNemar's exact test of the pairs "
+        "that differ; p, Holm: adjusted over the fault types.",
         heads=(
             *("what", "fault type", "pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
             *("difference", "difference, low", "difference, high", "p", "p, Holm"),
@@ -127,8 +127,8 @@ def times_sheet(frame: pd.DataFrame, names: Names) -> Sheet:
         name="times",
         title="How long it took, where it came in both runs",
         note=f"Medians in s. Difference: the median of the pairs' differences, {names.b} less {names.a}, "
-        "with its exact interval (none for fewer than six pairs); p: Wilcoxon's signed-rank test (none where no "
-        "pair differs); p, Holm: adjusted over the fault types.",
+        "with its exact interval (none for fewer than six pairs); p: Wilcoxon's signed-rank test (none where "
+        "no pair differs); p, Holm: adjusted over the fault types.",
         heads=(
             *("time", "fault type", "pairs", names.a, names.b),
             *("difference", "difference, low", "difference, high", "p", "p, Holm"),
