@@ -69,9 +69,13 @@ def words(experiment: Experiment) -> str:
     """The experiment in words: `radar/chaff/distance 35 m, S1, guided C1`."""
     fault = experiment.fault
     value = f" {fault.value} {fault.unit}".removesuffix(" -") if fault.value is not None else ""
+    return f"{fault.spec}{value}, {drive(experiment)}"
+
+
+def drive(experiment: Experiment) -> str:
+    """What the fault was put to, in words: `S1, guided C1`."""
     method = experiment.method.value
-    trigger = experiment.trigger.name.removeprefix(f"{method}/")
-    return f"{fault.spec}{value}, {experiment.scenario}, {method} {trigger}"
+    return f"{experiment.scenario}, {method} {experiment.trigger.name.removeprefix(f'{method}/')}"
 
 
 def _text(value: object) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 from mutator import __version__, planfile, single
 from mutator.anchors import ParsedFile, Site
+from mutator.compare.sides import drive
 from mutator.fault_models import FaultModels
 from mutator.manifest import TargetManifest
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
@@ -128,20 +129,15 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
     return {
         "status": status,
         "statusReason": reason,
-        "coveredBy": [_test_id(e) for e in active],
-        "killedBy": [_test_id(e) for e in hazardous],
+        "coveredBy": [drive(e) for e in active],
+        "killedBy": [drive(e) for e in hazardous],
         "testsCompleted": len(of[Status.OK]),
     }
 
 
-def _test_id(experiment: Experiment) -> str:
-    return f"{experiment.scenario}/{experiment.method.value}/{experiment.trigger.name}"
-
-
 def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
     """A file of tests for each scenario: its drives, by method and trigger."""
-    drives = {(e.scenario, _test_id(e)): f"{e.method.value}: {e.trigger.name}" for e in experiments}
     files: dict[str, Any] = {}
-    for (scenario, name), text in sorted(drives.items()):
-        files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": text})
+    for scenario, name in sorted({(e.scenario, drive(e)) for e in experiments}):
+        files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})
     return files
