@@ -1,5 +1,6 @@
 """Fixtures that several kinds of tests share."""
 
+import dataclasses
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -23,6 +24,8 @@ from mutator.model import (
     Status,
     Trigger,
 )
+from mutator.plan import freeze, make_plan
+from mutator.records import SCHEMA, LineWriter
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
@@ -134,3 +137,28 @@ def record() -> Callable[..., Record]:
         return Record(**fields | given)
 
     return make
+
+
+@pytest.fixture
+def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
+    """Makes a run folder whose records are made up: nothing is driven."""
+
+    def write(
+        workspace: Workspace,
+        out: Path,
+        became: Callable[[Experiment], dict[str, Any] | None] = lambda experiment: {},
+        campaign: str = "toy",
+        **choices: Any,
+    ) -> Path:
+        """`became` says what a record has of its own; None: the experiment was not run."""
+        plan = make_plan(workspace, campaign, **choices)
+        freeze(plan, out, workspace)
+        lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA})
+        for experiment in plan.experiments:
+            fields = became(experiment)
+            if fields is not None:
+                lines.append(dataclasses.asdict(record(experiment.id, **fields)))
+        lines.close()
+        return out
+
+    return write

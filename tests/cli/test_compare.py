@@ -1,0 +1,101 @@
+"""`compare` and `export` on the command line."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.model import Experiment, Outcome, Status
+from mutator.workspace import Workspace
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Write = Callable[..., Path]
+
+
+def worse(e: Experiment) -> dict[str, Any]:
+    """One fault is hazardous now, the rest is as before."""
+    hazard = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
+    return hazard if e.fault.fault_type == "silence" and e.scenario == "A" else {}
+
+
+@pytest.fixture
+def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
+    """Two toy runs in the current folder, the second one worse."""
+    workspace = Workspace.find(root)
+    return write_run(workspace, Path("before")), write_run(workspace, Path("after"), worse)
+
+
+def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """What changed is in the terminal's tables, and written beside the second run; without a gate it is fine."""
+    answer = cli("compare", *runs)
+    assert answer.code == 0, answer.err
+    for wanted in ("new-hazard", "sensor/silence", "24 experiments are in both runs"):
+        assert wanted in answer.out
+    for name in ("COMPARISON.md", "index.html", "pairs.csv", "unmatched.csv"):
+        assert (Path("after") / "report" / "compare-before" / name).is_file()
+
+
+def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """With --fail-on a new hazard is exit code 1 and its experiment is named; the other way round it is fine."""
+    failed = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,unmatched")
+    assert failed.code == 1
+    assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err
+    assert (Path("c") / "index.html").is_file()
+    assert cli("compare", *reversed(runs), "--fail-on", "new-hazard").code == 0
+    assert cli("compare", *runs, "--fail-on", "lost-alert", "--fail-on", "new-hazard").code == 1
+
+
+def test_a_run_with_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """A run compared with itself passes every gate and has no difference."""
+    _, after = runs
+    answer = cli("compare", after, after, "--json", "--fail-on", "new-hazard,worse,harness-error,unmatched")
+    assert answer.code == 0
+    assert (answer.json["pairs"], answer.json["changed"], answer.json["differs"]) == (24, 0, [])
+
+
+def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run: Write) -> None:
+    """Where results are missing a gate ends with 3: nobody can say that nothing got worse."""
+    workspace = Workspace.find(root)
+    whole = write_run(workspace, Path("whole"))
+    part = write_run(workspace, Path("part"), lambda e: None if e.scenario == "B" else {})
+    answer = cli("compare", whole, part, "--fail-on", "new-hazard")
+    assert answer.code == 3
+    assert "have no result" in answer.err
+    assert cli("compare", whole, part).code == 0
+    broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None}
+    bad = write_run(workspace, Path("bad"), lambda e: broken if e.scenario == "B" else {})
+    assert cli("compare", whole, bad, "--fail-on", "harness-error").code == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--fail-on", "hazards"], "'hazards'"),
+        (["--only", "nonsense > 1"], "unknown column `nonsense`"),
+    ],
+)
+def test_wrong_input(cli: Cli, runs: tuple[Path, Path], words: list[str], told: str) -> None:
+    """A kind or a filter that does not exist is wrong input, and the known ones are named."""
+    answer = cli("compare", *runs, *words)
+    assert answer.code == 2
+    assert told in answer.err
+    assert "expected" in answer.err
+
+
+def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """Each format is written where it is asked for, else into the run folder."""
+    _, after = runs
+    answer = cli("export", after, "--format", "mutation-elements", "--out", "m.json")
+    assert answer.code == 0, answer.err
+    assert json.loads(Path("m.json").read_text())["schemaVersion"] == "2.0"
+    for name in ("junit", "csv", "parquet"):
+        made = cli("export", after, "--format", name, "--json")
+        assert made.code == 0, made.err
+        assert Path(made.json["file"]).stat().st_size > 0
+    failures = cli("export", after, "--format", "junit", "--failures", "hazard", "--out", "j.xml")
+    assert failures.code == 0
+    assert '<failure type="hazard"' in Path("j.xml").read_text()
+    assert cli("export", after, "--format", "junit", "--failures", "harness_error").code == 2
+    assert cli("export", after, "--format", "pdf").code == 2

@@ -1,0 +1,57 @@
+"""Comparisons, for any results."""
+
+import dataclasses
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mutator.compare.pairs import Change, Pair
+from mutator.model import Outcome, Status
+from mutator.tables import Row
+
+MIRROR = {
+    Change.NEW_HAZARD: Change.HAZARD_GONE,
+    Change.EARLIER_HAZARD: Change.LATER_HAZARD,
+    Change.LOST_ALERT: Change.NEW_ALERT,
+    Change.WORSE: Change.BETTER,
+    Change.NEW_CRASH: Change.CRASH_GONE,
+    Change.HARNESS_ERROR: Change.MENDED,
+    Change.OTHERWISE: Change.OTHERWISE,
+}
+MIRROR |= {after: before for before, after in MIRROR.items()}
+TIME = st.sampled_from([2.0, 2.5, 3.0, 7.25])
+
+
+@st.composite
+def rows(draw: st.DrawFn) -> Row:
+    """Any row that a campaign can leave, and some that it cannot."""
+    names = draw(st.lists(st.sampled_from(["H1", "H2"]), unique=True))
+    hazards = tuple(sorted(((name, draw(TIME)) for name in names), key=lambda h: h[1]))
+    status = draw(st.sampled_from(Status))
+    return Row(
+        **dict.fromkeys(("experiment_id", "module", "fault_type", "variant", "value", "unit"), "x"),
+        **dict.fromkeys(("scenario", "method", "trigger", "detail"), "x"),
+        status=status,
+        outcome=draw(st.sampled_from(Outcome)) if status is Status.OK else None,
+        t_activation=draw(st.none() | st.just(1.5)),
+        t_manifest=None,
+        checked=("H1", "H2"),
+        hazards=hazards,
+        alerts=tuple(draw(st.lists(st.just("fcw"), max_size=1))),
+        t_alert=None,
+        reaction_time=None,
+    )
+
+
+@given(rows())
+def test_a_run_does_not_differ_from_itself(row: Row) -> None:
+    """Whatever became of an experiment, the same again is no change."""
+    assert Pair(None, None, row, dataclasses.replace(row)).changes == set()  # type: ignore[arg-type]
+
+
+@given(rows(), rows())
+def test_what_is_worse_one_way_is_better_the_other(a: Row, b: Row) -> None:
+    """Turning the runs round turns every change round; another hazard may be one either way."""
+    there = Pair(None, None, a, b).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
+    back = Pair(None, None, b, a).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
+    assert {MIRROR[change] for change in there} == back

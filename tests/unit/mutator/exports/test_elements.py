@@ -1,0 +1,137 @@
+"""Runs as mutation testing reports: the structure that their schema asks for, and what statuses mean."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.exports import Format, export
+from mutator.exports.elements import verdict
+from mutator.model import Experiment, Outcome, Record, Status
+from mutator.workspace import Workspace
+
+Write = Callable[..., Path]
+STATUSES = {
+    "Killed",
+    "Survived",
+    "NoCoverage",
+    "CompileError",
+    "RuntimeError",
+    "Timeout",
+    "Ignored",
+    "Pending",
+}
+HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.0),)}
+IDLE = {"outcome": Outcome.NOT_ACTIVATED, "activation": None}
+
+
+@pytest.fixture
+def report(toycar: Workspace, tmp_path: Path, write_run: Write) -> dict[str, Any]:
+    """The report of a toy run whose faults of the lane are hazardous."""
+    run = write_run(toycar, tmp_path / "run", lambda e: HAZARD if e.fault.fault_type == "lane" else {})
+    file = export(run, Format.MUTATION_ELEMENTS, workspace=toycar)
+    assert file == run.resolve() / "exports" / "mutation-elements.json"
+    again = export(run, Format.MUTATION_ELEMENTS, tmp_path / "again.json", workspace=toycar)
+    assert again.read_bytes() == file.read_bytes()
+    data: dict[str, Any] = json.loads(file.read_text())
+    return data
+
+
+def mutants(report: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Each mutant with the source of its file."""
+    for file in report["files"].values():
+        yield from ((file["source"], mutant) for mutant in file["mutants"])
+
+
+def test_the_structure_is_that_of_the_schema(report: dict[str, Any]) -> None:
+    """What the schema requires is there, of the type and in the range it asks for."""
+    assert re.fullmatch(r"([1-2]\d*|0)(\.(([1-9]\d*)|0)){0,2}", report["schemaVersion"])
+    assert all(0 <= report["thresholds"][name] <= 100 for name in ("high", "low"))
+    assert all(type(report["thresholds"][name]) is int for name in ("high", "low"))
+    assert report["files"]
+    for file in report["files"].values():
+        assert isinstance(file["source"], str)
+        assert file["language"] == "python"
+    for _, mutant in mutants(report):
+        assert mutant["status"] in STATUSES
+        for name in ("id", "mutatorName", "description", "replacement", "statusReason"):
+            assert isinstance(mutant[name], str)
+        for name in ("coveredBy", "killedBy"):
+            assert all(isinstance(test, str) for test in mutant[name])
+    assert isinstance(report["framework"]["name"], str)
+    ids = [mutant["id"] for _, mutant in mutants(report)]
+    assert len(ids) == len(set(ids)) > 0
+
+
+def test_tests_are_drives(report: dict[str, Any]) -> None:
+    """Every drive that a mutant names is a test of its scenario, named once."""
+    tests = [test["id"] for file in report["testFiles"].values() for test in file["tests"]]
+    assert len(tests) == len(set(tests))
+    named = {test for _, m in mutants(report) for test in (*m["coveredBy"], *m["killedBy"])}
+    assert named <= set(tests)
+    assert set(report["testFiles"]) == {"A", "B"}
+
+
+def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
+    """Source and location give the statement; the replacement has it, and the injected lines beside it."""
+    for source, mutant in mutants(report):
+        start, end = mutant["location"]["start"], mutant["location"]["end"]
+        lines = source.splitlines()[start["line"] - 1 : end["line"]]
+        assert start["column"] == 1
+        assert end["column"] == len(lines[-1]) + 1
+        statement = [line.strip() for line in lines]
+        replacement = [line.strip() for line in mutant["replacement"].splitlines()]
+        assert [line for line in replacement if "# fi:" not in line] == statement
+        assert any("# fi:" in line for line in replacement)
+
+
+def test_killed_means_hazard(report: dict[str, Any]) -> None:
+    """A fault that led to a hazard in a drive is killed by that drive, the others survive."""
+    for _, mutant in mutants(report):
+        lane = mutant["description"].startswith("sensor/lane/")
+        assert mutant["status"] == ("Killed" if lane else "Survived")
+        assert mutant["killedBy"] == (mutant["coveredBy"] if lane else [])
+
+
+def test_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
+    """Sources that are not those of the run are not shown as if they were."""
+    run = write_run(toycar, tmp_path / "run")
+    (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
+    with pytest.raises(MutatorError, match="changed since this run was planned: target"):
+        export(run, Format.MUTATION_ELEMENTS, workspace=toycar)
+
+
+@pytest.mark.parametrize(
+    ("became", "status"),
+    [
+        ([{}, HAZARD], "Killed"),
+        ([{}, {}], "Survived"),
+        ([{}, None], "Survived"),
+        ([IDLE, IDLE], "NoCoverage"),
+        ([None, None], "Pending"),
+        ([{"status": Status.CRASHED, "outcome": None}, {}], "RuntimeError"),
+        ([{"status": Status.CRASHED, "outcome": None}, HAZARD], "Killed"),
+        ([{"status": Status.TIMEOUT, "outcome": None}, {}], "Timeout"),
+        ([{"status": Status.INVALID_MUTANT, "outcome": None, "activation": None}] * 2, "CompileError"),
+        ([{"status": Status.HARNESS_ERROR, "outcome": None, "activation": None}] * 2, "Ignored"),
+        ([{"status": Status.HARNESS_ERROR, "outcome": None, "activation": None}, {}], "Survived"),
+    ],
+)
+def test_status(
+    became: list[dict[str, Any] | None],
+    status: str,
+    experiment: Callable[..., Experiment],
+    record: Callable[..., Record],
+) -> None:
+    """The status of a fault follows from what became of its drives, hazards first."""
+    drives = [experiment(scenario=f"S{i}") for i in range(len(became))]
+    records = {
+        e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None
+    }
+    found = verdict(drives, records)
+    assert found["status"] == status
+    assert found["testsCompleted"] == sum(r.status is Status.OK for r in records.values())

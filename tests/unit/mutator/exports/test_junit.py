@@ -1,0 +1,88 @@
+"""Runs as JUnit XML."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.exports import Format, export
+from mutator.model import Experiment, Outcome, Status
+from mutator.workspace import Workspace
+
+BECAME: dict[str, dict[str, Any] | None] = {
+    "lane": {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "alerts": (("brake_hard", 3.0),)},
+    "silence": {
+        "status": Status.HARNESS_ERROR,
+        "outcome": None,
+        "activation": None,
+        "detail": "no <disk>\x00 & so on",
+    },
+}
+
+
+def became(e: Experiment) -> dict[str, Any] | None:
+    """Lane: hazards. Silence: harness errors. Distance: masked, not active, not run."""
+    if e.fault.fault_type in BECAME:
+        return BECAME[e.fault.fault_type]
+    if e.method.value == "random":
+        return None
+    return {"outcome": Outcome.NOT_ACTIVATED, "activation": None} if e.scenario == "B" else {}
+
+
+@pytest.fixture
+def run(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Path:
+    return write_run(toycar, tmp_path / "run", became)
+
+
+def cases(file: Path) -> dict[str, list[ET.Element]]:
+    """The cases of each suite, by the last word of its name."""
+    root = ET.parse(file).getroot()
+    suites = root.findall("testsuite")
+    for element in (root, *suites):
+        assert int(element.get("tests", "")) == len(list(element.iter("testcase")))
+        for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            assert int(element.get(name, "")) == len(list(element.iter(tag)))
+    return {suite.get("name", "").split("/")[1]: suite.findall("testcase") for suite in suites}
+
+
+def test_a_hazard_is_data(run: Path) -> None:
+    """By default hazards pass, harness errors are errors, what did not act or run is skipped; counts agree."""
+    file = export(run, Format.JUNIT)
+    found = cases(file)
+    assert set(found) == {"lane", "silence", "distance"}
+    assert ET.parse(file).getroot().get("failures") == "0"
+    for case in found["lane"]:
+        assert [child.tag for child in case] == ["properties"]
+        told = {p.get("name"): p.get("value") for p in case.iter("property")}
+        assert (told["ending"], told["hazard H3 [s]"], told["alerts"]) == ("hazard", "4.00", "brake_hard")
+    for case in found["silence"]:
+        assert case.find("error").get("message") == "no <disk>? & so on"  # type: ignore[union-attr]
+    skipped = {
+        case.find("skipped") is not None
+        for case in found["distance"]
+        if "guided" not in str(case.get("name"))
+    }
+    assert skipped == {True}
+
+
+def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
+    """Who wants to see hazards as failures says so; they then name hazard and time."""
+    found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", failures=["hazard"]))
+    assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
+    assert not any(list(c.iter("failure")) for c in found["distance"])
+
+
+def test_an_error_cannot_be_a_failure(run: Path) -> None:
+    """A harness error says nothing about the controller, so it is no failure of its."""
+    with pytest.raises(MutatorError, match="harness_error"):
+        export(run, Format.JUNIT, failures=["harness_error"])
+
+
+def test_tables_are_those_of_the_run(run: Path, tmp_path: Path) -> None:
+    """CSV and Parquet are the run's own tables, brought up to date."""
+    for format, name in ((Format.CSV, "results.csv"), (Format.PARQUET, "results.parquet")):
+        file = export(run, format, tmp_path / "new" / name)
+        assert file.read_bytes() == (run / name).read_bytes()

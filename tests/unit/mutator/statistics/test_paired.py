@@ -1,0 +1,63 @@
+"""Statistics of pairs."""
+
+import math
+
+import pandas as pd
+import pytest
+
+from mutator.statistics.paired import Difference, Matched, mcnemar, rate_difference, times
+
+
+def flags(text: str) -> pd.Series:
+    return pd.Series([letter == "1" for letter in text], dtype=bool)
+
+
+def test_mcnemar_looks_at_pairs_that_differ() -> None:
+    """The counts are those of the pairs, the p-value the exact binomial one of those that differ."""
+    found = mcnemar(flags("1111111100"), flags("1000000010"))
+    assert (found.both, found.first_only, found.second_only, found.neither, found.pairs) == (1, 7, 1, 1, 10)
+    assert found.p == pytest.approx(2 * (1 + 8) / 2**8)
+
+
+def test_nothing_differs() -> None:
+    """Equal flags have p 1 and a difference of 0 with nothing around it."""
+    same = flags("1100")
+    assert mcnemar(same, same) == Matched(both=2, first_only=0, second_only=0, neither=2, p=1.0)
+    found = rate_difference(same, same, pd.Series(list("abcd")))
+    assert found == Difference(difference=0.0, low=0.0, high=0.0)
+
+
+def test_whole_faults_are_drawn_anew() -> None:
+    """Ten equal pairs of each of few faults say little: the interval is as wide as that of few faults."""
+    first, second = flags("0" * 40), flags("1" * 10 + "0" * 30)
+    alike = rate_difference(first, second, pd.Series([i // 10 for i in range(40)]))
+    apart = rate_difference(first, second, pd.Series(range(40)))
+    assert alike.difference == apart.difference == 0.25
+    assert alike.high - alike.low > 1.5 * (apart.high - apart.low)
+    assert rate_difference(first, second, pd.Series(range(40))) == apart  # the same each time
+
+
+def test_one_fault_has_no_interval() -> None:
+    """With a single fault there is nothing to draw anew."""
+    found = rate_difference(flags("00"), flags("10"), pd.Series(["a", "a"]))
+    assert found.difference == 0.5
+    assert math.isnan(found.low)
+
+
+def test_times_of_pairs() -> None:
+    """Medians and their difference are of the pairs that have both times; the interval is exact."""
+    first = pd.Series([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, None, 9.0])
+    second = first + pd.Series([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.0, None])
+    found = times(first, second)
+    assert (found.n, found.first, found.second) == (7, 4.0, 4.8)
+    assert found.median == Difference(difference=0.8, low=0.5, high=1.1)
+    assert found.p == pytest.approx(2 / 2**7)
+
+
+def test_equal_and_missing_times() -> None:
+    """Where no time differs there is nothing to test; where there is none, no number is made up."""
+    same = pd.Series([1.0, 0.1 + 0.2])
+    assert math.isnan(times(same, pd.Series([1.0, 0.3])).p)
+    none = times(pd.Series([None], dtype=float), pd.Series([1.0]))
+    assert none.n == 0
+    assert math.isnan(none.median.difference)
