@@ -28,7 +28,7 @@ def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
 
 
 def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """What changed is in the terminal's tables, and written beside the second run; without a gate it is fine."""
+    """What changed is in the terminal's tables, and written beside the second run."""
     answer = cli("compare", *runs)
     assert answer.code == 0, answer.err
     for wanted in ("new-hazard", "sensor/silence", "24 experiments are in both runs"):
@@ -38,7 +38,7 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """With --fail-on a new hazard is exit code 1 and its experiment is named; the other way round it is fine."""
+    """With --fail-on a new hazard is exit code 1 and named; the other way round it is fine."""
     failed = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,unmatched")
     assert failed.code == 1
     assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err

@@ -1,6 +1,7 @@
 """Runs in notebooks."""
 
 import dataclasses
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ from mutator.records import SCHEMA, LineWriter
 from mutator.runfolder import RunFolder
 from mutator.single import run_single
 from mutator.workspace import Workspace
+
+LANE = 'fault_type == "lane" and method == "random"'
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "use-in-a-notebook.md"
 
 
 def became(e: Experiment) -> dict[str, Any]:
@@ -72,7 +76,9 @@ def test_it_says_what_it_is(run: Run) -> None:
 @pytest.fixture
 def driven(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Run:
     """A run of one experiment that was really driven, with golden run, patch and record, and no trace."""
-    folder = RunFolder.open(write_run(toycar, tmp_path / "driven", lambda e: None, campaign="small", limit=1))
+    folder = RunFolder.open(
+        write_run(toycar, tmp_path / "runs" / "first", lambda e: None, campaign="small", only=LANE, limit=1)
+    )
     [experiment] = planfile.read_all(folder.path)
     single = run_single(toycar, toycar.manifest("toycar"), experiment, tmp_path / "single")
     golden = folder.golden(experiment.scenario, experiment.changes)
@@ -100,6 +106,21 @@ def test_traces_are_driven_when_asked_for(driven: Run) -> None:
     assert (driven.path / "traces" / name / "faulty" / "log.npz").is_file()
     assert driven.trace(name) is faulty
     assert "# fi:" in driven.patch(name)
+
+
+def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The code of the page runs as it is printed, one block after the other, on a run in runs/first."""
+    assert driven.root is not None
+    monkeypatch.setenv("MUTATOR_ROOT", str(driven.root))
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 5
+    names: dict[str, Any] = {}
+    for block in blocks:
+        exec(compile(block, PAGE, "exec"), names)
+    assert names["difference"].max() == 0.0 < (names["faulty"] - names["golden"])["wheel_turn"].abs().max()
+    assert names["fault"].fault_type == "lane"
 
 
 def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def cases(file: Path) -> dict[str, list[ET.Element]]:
 
 
 def test_a_hazard_is_data(run: Path) -> None:
-    """By default hazards pass, harness errors are errors, what did not act or run is skipped; counts agree."""
+    """Hazards pass, harness errors are errors, what did not act or run is skipped; counts agree."""
     file = export(run, Format.JUNIT)
     found = cases(file)
     assert set(found) == {"lane", "silence", "distance"}
