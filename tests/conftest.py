@@ -116,7 +116,7 @@ def experiment() -> Callable[..., Experiment]:
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def record() -> Callable[..., Record]:
     """Makes a record of an experiment that went well and whose fault was masked, but for what is given."""
 
@@ -139,7 +139,7 @@ def record() -> Callable[..., Record]:
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
     """Makes a run folder whose records are made up: nothing is driven."""
 

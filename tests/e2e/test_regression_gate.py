@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    """A clone of the toy with the page's script, a copy of its controller, and one that steers too little."""
+    """The toy with the page's script, a copy of its controller, and one that keeps to the right."""
     toy = CLONE / "tests" / "toy"
     ignored = shutil.ignore_patterns("__pycache__", "hostile")
     shutil.copytree(toy / "fault_library", tmp_path / "fault_library", ignore=ignored)
@@ -26,7 +26,7 @@ def root(tmp_path: Path) -> Path:
         shutil.copytree(toy / "tree", tmp_path / name, ignore=ignored)
     driver = tmp_path / "worse" / "toycar" / "driver.py"
     text = driver.read_text()
-    driver.write_text(text.replace("-0.6 * offset", "-0.25 * offset"))
+    driver.write_text(text.replace("-0.6 * offset", "-0.6 * (offset + 0.3)"))
     assert driver.read_text() != text
     [script] = re.findall(r"^```sh\n(#!/bin/sh\n.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     (tmp_path / "gate.sh").write_text(script)

@@ -31,11 +31,16 @@ def became(e: Experiment) -> dict[str, Any]:
     return hazard if e.fault.fault_type == "lane" else {}
 
 
-@pytest.fixture
-def run(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Run:
+@pytest.fixture(scope="module")
+def run(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+) -> Run:
     """A toy run with made up records."""
-    folder = write_run(toycar, tmp_path / "runs" / "first", became)
-    return mutator.load_run(folder, root=toycar.library.parent)
+    folder = tmp_path_factory.mktemp("load")
+    toycar = copy_toycar(folder)
+    return mutator.load_run(write_run(toycar, folder / "first", became), root=toycar.library.parent)
 
 
 def test_the_frame_is_typed(run: Run) -> None:

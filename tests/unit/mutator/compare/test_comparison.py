@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -29,16 +30,20 @@ def lane_is_left(e: Experiment) -> dict[str, Any]:
     return HAZARD
 
 
-@pytest.fixture
-def runs(toycar: Workspace, tmp_path: Path, write_run: Write) -> tuple[Path, Path]:
+@pytest.fixture(scope="module")
+def runs(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
+) -> tuple[Path, Path]:
     """Two runs of the toy: in `before` nothing happens, in `after` the target is another one and worse."""
-    before = write_run(toycar, tmp_path / "before")
+    place = tmp_path_factory.mktemp("runs")
+    toycar = copy_toycar(place)
+    before = write_run(toycar, place / "before")
     driver = toycar.library.parent / "tree" / "toycar" / "driver.py"
     driver.write_text(driver.read_text().replace("-0.6 * offset", "-0.1 * offset"))
-    return before, write_run(toycar, tmp_path / "after", lane_is_left)
+    return before, write_run(toycar, place / "after", lane_is_left)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def found(runs: tuple[Path, Path]) -> Comparison:
     return compare(*runs)
 
@@ -54,13 +59,14 @@ def test_what_differs_is_told(found: Comparison) -> None:
     assert found.remarks == ()
 
 
-def test_a_run_planned_before_files_were_written_down(runs: tuple[Path, Path]) -> None:
+def test_a_run_planned_before_files_were_written_down(runs: tuple[Path, Path], tmp_path: Path) -> None:
     """Runs whose head has no list of files are compared; that it is not known is told."""
-    head = runs[0] / HEAD
+    old = shutil.copytree(runs[0], tmp_path / "old")
+    head = old / HEAD
     told = json.loads(head.read_text())
     del told["target_files"]
     head.write_text(json.dumps(told))
-    assert "is not known" in pages.files_text(compare(*runs))
+    assert "is not known" in pages.files_text(compare(old, runs[1]))
 
 
 def test_gates_name_what_is_worse(found: Comparison) -> None:
@@ -107,14 +113,14 @@ def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
         compare(*runs, only="value == -1")
 
 
-def test_a_failed_proof_is_not_compared(runs: tuple[Path, Path]) -> None:
+def test_a_failed_proof_is_not_compared(runs: tuple[Path, Path], tmp_path: Path) -> None:
     """A run whose engine was proved wrong is refused."""
-    _, after = runs
+    after = shutil.copytree(runs[1], tmp_path / "after")
     (after / "proof").mkdir()
     lines = (after / "records" / "0001-a.jsonl").read_text().replace('"outcome":"masked"', '"outcome":"sdc"')
     (after / "proof" / "0001-a.jsonl").write_text(lines)
     with pytest.raises(CheckFailed, match="reference engine"):
-        compare(*runs)
+        compare(runs[0], after)
 
 
 def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
@@ -167,8 +173,8 @@ def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
     }
 
 
-def test_it_is_written_the_same_each_time(runs: tuple[Path, Path], tmp_path: Path) -> None:
+def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, Path], tmp_path: Path) -> None:
     """The same runs give the same bytes."""
-    one, two = (pages.write(compare(*runs), tmp_path / name) for name in "ab")
+    one, two = (pages.write(c, tmp_path / name) for c, name in ((found, "a"), (compare(*runs), "b")))
     for a, b in ((one.page, two.page), (one.markdown, two.markdown), (one.pairs, two.pairs)):
         assert a.read_bytes() == b.read_bytes()

@@ -29,9 +29,13 @@ HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.0),)}
 IDLE = {"outcome": Outcome.NOT_ACTIVATED, "activation": None}
 
 
-@pytest.fixture
-def report(toycar: Workspace, tmp_path: Path, write_run: Write) -> dict[str, Any]:
+@pytest.fixture(scope="module")
+def report(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
+) -> dict[str, Any]:
     """The report of a toy run whose faults of the lane are hazardous."""
+    tmp_path = tmp_path_factory.mktemp("report")
+    toycar = copy_toycar(tmp_path)
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD if e.fault.fault_type == "lane" else {})
     file = export(run, Format.MUTATION_ELEMENTS, workspace=toycar)
     assert file == run.resolve() / "exports" / "mutation-elements.json"

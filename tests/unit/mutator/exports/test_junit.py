@@ -32,9 +32,14 @@ def became(e: Experiment) -> dict[str, Any] | None:
     return {"outcome": Outcome.NOT_ACTIVATED, "activation": None} if e.scenario == "B" else {}
 
 
-@pytest.fixture
-def run(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Path:
-    return write_run(toycar, tmp_path / "run", became)
+@pytest.fixture(scope="module")
+def run(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+) -> Path:
+    folder = tmp_path_factory.mktemp("junit")
+    return write_run(copy_toycar(folder), folder / "run", became)
 
 
 def cases(file: Path) -> dict[str, list[ET.Element]]:
