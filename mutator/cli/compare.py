@@ -11,8 +11,8 @@ from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
     from mutator.compare.comparison import Comparison, Finding, Gate
-    from mutator.statistics.sheet import Sheet
 
+SHOWN = 4  # tables that the terminal shows: those that are not by fault type, but for the changes
 NAMED = 20  # experiments that the terminal names; the written comparison has all
 GATES = "new-hazard, other-hazard, earlier-hazard, lost-alert, worse, new-crash, harness-error, unmatched"
 
@@ -87,31 +87,14 @@ def _show(terminal: Terminal, found: "Comparison") -> None:
         terminal.table(["what differs", found.names.a, found.names.b], differing)
         terminal.say(pages.files_text(found))
         terminal.say()
-    endings, changes, rates, times = found.sheets
-    for sheet in (endings, changes, _in_all(rates), _in_all(times)):
+    for sheet in found.sheets[:SHOWN]:
         terminal.say(sheet.title, style="bold")
-        terminal.table(
-            list(sheet.heads),
-            sheet.texts(),
-            right=range(1, len(sheet.heads)),
-            total=sheet is changes,
-        )
+        heads, lines = list(sheet.heads), sheet.texts()
+        terminal.table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")
         terminal.say()
     terminal.say(pages.summary(found))
     for remark in found.remarks:
         terminal.say(remark)
-
-
-def _in_all(sheet: "Sheet") -> "Sheet":
-    """The lines of all fault types together, without the columns that say so."""
-    import dataclasses
-
-    keep = [i for i, head in enumerate(sheet.heads) if head not in ("fault type", "p, Holm")]
-    return dataclasses.replace(
-        sheet,
-        heads=tuple(sheet.heads[i] for i in keep),
-        lines=tuple(tuple(line[i] for i in keep) for line in sheet.lines if line[1] == "in all"),
-    )
 
 
 def _as_json(found: "Comparison", failing: "tuple[Finding, ...]") -> dict[str, object]:

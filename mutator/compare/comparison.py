@@ -13,8 +13,8 @@ from mutator.compare.sheets import (
     changes_sheet,
     endings_sheet,
     frame_of,
-    rates_sheet,
-    times_sheet,
+    rates_sheets,
+    times_sheets,
 )
 from mutator.compare.sides import Side, read_side, words
 from mutator.errors import MutatorError
@@ -65,14 +65,10 @@ class Comparison:
 
     @cached_property
     def changed(self) -> tuple[Pair, ...]:
-        """The pairs with any change, those with a new hazard first, then in the order of `Change`."""
+        """The pairs with any change: new hazards first, then as in `Change`, and as in the plan."""
         order = list(Change)
-        return tuple(
-            sorted(
-                (p for p in self.pairs if p.changes),
-                key=lambda p: (sorted(map(order.index, p.changes)), words(p.b)),
-            )
-        )
+        changed = (pair for pair in self.pairs if pair.changes)
+        return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.changes))))
 
     def having(self, change: Change) -> tuple[Pair, ...]:
         return tuple(p for p in self.pairs if change in p.changes)
@@ -93,12 +89,10 @@ class Comparison:
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables, those first that are read first."""
         frame = frame_of(self.pairs)
-        return (
-            endings_sheet(self.pairs, self.names),
-            changes_sheet(self.pairs),
-            rates_sheet(frame, self.names),
-            times_sheet(frame, self.names),
-        )
+        rates, rates_by_type = rates_sheets(frame, self.names)
+        spans, spans_by_type = times_sheets(frame, self.names)
+        counts = (endings_sheet(self.pairs, self.names), changes_sheet(self.pairs))
+        return (*counts, rates, spans, rates_by_type, spans_by_type)
 
     @cached_property
     def unmatched(self) -> tuple[tuple[str, Experiment], ...]:

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -10,7 +10,7 @@ import pandas as pd
 from mutator.compare.pairs import Change, Pair, time_to_hazard
 from mutator.model import Outcome, Status
 from mutator.statistics.compare import holm
-from mutator.statistics.paired import Matched, Times, mcnemar, rate_difference, times
+from mutator.statistics.paired import mcnemar, rate_difference, times
 from mutator.statistics.share import share
 from mutator.statistics.sheet import Cell, P, Sheet
 from mutator.tables import Row, by_fault_type
@@ -18,7 +18,6 @@ from mutator.tables import Row, by_fault_type
 FLAGS = {"activated": "t_activation", "manifested": "t_manifest", "alert": "t_alert", "hazard": "t_hazard"}
 # of an experiment, each counted from its activation; the last from its first alert
 TIMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
-_IN_ALL = "in all"
 
 
 def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
@@ -64,76 +63,82 @@ class Names:
     b: str
 
 
-def groups(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    """All pairs, then those of each fault type."""
-    yield _IN_ALL, frame
-    for kind, group in frame.groupby("kind"):
-        yield str(kind), group
-
-
-def rates_sheet(frame: pd.DataFrame, names: Names) -> Sheet:
-    """For each flag, in all and of each fault type: rates, their difference, McNemar's exact test."""
-    lines: list[tuple[Cell, ...]] = []
+def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
+    """Rates, their difference and McNemar's exact test of each flag: of all pairs, and of each fault type."""
+    whole = tuple((flag, *_rates(frame, flag)) for flag in FLAGS)
+    parts: list[tuple[Cell, ...]] = []
     for flag in FLAGS:
-        found = {kind: (_matched(g, flag), g) for kind, g in groups(frame)}
-        adjusted = _adjusted({kind: m.p for kind, (m, _) in found.items() if kind != _IN_ALL})
-        for kind, (m, group) in found.items():
-            change = rate_difference(group[f"{flag}_a"], group[f"{flag}_b"], group["fault"])
-            rates = (share(m.both + m.first_only, m.pairs), share(m.both + m.second_only, m.pairs))
-            lines.append(
-                (
-                    *(flag, kind, m.pairs, *rates, m.first_only, m.second_only),
-                    *(change.difference, change.low, change.high, P(m.p), adjusted.get(kind)),
-                )
-            )
-    return Sheet(
-        name="rates",
-        title="What came in how many runs",
-        note=f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
+        found = {str(kind): _rates(group, flag) for kind, group in frame.groupby("kind")}
+        parts += _adjusted(flag, found)
+    note = (
+        f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
         "(of 1), its interval resampled by fault (variant and value). p: McNemar's exact test of the pairs "
-        "that differ; p, Holm: adjusted over the fault types.",
-        heads=(
-            *("what", "fault type", "pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
-            *("difference", "difference, low", "difference, high", "p", "p, Holm"),
-        ),
-        lines=tuple(lines),
+        "that differ"
+    )
+    heads = (
+        *("pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
+        *("difference", "difference, low", "difference, high", "p"),
+    )
+    return _both("rates", "What came in how many runs", note, ("what", heads), whole, parts)
+
+
+def _rates(frame: pd.DataFrame, flag: str) -> tuple[Cell, ...]:
+    first, second = frame[f"{flag}_a"], frame[f"{flag}_b"]
+    m, change = mcnemar(first, second), rate_difference(first, second, frame["fault"])
+    rates = (share(m.both + m.first_only, m.pairs), share(m.both + m.second_only, m.pairs))
+    return (
+        *(m.pairs, *rates, m.first_only, m.second_only),
+        *(change.difference, change.low, change.high, P(m.p)),
     )
 
 
-def _matched(frame: pd.DataFrame, flag: str) -> Matched:
-    return mcnemar(frame[f"{flag}_a"], frame[f"{flag}_b"])
+def times_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
+    """Medians, their difference and Wilcoxon's test of each time: of all pairs, and by fault type."""
+    known = {name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIMES}
+    whole = tuple((name, *_times(some, name)) for name, some in known.items() if len(some))
+    parts: list[tuple[Cell, ...]] = []
+    for name, some in known.items():
+        parts += _adjusted(name, {str(kind): _times(group, name) for kind, group in some.groupby("kind")})
+    note = (
+        f"Medians in s. Difference: the median of the pairs' differences, {names.b} less {names.a}, with its "
+        "exact interval (none for fewer than six pairs). p: Wilcoxon's signed-rank test (none where no pair "
+        "differs)"
+    )
+    heads = ("pairs", names.a, names.b, "difference", "difference, low", "difference, high", "p")
+    return _both("times", "How long it took, where it came in both runs", note, ("time", heads), whole, parts)
 
 
-def _adjusted(p_values: dict[str, float]) -> dict[str, Cell]:
-    known = {kind: p for kind, p in p_values.items() if not math.isnan(p)}
-    return {kind: P(p) for kind, p in zip(known, holm(list(known.values())), strict=True)}
+def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
+    t = times(frame[f"{name}_a"], frame[f"{name}_b"])
+    return (t.n, t.first, t.second, t.median.difference, t.median.low, t.median.high, P(t.p))
 
 
-def times_sheet(frame: pd.DataFrame, names: Names) -> Sheet:
-    """For each time, in all and of each fault type that has it: medians, their difference, Wilcoxon."""
-    lines: list[tuple[Cell, ...]] = []
-    for name in TIMES:
-        found: dict[str, Times] = {k: times(g[f"{name}_a"], g[f"{name}_b"]) for k, g in groups(frame)}
-        adjusted = _adjusted({kind: t.p for kind, t in found.items() if kind != _IN_ALL})
-        lines += [
-            (
-                *(name, kind, t.n, t.first, t.second),
-                *(t.median.difference, t.median.low, t.median.high, P(t.p), adjusted.get(kind)),
-            )
-            for kind, t in found.items()
-            if t.n
-        ]
-    return Sheet(
-        name="times",
-        title="How long it took, where it came in both runs",
-        note=f"Medians in s. Difference: the median of the pairs' differences, {names.b} less {names.a}, "
-        "with its exact interval (none for fewer than six pairs); p: Wilcoxon's signed-rank test (none where "
-        "no pair differs); p, Holm: adjusted over the fault types.",
-        heads=(
-            *("time", "fault type", "pairs", names.a, names.b),
-            *("difference", "difference, low", "difference, high", "p", "p, Holm"),
+def _adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
+    """The lines of one thing by fault type; behind p, which is the last cell, what it is after Holm."""
+    p_values = {kind: cells[-1] for kind, cells in found.items()}
+    known = {kind: p for kind, p in p_values.items() if isinstance(p, P) and not math.isnan(p)}
+    holm_values = dict(zip(known, map(P, holm(list(known.values()))), strict=True))
+    return [(name, kind, *cells, holm_values.get(kind)) for kind, cells in found.items()]
+
+
+def _both(
+    name: str,
+    title: str,
+    note: str,
+    heads: tuple[str, tuple[str, ...]],
+    whole: tuple[tuple[Cell, ...], ...],
+    parts: Sequence[tuple[Cell, ...]],
+) -> tuple[Sheet, Sheet]:
+    what, numbers = heads
+    return (
+        Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),
+        Sheet(
+            name=f"{name}_by_fault_type",
+            title=f"{title}, by fault type",
+            note=f"{note}; p, Holm: adjusted over the fault types.",
+            heads=(what, "fault type", *numbers, "p, Holm"),
+            lines=tuple(parts),
         ),
-        lines=tuple(lines),
     )
 
 
