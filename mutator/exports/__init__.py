@@ -1,18 +1,6 @@
 """A run written for other tools: mutation testing viewers, CI servers, spreadsheets, data frames."""
 
-from collections.abc import Sequence
 from enum import StrEnum
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from mutator import results
-from mutator.jsonio import make_folder, write_atomic
-from mutator.runfolder import RunFolder
-
-if TYPE_CHECKING:
-    from mutator.workspace import Workspace
-
-FOLDER = "exports"
 
 
 class Format(StrEnum):
@@ -22,47 +10,3 @@ class Format(StrEnum):
     JUNIT = "junit"
     CSV = "csv"
     PARQUET = "parquet"
-
-
-FILES = {
-    Format.MUTATION_ELEMENTS: "mutation-elements.json",
-    Format.JUNIT: "junit.xml",
-    Format.CSV: "results.csv",
-    Format.PARQUET: "results.parquet",
-}
-
-
-def export(
-    run: Path,
-    format: Format,
-    out: Path | None = None,
-    *,
-    workspace: "Workspace | None" = None,
-    failures: Sequence[str] = (),
-) -> Path:
-    """Write the run folder `run` as `format` to `out` (default: RUN/exports/); returns the file.
-
-    A mutation report shows sources, so it needs the `workspace` with the target that was run; `failures` are
-    the endings that JUnit is told as failures. MutatorError for a target that has changed since.
-    """
-    folder = RunFolder.open(run)
-    place = out or folder.path / FOLDER / FILES[format]
-    make_folder(place.parent)
-    write_atomic(place, _content(folder, format, workspace, failures))
-    return place
-
-
-def _content(
-    folder: RunFolder, format: Format, workspace: "Workspace | None", failures: Sequence[str]
-) -> bytes:
-    if format is Format.MUTATION_ELEMENTS:
-        from mutator.exports import elements
-
-        assert workspace is not None
-        return elements.content(folder, workspace)
-    if format is Format.JUNIT:
-        from mutator.exports import junit
-
-        return junit.content(folder, failures)
-    table = results.ensure(folder.path)
-    return (table if format is Format.CSV else table.with_suffix(".parquet")).read_bytes()

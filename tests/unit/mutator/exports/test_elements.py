@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.exports import Format, export
+from mutator.exports import Format
 from mutator.exports.elements import verdict
+from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.workspace import Workspace
 

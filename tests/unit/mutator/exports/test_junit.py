@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.exports import Format, export
+from mutator.exports import Format
+from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 
