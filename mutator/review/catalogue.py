@@ -1,0 +1,248 @@
+"""What there is to review: the mutants of a library or campaign, grouped by place, template and trigger.
+
+A group does not depend on which of its mutants are asked for: its id comes from what it is about, and what a
+decision about it is bound to (`Bound`) from its diff with holes, the target's functions and the templates.
+"""
+
+import ast
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from mutator.expand import expand
+from mutator.fault_models import PROBE_TEMPLATE, FaultModels
+from mutator.ids import content_id
+from mutator.manifest import TargetManifest
+from mutator.model import Experiment, Fault, FaultLocation, Injection, Trigger
+from mutator.mutant import OBSERVE_TAG, build
+from mutator.review import groups
+from mutator.review.groups import Shape
+from mutator.spec import READINGS, FaultSpec
+from mutator.splice import PROBE_TAG
+from mutator.trigger import always, at_time
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
+
+_FAULT_TAG = re.compile(rf"^\+.*# fi:(?!{PROBE_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
+_HUNK_HEAD = re.compile(r"^@@ .*$", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bound:
+    """Digests of what a decision is about; when one of them changes, the decision no longer holds."""
+
+    diff: str  # the hunks with injected lines, their values and line numbers cut out
+    function: str  # the target's functions that they stand in, as they are without them
+    template: str  # the templates that they were made from
+
+    def changed(self, now: "Bound") -> list[str]:
+        """What is no longer what it was, in words."""
+        words = {"template": "template", "function": "target function", "diff": "diff"}
+        return [word for name, word in words.items() if getattr(self, name) != getattr(now, name)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Mutants that differ in values alone. `what` says where, with which template, and when, in one line.
+
+    `shapes` are its diffs with holes: one, but where a template writes other lines for other numbers. Their
+    members are `faults`, by id. `runs` is how many experiments there are; None: no campaign was asked for.
+    """
+
+    id: str
+    what: str
+    places: tuple[str, ...]
+    functions: tuple[str, ...]
+    models: tuple[str, ...]
+    trigger: str
+    hold: str
+    shapes: tuple[Shape, ...]
+    faults: tuple[Fault, ...]
+    triggers: tuple[Trigger, ...]
+    runs: int | None
+    bound: Bound
+
+    @property
+    def diff(self) -> str:
+        """Its diffs with holes, for reading."""
+        return "".join(shape.diff for shape in self.shapes)
+
+    @property
+    def specs(self) -> tuple[str, ...]:
+        """The variants that its faults are of."""
+        return tuple(dict.fromkeys(fault.spec for fault in self.faults))
+
+
+_Member = tuple[Fault, Trigger]
+
+
+def of_experiments(
+    workspace: "Workspace", manifest: TargetManifest, experiments: Iterable[Experiment]
+) -> tuple[Group, ...]:
+    """The groups of these experiments' mutants, the probe's first."""
+    members = [(e.fault, e.trigger) for e in experiments]
+    return _Catalogue(workspace.fault_models(), manifest).groups(members, counted=True)
+
+
+def of_library(
+    workspace: "Workspace",
+    manifest: TargetManifest,
+    *,
+    specs: Sequence[str] = (),
+    readings: Sequence[str] = READINGS,
+    seed: int = 0,
+) -> tuple[Group, ...]:
+    """The groups of the library's faults, the probe's first.
+
+    Under every context of its tables, and at a random time: what campaigns make of them, but for those that
+    say how long a fault stays. `specs` are spec files or globs over specs (none: all); MutatorError for one
+    that matches nothing.
+    """
+    models = workspace.fault_models()
+    tables = map(workspace.context_table, workspace.context_table_names())
+    contexts = [t for table in tables for t in table.triggers(armed_after_s=manifest.armed_after_s)]
+    triggers = (*contexts, at_time(manifest.armed_after_s))
+    faults = [
+        fault
+        for spec in _specs(workspace, specs)
+        for reading in readings
+        for fault in expand(spec, seed, reading, models=models, manifest=manifest)
+    ]
+    members = [(fault, trigger) for fault in faults for trigger in triggers]
+    return _Catalogue(models, manifest).groups(members, counted=False)
+
+
+def _specs(workspace: "Workspace", wanted: Sequence[str]) -> Iterator[FaultSpec]:
+    """The specs meant: all, files, or those whose name is like a glob."""
+    library = workspace.specs()
+    if not wanted:
+        yield from library
+    for text in wanted:
+        hits = [spec for spec in library if fnmatchcase(spec.name, text)]
+        yield from hits or [workspace.spec(text)]
+
+
+class _Catalogue:
+    """Makes the groups of one target and its templates."""
+
+    def __init__(self, models: FaultModels, manifest: TargetManifest) -> None:
+        self.models = models
+        self.manifest = manifest
+
+    def groups(self, members: Sequence[_Member], *, counted: bool) -> tuple[Group, ...]:
+        """The groups of `members`, those of one file side by side; with `counted` each is an experiment."""
+        found: dict[str, list[_Member]] = {}
+        for fault, trigger in members:
+            found.setdefault(groups.label(fault, trigger), []).append((fault, trigger))
+        patches: dict[tuple[Injection, ...], str] = {}
+        for fault, trigger in members:
+            if fault.injections not in patches:
+                mutant = build(self.manifest, self.models, fault, trigger)
+                patches[fault.injections] = fault_hunks(mutant.patch)
+        made = [self._group(what, found[what], patches, counted) for what in sorted(found)]
+        return (self._probe(counted), *made)
+
+    def _group(
+        self,
+        what: str,
+        members: Sequence[_Member],
+        patches: dict[tuple[Injection, ...], str],
+        counted: bool,
+    ) -> Group:
+        faults = {fault.id: fault for fault, _ in members}
+        shapes = groups.shapes((fault.id, what, patches[fault.injections]) for fault in faults.values())
+        fault, trigger = members[0]
+        return Group(
+            id=self._id(what),
+            what=what,
+            places=tuple(groups.place(injection.location) for injection in fault.injections),
+            functions=tuple(dict.fromkeys(i.location.function for i in fault.injections)),
+            models=tuple(dict.fromkeys(injection.model for injection in fault.injections)),
+            trigger=groups.trigger_kind(trigger),
+            hold=groups.hold(fault, trigger).value,
+            shapes=tuple(s.named(groups.parameters(faults[m]) for m in s.members) for s in shapes),
+            faults=tuple(faults.values()),
+            triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
+            runs=len(members) if counted else None,
+            bound=self._bound(
+                sorted({patches[fault.injections] for fault in faults.values()}, key=groups.cut),
+                [injection.location for injection in fault.injections],
+                {i.model: self.models.get(i.model).template for i in fault.injections},
+            ),
+        )
+
+    def _probe(self, counted: bool) -> Group:
+        """What every mutant gets: the probe, its import, and the statement that observes."""
+        location = self.manifest.observation.location
+        what = f"the probe, observing at {groups.place(location)}"
+        patch = build(self.manifest, self.models, None, always()).patch
+        return Group(
+            id=self._id(what),
+            what=what,
+            places=(groups.place(location),),
+            functions=(location.function,),
+            models=(PROBE_TEMPLATE.partition(".")[0],),
+            trigger="",
+            hold="",
+            shapes=tuple(groups.shapes([("", what, patch)])),
+            faults=(),
+            triggers=(),
+            runs=0 if counted else None,
+            bound=self._bound([patch], [location], {PROBE_TEMPLATE: self.models.probe}),
+        )
+
+    def _id(self, what: str) -> str:
+        return content_id([self.manifest.name, what])[:12]
+
+    def _bound(
+        self, patches: Sequence[str], locations: Sequence[FaultLocation], templates: dict[str, str]
+    ) -> Bound:
+        diffs = dict.fromkeys(_HUNK_HEAD.sub("@@", groups.cut(patch)) for patch in patches)
+        sources = {
+            f"{place.path} {place.function}": _function(
+                self.manifest.tree.files[place.path], place.function
+            ).decode("utf-8", "surrogateescape")
+            for place in locations
+        }
+        return Bound(
+            diff=content_id(list(diffs)), function=content_id(sources), template=content_id(templates)
+        )
+
+
+def fault_hunks(patch: str) -> str:
+    """The hunks that hold lines of a fault, without those that every mutant has."""
+    kept = []
+    for section in re.split(r"^(?=diff --git )", patch, flags=re.MULTILINE):
+        head, *hunks = re.split(r"^(?=@@ )", section, flags=re.MULTILINE)
+        if "\nnew file mode " not in head:
+            own = [hunk for hunk in hunks if _FAULT_TAG.search(hunk)]
+            kept += [head, *own] if own else []
+    return "".join(kept)
+
+
+@lru_cache(maxsize=256)
+def _function(data: bytes, name: str) -> bytes:
+    """The source of the functions of that qualified name, decorators included."""
+    lines = data.splitlines(keepends=True)
+    spans = [
+        (min(n.lineno for n in (node, *node.decorator_list)), node.end_lineno)
+        for path, node in _functions(ast.parse(data), ())
+        if path == name
+    ]
+    return b"".join(b"".join(lines[first - 1 : last]) for first, last in spans)
+
+
+def _functions(
+    tree: ast.AST, path: tuple[str, ...]
+) -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    for node in ast.iter_child_nodes(tree):
+        inside = path
+        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            inside = (*path, node.name)
+            if not isinstance(node, ast.ClassDef):
+                yield ".".join(inside), node
+        yield from _functions(node, inside)

@@ -1,0 +1,69 @@
+"""`--require-reviewed`: nothing is run that nobody has approved, and a run says who approved what it ran."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from mutator.errors import CheckFailed
+from mutator.ids import plain
+from mutator.jsonio import read_json, write_json
+from mutator.plan import Plan
+from mutator.review.catalogue import Group, of_experiments
+from mutator.review.decisions import Review, State, load_review
+from mutator.workspace import Workspace
+
+SCHEMA = "reviewed/1"
+FILE = "reviewed.json"
+_NAMED = 10
+
+
+def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
+    """The decisions that allow the plan to run (canary and probe included), for `write`.
+
+    CheckFailed, which names the groups and how to look at them, unless each group is approved as it is now.
+    """
+    manifest = workspace.manifest(plan.campaign.target)
+    groups = of_experiments(workspace, manifest, (*plan.experiments, plan.canary))
+    review = load_review(workspace, manifest.name)
+    refused = [group for group in groups if review.state(group) is not State.APPROVED]
+    if refused:
+        raise _refusal(plan, review, refused)
+    decisions = [plain(review.decisions[group.id]) for group in groups]
+    return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
+
+
+def write(run: Path, approvals: dict[str, Any]) -> None:
+    """Keep in the run folder what was approved, by whom, and the digests of what they saw."""
+    write_json(run / FILE, approvals)
+
+
+def told(run: Path) -> str:
+    """For a report: what of the run was reviewed; empty when nobody asked for it."""
+    if not (run / FILE).exists():
+        return ""
+    groups = read_json(run / FILE, SCHEMA)["groups"]
+    names = Counter(group["by"] for group in groups)
+    return f"all {len(groups)} groups approved, by " + ", ".join(
+        f"{name} ({n})" for name, n in sorted(names.items())
+    )
+
+
+def _refusal(plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
+    lines = [
+        f"  {group.id}  {review.state(group)}, {_runs(group)}: {group.what}"
+        for group in review.in_turn(refused)[:_NAMED]
+    ]
+    more = [f"  and {len(refused) - _NAMED} more"] if len(refused) > _NAMED else []
+    ids = " ".join(group.id for group in refused) if len(refused) <= _NAMED else "GROUP..."
+    campaign = f"--campaign {plan.campaign.path}"
+    return CheckFailed(
+        "\n".join([f"{len(refused)} groups of mutants are not approved:", *lines, *more]),
+        where=review.path,
+        expected="an approval of each, as it is now",
+        remedy=f"see them: `mutator review {campaign}`; "
+        f"then: `mutator review approve {campaign} {ids} --by NAME`",
+    )
+
+
+def _runs(group: Group) -> str:
+    return f"{group.runs} experiments" if group.runs else "in every mutant"
