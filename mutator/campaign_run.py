@@ -21,18 +21,16 @@ from typing import Any
 import pytest
 
 from mutator import engines, proof, results
-from mutator.campaign import load_campaign
 from mutator.checks import run_checks
 from mutator.chunks import Pending, pending
 from mutator.engine import prepare_base
-from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
-from mutator.ids import digest
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
+from mutator.frozen import frozen
 from mutator.interrupts import terminable
 from mutator.jsonio import DiskFull, is_half_written
 from mutator.locks import owned
 from mutator.model import Record, Status
-from mutator.plan import Choices, freeze_owned, make_plan, make_run_folder
-from mutator.provenance import check_sources, sources
+from mutator.plan import Choices, make_run_folder
 from mutator.records import Progress, Tail, label, read_records
 from mutator.runfolder import RunFolder
 from mutator.workspace import Workspace
@@ -75,17 +73,26 @@ def run(
     workers: int = 0,
     choices: Choices | None = None,
     engine: str | None = None,
+    reviewed: bool = False,
     notify: Notify | None = None,
 ) -> Summary:
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
     A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
     MutatorError, as is a changed campaign file or target. `engine` is one of `engines.ENGINES` (None: the
-    fastest that is worth it). `notify` is called from another thread about twice a second. MutatorError for
-    wrong input, CheckFailed when the checks before the campaign fail, or the proof of its engine does.
+    fastest that is worth it). With `reviewed` only what is approved is run (`mutator.review.gate`). `notify`
+    is called from another thread about twice a second. MutatorError for wrong input, CheckFailed when
+    something is not approved, the checks before the campaign fail, or the proof of its engine does.
     """
     with session(
-        workspace, campaign, out, workers=workers, choices=choices or Choices(), engine=engine, notify=notify
+        workspace,
+        campaign,
+        out,
+        workers=workers,
+        choices=choices or Choices(),
+        engine=engine,
+        reviewed=reviewed,
+        notify=notify,
     ) as begun:
         begun.prepare()
         if begun.pending or begun.proof:
@@ -181,18 +188,15 @@ def session(
     workers: int,
     choices: Choices,
     engine: str | None = None,
+    reviewed: bool = False,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
     """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
     make_run_folder(out)
     with terminable(), owned(out):
-        if RunFolder.exists(out):
-            folder = _frozen(workspace, campaign, out, choices)
-        else:
-            if notify:
-                notify(Progress(stage="plan"))
-            plan = make_plan(workspace, campaign, **asdict(choices))
-            folder = freeze_owned(plan, out, workspace)
+        if notify and not RunFolder.exists(out):
+            notify(Progress(stage="plan"))
+        folder = frozen(workspace, campaign, out, choices, reviewed=reviewed)
         shutil.rmtree(folder.work, ignore_errors=True)
         # not everywhere: there may be thousands of patches
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))
@@ -203,33 +207,6 @@ def session(
             yield Session(workspace, folder, workers, engine, notify)
         finally:
             shutil.rmtree(folder.work, ignore_errors=True)
-
-
-def _frozen(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
-    """The run folder, if it was planned from this campaign with these choices and sources."""
-    folder = RunFolder.open(out)
-    head = folder.head
-    loaded = load_campaign(workspace.campaign(campaign))
-    if digest(loaded.source) != head["campaign_digest"]:
-        raise MutatorError(
-            f"holds a run of campaign '{head['campaign']}' with another text than {loaded.path}",
-            where=out,
-            remedy="use another folder, or give the run's own file: " + str(out / "campaign.yaml"),
-        )
-    for name, value in asdict(choices).items():
-        frozen = head["choices"].get(name)
-        if name in ("seed", "reading"):
-            frozen = head[name]
-        if value is not None and value != frozen:
-            raise MutatorError(
-                f"--{name} {value}",
-                where=out,
-                expected=f"what this run was planned with ({name} {frozen})",
-                remedy=f"leave --{name} away, or use another folder",
-            )
-    scenarios = {scenario for scenario, _ in head["goldens"]}
-    check_sources(out, head["sources"], sources(workspace, workspace.manifest(head["target"]), scenarios))
-    return folder
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from mutator.locks import owned
 from mutator.model import Record, Status
 from mutator.plan import make_run_folder
 from mutator.records import read_records
+from mutator.review.gate import FILE as REVIEWED
 from mutator.runfolder import HEAD, RunFolder
 
 _SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
@@ -160,6 +161,8 @@ def _copy(folders: Sequence[RunFolder], out: Path) -> None:
             shutil.copytree(source, out / name)
         else:
             shutil.copy(source, out / name)
+    if all((folder.path / REVIEWED).exists() for folder in folders):
+        shutil.copy(first.path / REVIEWED, out / REVIEWED)
     for folder in folders:
         assert folder.shard is not None
         shutil.copytree(folder.path / "patches", out / "patches", dirs_exist_ok=True)

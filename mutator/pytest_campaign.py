@@ -85,13 +85,13 @@ class LazyWorker:
             self._worker = None
 
 
-def configure(config: pytest.Config, campaign: str, out: Path) -> None:
+def configure(config: pytest.Config, campaign: str, out: Path, *, reviewed: bool) -> None:
     """Put the plugin of this process's role in place."""
     given = getattr(config, "workerinput", {}).get(_INPUT)
     if given is not None:
         config.pluginmanager.register(WorkerSide(config, given, config.workerinput["workerid"]))  # type: ignore[attr-defined]
     elif not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
-        config.pluginmanager.register(PlainController(campaign, out))
+        config.pluginmanager.register(PlainController(campaign, out, reviewed=reviewed))
 
 
 def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
@@ -193,9 +193,10 @@ class Controller:
 class PlainController(Controller):
     """As Controller, for pytest called directly: also plans, checks, and tells the end."""
 
-    def __init__(self, campaign: str, out: Path) -> None:
+    def __init__(self, campaign: str, out: Path, *, reviewed: bool) -> None:
         super().__init__()
         self._campaign = campaign
+        self._reviewed = reviewed
         self._out = out
         self._open = ExitStack()
         self._told: list[str] = []
@@ -205,7 +206,12 @@ class PlainController(Controller):
         workers = getattr(session.config.option, "numprocesses", None) or 0
         try:
             opened = campaign_run.session(
-                Workspace.find(), self._campaign, self._out, workers=workers, choices=Choices()
+                Workspace.find(),
+                self._campaign,
+                self._out,
+                workers=workers,
+                choices=Choices(),
+                reviewed=self._reviewed,
             )
             self.begun = self._open.enter_context(opened)
             self.begun.prepare()

@@ -22,6 +22,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         type=Path,
         help="its run folder; an interrupted run goes on there",
     )
+    group.addoption(
+        "--require-reviewed",
+        action="store_true",
+        help="refuse to run what `mutator review` has no approval of",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -29,9 +34,11 @@ def pytest_configure(config: pytest.Config) -> None:
     if campaign is None:
         if out is not None:
             raise pytest.UsageError("--campaign-out without --campaign")
+        if config.getoption("require_reviewed"):
+            raise pytest.UsageError("--require-reviewed without --campaign")
         return
     if out is None:
         raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
     from mutator.pytest_campaign import configure
 
-    configure(config, campaign, out)
+    configure(config, campaign, out, reviewed=config.getoption("require_reviewed"))

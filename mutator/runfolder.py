@@ -5,6 +5,7 @@ DIR/
   campaign.yaml         the campaign file as it was read
   plan.csv              the plan for people and spreadsheets
   plan/experiments.jsonl, plan/faults.jsonl      the frozen plan
+  reviewed.json         who approved what is run, and digests of it (`run --require-reviewed`)
   checks.json           the checks before the campaign, keyed by digest
   golden/<scenario>[+change]/                    fault-free runs: trace and record of the target
   patches/<xx>/<experiment>.patch                source diff of each experiment that ran

@@ -146,6 +146,10 @@ def run(
     reading: Reading = None,
     shard: ShardOf = None,
     engine: Engine = None,
+    reviewed: Annotated[
+        bool,
+        typer.Option("--require-reviewed", help="Run nothing that `mutator review` has no approval of."),
+    ] = False,
     as_json: Json = False,
     *,
     place: Place,
@@ -161,7 +165,14 @@ def run(
     try:
         with campaign_progress(terminal) as notify:
             summary = campaign_run.run(
-                workspace, campaign, out, workers=workers, choices=chosen, engine=engine, notify=notify
+                workspace,
+                campaign,
+                out,
+                workers=workers,
+                choices=chosen,
+                engine=engine,
+                reviewed=reviewed,
+                notify=notify,
             )
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None

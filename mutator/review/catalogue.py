@@ -6,7 +6,8 @@ decision about it is bound to (`Bound`) from its diff with holes, the target's f
 
 import ast
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -16,7 +17,7 @@ from mutator.expand import expand
 from mutator.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.ids import content_id
 from mutator.manifest import TargetManifest
-from mutator.model import Experiment, Fault, FaultLocation, Injection, Trigger
+from mutator.model import Fault, FaultLocation, Injection, Trigger
 from mutator.mutant import OBSERVE_TAG, build
 from mutator.review import groups
 from mutator.review.groups import Shape
@@ -25,6 +26,7 @@ from mutator.splice import PROBE_TAG
 from mutator.trigger import always, at_time
 
 if TYPE_CHECKING:
+    from mutator.plan import Plan
     from mutator.workspace import Workspace
 
 _FAULT_TAG = re.compile(rf"^\+.*# fi:(?!{PROBE_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
@@ -50,12 +52,14 @@ class Group:
     """Mutants that differ in values alone. `what` says where, with which template, and when, in one line.
 
     `shapes` are its diffs with holes: one, but where a template writes other lines for other numbers. Their
-    members are `faults`, by id. `runs` is how many experiments there are; None: no campaign was asked for.
+    members are `faults`, by id. `runs` is how many experiments a campaign has of it; None: no campaign was
+    asked for.
     """
 
     id: str
     what: str
-    places: tuple[str, ...]
+    injections: tuple[str, ...]  # `place: model(parameters)` of each
+    files: tuple[str, ...]
     functions: tuple[str, ...]
     models: tuple[str, ...]
     trigger: str
@@ -80,12 +84,12 @@ class Group:
 _Member = tuple[Fault, Trigger]
 
 
-def of_experiments(
-    workspace: "Workspace", manifest: TargetManifest, experiments: Iterable[Experiment]
-) -> tuple[Group, ...]:
-    """The groups of these experiments' mutants, the probe's first."""
-    members = [(e.fault, e.trigger) for e in experiments]
-    return _Catalogue(workspace.fault_models(), manifest).groups(members, counted=True)
+def of_plan(workspace: "Workspace", plan: "Plan") -> tuple[Group, ...]:
+    """The groups of all that running the plan takes, its canary included, the probe's first."""
+    manifest = workspace.manifest(plan.campaign.target)
+    members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
+    runs = Counter(groups.label(e.fault, e.trigger) for e in plan.experiments)
+    return _Catalogue(workspace.fault_models(), manifest).groups(members, runs)
 
 
 def of_library(
@@ -113,7 +117,7 @@ def of_library(
         for fault in expand(spec, seed, reading, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
-    return _Catalogue(models, manifest).groups(members, counted=False)
+    return _Catalogue(models, manifest).groups(members, None)
 
 
 def _specs(workspace: "Workspace", wanted: Sequence[str]) -> Iterator[FaultSpec]:
@@ -133,8 +137,8 @@ class _Catalogue:
         self.models = models
         self.manifest = manifest
 
-    def groups(self, members: Sequence[_Member], *, counted: bool) -> tuple[Group, ...]:
-        """The groups of `members`, those of one file side by side; with `counted` each is an experiment."""
+    def groups(self, members: Sequence[_Member], runs: Mapping[str, int] | None) -> tuple[Group, ...]:
+        """The groups of `members`, those of one file side by side; `runs` counts experiments by label."""
         found: dict[str, list[_Member]] = {}
         for fault, trigger in members:
             found.setdefault(groups.label(fault, trigger), []).append((fault, trigger))
@@ -143,15 +147,15 @@ class _Catalogue:
             if fault.injections not in patches:
                 mutant = build(self.manifest, self.models, fault, trigger)
                 patches[fault.injections] = fault_hunks(mutant.patch)
-        made = [self._group(what, found[what], patches, counted) for what in sorted(found)]
-        return (self._probe(counted), *made)
+        made = [self._group(what, found[what], patches, runs) for what in sorted(found)]
+        return (self._probe(runs), *made)
 
     def _group(
         self,
         what: str,
         members: Sequence[_Member],
         patches: dict[tuple[Injection, ...], str],
-        counted: bool,
+        runs: Mapping[str, int] | None,
     ) -> Group:
         faults = {fault.id: fault for fault, _ in members}
         shapes = groups.shapes((fault.id, what, patches[fault.injections]) for fault in faults.values())
@@ -159,7 +163,8 @@ class _Catalogue:
         return Group(
             id=self._id(what),
             what=what,
-            places=tuple(groups.place(injection.location) for injection in fault.injections),
+            injections=tuple(map(groups.injected, fault.injections)),
+            files=tuple(dict.fromkeys(i.location.path for i in fault.injections)),
             functions=tuple(dict.fromkeys(i.location.function for i in fault.injections)),
             models=tuple(dict.fromkeys(injection.model for injection in fault.injections)),
             trigger=groups.trigger_kind(trigger),
@@ -167,7 +172,7 @@ class _Catalogue:
             shapes=tuple(s.named(groups.parameters(faults[m]) for m in s.members) for s in shapes),
             faults=tuple(faults.values()),
             triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
-            runs=len(members) if counted else None,
+            runs=None if runs is None else runs.get(what, 0),
             bound=self._bound(
                 sorted({patches[fault.injections] for fault in faults.values()}, key=groups.cut),
                 [injection.location for injection in fault.injections],
@@ -175,7 +180,7 @@ class _Catalogue:
             ),
         )
 
-    def _probe(self, counted: bool) -> Group:
+    def _probe(self, runs: Mapping[str, int] | None) -> Group:
         """What every mutant gets: the probe, its import, and the statement that observes."""
         location = self.manifest.observation.location
         what = f"the probe, observing at {groups.place(location)}"
@@ -183,7 +188,8 @@ class _Catalogue:
         return Group(
             id=self._id(what),
             what=what,
-            places=(groups.place(location),),
+            injections=(what,),
+            files=(location.path,),
             functions=(location.function,),
             models=(PROBE_TEMPLATE.partition(".")[0],),
             trigger="",
@@ -191,7 +197,7 @@ class _Catalogue:
             shapes=tuple(groups.shapes([("", what, patch)])),
             faults=(),
             triggers=(),
-            runs=0 if counted else None,
+            runs=None if runs is None else sum(runs.values()),
             bound=self._bound([patch], [location], {PROBE_TEMPLATE: self.models.probe}),
         )
 

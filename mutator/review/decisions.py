@@ -108,7 +108,7 @@ class Review:
         return decision.words + (f" (changed since: {', '.join(changed)})" if changed else "")
 
     def decided(self, groups: Iterable[Group], verdict: Verdict, by: str, remark: str) -> "Review":
-        """The review with this said of `groups`; MutatorError for a name or remark that is no line of text."""
+        """The review with this said of `groups`; MutatorError for a name or remark that is no text."""
         by, remark = _line(by, "--by"), _line(remark, "--remark")
         if not by:
             raise MutatorError("no name", where="--by", expected="who has reviewed", remedy="give a name")

@@ -1,5 +1,6 @@
 """`--require-reviewed`: nothing is run that nobody has approved, and a run says who approved what it ran."""
 
+import shlex
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from mutator.errors import CheckFailed
 from mutator.ids import plain
 from mutator.jsonio import read_json, write_json
 from mutator.plan import Plan
-from mutator.review.catalogue import Group, of_experiments
+from mutator.review.catalogue import Group, of_plan
 from mutator.review.decisions import Review, State, load_review
 from mutator.workspace import Workspace
 
@@ -23,11 +24,11 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     CheckFailed, which names the groups and how to look at them, unless each group is approved as it is now.
     """
     manifest = workspace.manifest(plan.campaign.target)
-    groups = of_experiments(workspace, manifest, (*plan.experiments, plan.canary))
+    groups = of_plan(workspace, plan)
     review = load_review(workspace, manifest.name)
     refused = [group for group in groups if review.state(group) is not State.APPROVED]
     if refused:
-        raise _refusal(plan, review, refused)
+        raise _refusal(workspace, plan, review, refused)
     decisions = [plain(review.decisions[group.id]) for group in groups]
     return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
 
@@ -48,22 +49,26 @@ def told(run: Path) -> str:
     )
 
 
-def _refusal(plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
+def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {review.state(group)}, {_runs(group)}: {group.what}"
+        f"  {group.id}  {review.state(group)}, {group.runs} experiments: {group.what}"
         for group in review.in_turn(refused)[:_NAMED]
     ]
     more = [f"  and {len(refused) - _NAMED} more"] if len(refused) > _NAMED else []
-    ids = " ".join(group.id for group in refused) if len(refused) <= _NAMED else "GROUP..."
-    campaign = f"--campaign {plan.campaign.path}"
+    ids = " ".join(group.id for group in refused) if not more else "GROUP..."
+    wanted = f"--campaign {_name(workspace, plan)}"
+    wanted += f" --reading {plan.reading}" if plan.choices.reading else ""
     return CheckFailed(
         "\n".join([f"{len(refused)} groups of mutants are not approved:", *lines, *more]),
         where=review.path,
         expected="an approval of each, as it is now",
-        remedy=f"see them: `mutator review {campaign}`; "
-        f"then: `mutator review approve {campaign} {ids} --by NAME`",
+        remedy=f"look: `mutator review {wanted}`; approve: `mutator review approve {ids} {wanted} --by NAME`",
     )
 
 
-def _runs(group: Group) -> str:
-    return f"{group.runs} experiments" if group.runs else "in every mutant"
+def _name(workspace: Workspace, plan: Plan) -> str:
+    """The campaign as a command names it: by its name where that means this text, else by its file."""
+    name = plan.campaign.name
+    known = name in workspace.campaign_names()
+    same = known and workspace.campaign(name).read_bytes() == plan.campaign.source
+    return name if same else shlex.quote(str(plan.campaign.path))

@@ -113,8 +113,8 @@ def label(fault: Fault, trigger: Trigger) -> str:
 
     `selfdrive/sim/radar.py RadarSensor.measure after_assign d_rel: offset(by, target=d_rel); state, while`.
     """
-    injections = (f"{place(i.location)}: {_form(i)}" for i in fault.injections)
-    return "; ".join((*injections, f"{trigger_kind(trigger)}, {hold(fault, trigger).value}"))
+    when = f"{trigger_kind(trigger)}, {hold(fault, trigger).value}"
+    return "; ".join((*map(injected, fault.injections), when))
 
 
 def place(location: FaultLocation) -> str:
@@ -124,14 +124,14 @@ def place(location: FaultLocation) -> str:
     return " ".join(filter(None, (location.path, location.function, anchor.kind.value, anchor.name, number)))
 
 
-def _form(injection: Injection) -> str:
-    """The model and what it is given but for numbers: names and truth values, which may choose its lines."""
+def injected(injection: Injection) -> str:
+    """Where, the model, and what it is given but for numbers: names and truth values may choose its lines."""
     given = (
         f"{name}={value}" if isinstance(value, str | bool) else name
         for name, value in injection.params
         if value is not None
     )
-    return f"{injection.model}({', '.join(given)})"
+    return f"{place(injection.location)}: {injection.model}({', '.join(given)})"
 
 
 def trigger_kind(trigger: Trigger) -> str:
