@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from mutator import __version__
-from mutator.cli import campaigns, compare, experiments, exports, faults, library, run_folders, stpa
+from mutator.cli import campaigns, compare, experiments, exports, faults, library, reviews, run_folders, stpa
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
@@ -28,6 +28,7 @@ THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, er
 GROUPS = (
     ("Look around", ("list", "stpa", "check", "doctor")),
     ("One fault", ("try", "diff", "generate")),
+    ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
     ("After a campaign", ("compare", "export")),
     ("One experiment", ("show", "rerun")),
@@ -88,7 +89,7 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, stpa, faults, campaigns, run_folders, compare, exports, experiments):
+for module in (library, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments):
     module.register(app)
 
 

@@ -15,7 +15,7 @@ from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"
 FILE = "reviewed.json"
-_NAMED = 10
+_NAMED = 10  # ids in one printed command
 
 
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
@@ -51,15 +51,15 @@ def told(run: Path) -> str:
 
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {review.state(group)}, {group.runs} experiments: {group.what}"
-        for group in review.in_turn(refused)[:_NAMED]
+        f"  {group.id}  {review.state(group)}, {group.runs} experiment{'s' * (group.runs != 1)}: {group.what}"
+        for group in review.in_turn(refused)
     ]
-    more = [f"  and {len(refused) - _NAMED} more"] if len(refused) > _NAMED else []
-    ids = " ".join(group.id for group in refused) if not more else "GROUP..."
+    many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
+    ids = " ".join(group.id for group in refused) if len(refused) <= _NAMED else "GROUP..."
     wanted = f"--campaign {_name(workspace, plan)}"
     wanted += f" --reading {plan.reading}" if plan.choices.reading else ""
     return CheckFailed(
-        "\n".join([f"{len(refused)} groups of mutants are not approved:", *lines, *more]),
+        "\n".join([f"{many} not approved:", *lines]),
         where=review.path,
         expected="an approval of each, as it is now",
         remedy=f"look: `mutator review {wanted}`; approve: `mutator review approve {ids} {wanted} --by NAME`",

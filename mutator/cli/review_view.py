@@ -1,0 +1,115 @@
+"""Groups of mutants shown: as a table, one by one with diff and values, and as data."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from mutator.cli.console import Terminal
+
+if TYPE_CHECKING:
+    from mutator.review.catalogue import Group
+    from mutator.review.decisions import Review
+
+STYLES = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
+ROWS = 24  # of values that a terminal is shown
+CONDITIONS = 6
+
+
+def columns(review: "Review", group: "Group") -> dict[str, object]:
+    """What the filters know of a group; several of one kind stand with commas between them."""
+    decision = review.decisions.get(group.id)
+    return {
+        "group": group.id,
+        "state": review.state(group).value,
+        "by": decision.by if decision else None,
+        "file": ", ".join(group.files),
+        "function": ", ".join(group.functions),
+        "model": ", ".join(group.models),
+        "trigger": group.trigger,
+        "hold": group.hold,
+        "spec": ", ".join(group.specs),
+        "faults": len(group.faults),
+        "runs": group.runs,
+    }
+
+
+def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
+    """A group for a program; `whole`: with its diff and values."""
+    from mutator.review.words import values
+
+    decision = review.decisions.get(group.id)
+    facts = {**columns(review, group), "what": group.what, "injections": group.injections}
+    facts |= {"remark": decision.remark if decision else None}
+    facts |= {"changed": decision.changed(group) if decision else [], "bound": asdict(group.bound)}
+    if not whole:
+        return facts
+    heads, rows = values(group)
+    return facts | {
+        "diff": group.diff,
+        "values": [dict(zip(heads, row, strict=True)) for row in rows],
+        "triggers": [asdict(trigger) for trigger in group.triggers],
+    }
+
+
+def counts(review: "Review", groups: Sequence["Group"]) -> str:
+    """How many groups are in which state, in words."""
+    found = Counter(review.state(group).value for group in groups)
+    return ", ".join(f"{found[name]} {name}" for name in STYLES if found[name]) or "no groups"
+
+
+def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) -> None:
+    """The table of groups, or all of it as data."""
+    if terminal.as_json:
+        terminal.emit([data(review, group) for group in groups])
+        return
+    rows = [
+        (g.id, review.state(g).value, "\n".join(map(_short, g.injections)), _when(g), len(g.faults), g.runs)
+        for g in groups
+    ]
+    if terminal.out.is_terminal:
+        terminal.table(["group", "state", "what", "when", "faults", "runs"], rows, right=(4, 5))
+    else:
+        flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
+        terminal.table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
+    terminal.say(f"{len(groups)} groups: {counts(review, groups)}")
+    gone = review.decisions.keys() - {group.id for group in groups}
+    if gone:
+        terminal.note(f"{len(gone)} decisions are about groups that are not listed")
+
+
+def _short(injection: str) -> str:
+    """`radar.py RadarSensor.measure after_assign d_rel: offset(by)`: the file's name is enough in a table."""
+    path, space, rest = injection.partition(" ")
+    return path.rpartition("/")[2] + space + rest
+
+
+def _when(group: "Group") -> str:
+    return f"{group.trigger}, {group.hold}" if group.trigger else "always"
+
+
+def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
+    """One group: what it is, what was said of it, diff with holes, values, triggers."""
+    from mutator.review.words import conditions, values
+
+    state = review.state(group).value
+    terminal.say(f"group {group.id}: {state}", style=STYLES[state])
+    if told := review.told(group):
+        terminal.say(told)
+    for injection in group.injections:
+        terminal.say(f"  {injection}", style="bold")
+    runs = "" if group.runs is None else f", {group.runs} experiments"
+    terminal.say(f"when: {_when(group)}; {len(group.faults)} faults{runs}")
+    for line in conditions(group.triggers)[:CONDITIONS]:
+        terminal.say(f"  {line}")
+    if (more := len(conditions(group.triggers)) - CONDITIONS) > 0:
+        terminal.say(f"  and {more} more")
+    terminal.say()
+    terminal.diff(group.diff)
+    terminal.say()
+    heads, rows = values(group)
+    if rows:
+        terminal.table(heads, rows[:ROWS], right=range(2, len(heads)))
+        if len(rows) > ROWS:
+            terminal.say(f"{len(rows) - ROWS} more; `--json` has all of them")
+    terminal.say()

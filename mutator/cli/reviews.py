@@ -1,0 +1,337 @@
+"""`review`: mutants in groups that differ in values alone, looked at, approved or rejected."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mutator.cli import review_view as view
+from mutator.cli.console import Terminal, short_path
+from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator.review.catalogue import Group
+    from mutator.review.decisions import Review, Verdict
+
+COLUMNS = ("group", "state", "by", "file", "function", "model", "trigger", "hold", "spec", "faults", "runs")
+
+Campaign = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="What this campaign runs, with its readings and triggers."),
+]
+Specs = Annotated[
+    list[str] | None,
+    typer.Option("--spec", metavar="SPEC", help="Only these specs, globs or spec files; may be repeated."),
+]
+OnlyGroups = Annotated[
+    str | None,
+    typer.Option("--only", metavar="EXPR", help=f"Only groups for which this holds: {', '.join(COLUMNS)}."),
+]
+ExcludeGroups = Annotated[
+    str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups for which this holds.")
+]
+Groups = Annotated[
+    list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the starts of them.")
+]
+By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who has looked.")]
+Remark = Annotated[str, typer.Option(metavar="TEXT", help="Kept with the decision.")]
+
+EXAMPLES = """\b
+Examples:
+  mutator review                                   all of the library: new and changed groups first
+  mutator review --campaign paper_smoke            what one campaign runs
+  mutator review --only 'state == "new" and match(file, "*radar*")'
+  mutator review show 3f9a                         one group: diff with holes, values
+  mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"
+  mutator review walk --by "A. Reviewer"           one after the other
+  mutator review page --out review.html
+
+\b
+`mutator review` alone is `mutator review list`. Decisions are kept in fault_library/reviews/, for version
+control; `mutator run --require-reviewed` runs nothing but what is approved there.
+"""
+
+
+class Verbs(TyperGroup):
+    """The verbs of `review`; without one it lists."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """What is no verb and no call for help belongs to `list`."""
+        if not args or (args[0].startswith("-") and args[0] not in ("-h", "--help")):
+            args = ["list", *args]
+        return super().parse_args(ctx, args)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verbs to the command line."""
+    reviews = typer.Typer(
+        cls=Verbs, rich_markup_mode=None, epilog=EXAMPLES, context_settings={"max_content_width": 110}
+    )
+    reviews.callback()(review)
+    for name, verb in (
+        ("list", list_groups),
+        ("show", show),
+        ("approve", approve),
+        ("reject", reject),
+        ("walk", walk),
+        ("page", page),
+    ):
+        reviews.command(name)(verb)
+    app.add_typer(reviews, name="review")
+
+
+def review() -> None:
+    """Review generated diffs: approve or reject groups of mutants."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is to be reviewed: a campaign, specs, or all of the library."""
+
+    place: Place
+    campaign: str | None
+    specs: Sequence[str]
+    reading: str | None
+    seed: int | None
+    manifest: str | None
+
+    def load(self, terminal: Terminal) -> "Loaded":
+        """Its groups and what was said of them."""
+        from mutator.review import catalogue
+        from mutator.review.decisions import load_review
+
+        if self.campaign and self.specs:
+            raise MutatorError("--campaign together with --spec", expected="one or the other")
+        workspace = self.place.workspace()
+        with terminal.wait("making the mutants"):
+            if self.campaign:
+                from mutator.plan import make_plan
+
+                plan = make_plan(workspace, self.campaign, seed=self.seed, reading=self.reading)
+                target = plan.campaign.target
+                groups = catalogue.of_plan(workspace, plan)
+            else:
+                from mutator.cli.choose import target_name
+                from mutator.spec import READINGS
+
+                target = target_name(workspace, self.manifest)
+                groups = catalogue.of_library(
+                    workspace,
+                    workspace.manifest(target),
+                    specs=self.specs,
+                    readings=(self.reading,) if self.reading else READINGS,
+                    seed=self.seed or 0,
+                )
+        manifest = workspace.manifest(target)
+        found = load_review(workspace, manifest.name)
+        return Loaded(review=found, groups=tuple(found.in_turn(groups)), options=self.options)
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The options that mean the same again, for a command that is printed."""
+        given = {"--campaign": self.campaign, "--reading": self.reading, "--manifest": self.manifest}
+        words = [word for name, value in given.items() if value for word in (name, value)]
+        seed = ("--seed", str(self.seed)) if self.seed is not None else ()
+        return (*words, *seed, *(word for spec in self.specs for word in ("--spec", spec)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loaded:
+    """Groups in the order in which they are listed, and the decisions about them."""
+
+    review: "Review"
+    groups: tuple["Group", ...]
+    options: tuple[str, ...]
+
+    def matching(self, only: str | None, exclude: str | None) -> "Loaded":
+        """Those for which the filters hold."""
+        from mutator.filters import compile_filter
+
+        groups = self.groups
+        for text, wanted in ((only, True), (exclude, False)):
+            if text is not None:
+                accepts = compile_filter(text, COLUMNS)
+                groups = tuple(g for g in groups if accepts(view.columns(self.review, g)) is wanted)
+        return replace(self, groups=groups)
+
+    def find(self, starts: Sequence[str]) -> list["Group"]:
+        """The groups whose ids start so, each once; MutatorError for none or several of a start."""
+        found: dict[str, Group] = {}
+        for start in starts:
+            hits = [group for group in self.groups if group.id.startswith(start)]
+            if len(hits) != 1 or not start:
+                raise MutatorError(
+                    f"{len(hits)} groups start with '{start}'" if hits else f"no group '{start}'",
+                    expected="an id of `mutator review`, or the beginning of just one",
+                    remedy="give more of it" if hits else "name the --campaign or --spec that it is of",
+                )
+            found[hits[0].id] = hits[0]
+        return list(found.values())
+
+
+@with_place
+def list_groups(
+    campaign: Campaign = None,
+    specs: Specs = None,
+    only: OnlyGroups = None,
+    exclude: ExcludeGroups = None,
+    reading: Reading = None,
+    seed: Seed = None,
+    manifest: Manifest = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """List groups, new and changed ones first (what `review` alone does)."""
+    terminal = Terminal(as_json)
+    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
+    found = wanted.load(terminal).matching(only, exclude)
+    view.print_list(terminal, found.review, found.groups)
+
+
+@with_place
+def show(
+    groups: Groups,
+    campaign: Campaign = None,
+    specs: Specs = None,
+    reading: Reading = None,
+    seed: Seed = None,
+    manifest: Manifest = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Show a group: its diff with holes, and the values that fill them."""
+    terminal = Terminal(as_json)
+    found = _wanted(place, campaign, specs, reading, seed, manifest).load(terminal)
+    shown = found.find(groups)
+    if as_json:
+        terminal.emit([view.data(found.review, group, whole=True) for group in shown])
+        return
+    for group in shown:
+        view.print_group(terminal, found.review, group)
+
+
+@with_place
+def approve(
+    groups: Groups,
+    by: By,
+    remark: Remark = "",
+    campaign: Campaign = None,
+    specs: Specs = None,
+    reading: Reading = None,
+    seed: Seed = None,
+    manifest: Manifest = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Approve groups as they are now."""
+    from mutator.review.decisions import Verdict
+
+    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
+    _decide(Terminal(as_json), wanted, groups, Verdict.APPROVED, by, remark)
+
+
+@with_place
+def reject(
+    groups: Groups,
+    by: By,
+    remark: Remark = "",
+    campaign: Campaign = None,
+    specs: Specs = None,
+    reading: Reading = None,
+    seed: Seed = None,
+    manifest: Manifest = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Reject groups as they are now: `run --require-reviewed` does not run them."""
+    from mutator.review.decisions import Verdict
+
+    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
+    _decide(Terminal(as_json), wanted, groups, Verdict.REJECTED, by, remark)
+
+
+def _decide(
+    terminal: Terminal, wanted: Wanted, starts: Sequence[str], verdict: "Verdict", by: str, remark: str
+) -> None:
+    found = wanted.load(terminal)
+    groups = found.find(starts)
+    decided = found.review.decided(groups, verdict, by, remark)
+    decided.write()
+    if terminal.as_json:
+        terminal.emit([view.data(decided, group) for group in groups])
+    for group in groups:
+        terminal.say(f"{group.id} {decided.told(group)}", style=view.STYLES[verdict.value])
+    terminal.say(f"{short_path(decided.path)}: {view.counts(decided, found.groups)}")
+
+
+@with_place
+def walk(
+    by: By,
+    campaign: Campaign = None,
+    specs: Specs = None,
+    only: OnlyGroups = None,
+    exclude: ExcludeGroups = None,
+    reading: Reading = None,
+    seed: Seed = None,
+    manifest: Manifest = None,
+    *,
+    place: Place,
+) -> None:
+    """Show one new or changed group after the other, and ask."""
+    from mutator.cli.review_walk import walk_through
+
+    terminal = Terminal()
+    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
+    walk_through(terminal, lambda: wanted.load(terminal).matching(only, exclude), by)
+
+
+@with_place
+def page(
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The page, an .html file.")],
+    campaign: Campaign = None,
+    specs: Specs = None,
+    only: OnlyGroups = None,
+    exclude: ExcludeGroups = None,
+    reading: Reading = None,
+    seed: Seed = None,
+    manifest: Manifest = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """Write a page of all groups, complete in itself, to look at and to copy commands from."""
+    from mutator.review.page import write_page
+
+    terminal = Terminal(as_json)
+    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
+    found = wanted.load(terminal).matching(only, exclude)
+    write_page(out, found.review, found.groups, found.options)
+    if as_json:
+        terminal.emit({"page": str(out), "groups": len(found.groups)})
+    terminal.say(f"{len(found.groups)} groups in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)")
+
+
+def _wanted(
+    place: Place,
+    campaign: str | None,
+    specs: Sequence[str] | None,
+    reading: str | None,
+    seed: int | None,
+    manifest: str | None,
+) -> Wanted:
+    return Wanted(
+        place=place,
+        campaign=campaign,
+        specs=tuple(specs or ()),
+        reading=reading,
+        seed=seed,
+        manifest=manifest,
+    )
