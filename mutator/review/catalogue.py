@@ -85,7 +85,7 @@ _Member = tuple[Fault, Trigger]
 
 
 def of_plan(workspace: "Workspace", plan: "Plan") -> tuple[Group, ...]:
-    """The groups of all that running the plan takes, its canary included, the probe's first."""
+    """The groups of all that running the plan takes, its canary included; the probe's comes last."""
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
     runs = Counter(groups.label(e.fault, e.trigger) for e in plan.experiments)
@@ -100,7 +100,7 @@ def of_library(
     readings: Sequence[str] = READINGS,
     seed: int = 0,
 ) -> tuple[Group, ...]:
-    """The groups of the library's faults, the probe's first.
+    """The groups of the library's faults; the probe's comes last.
 
     Under every context of its tables, and at a random time: what campaigns make of them, but for those that
     say how long a fault stays. `specs` are spec files or globs over specs (none: all); MutatorError for one
@@ -148,7 +148,7 @@ class _Catalogue:
                 mutant = build(self.manifest, self.models, fault, trigger)
                 patches[fault.injections] = fault_hunks(mutant.patch)
         made = [self._group(what, found[what], patches, runs) for what in sorted(found)]
-        return (self._probe(runs), *made)
+        return (*made, self._probe(runs))
 
     def _group(
         self,

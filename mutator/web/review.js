@@ -100,7 +100,7 @@ const Review = (() => {
         el("p.facts.quiet", {}, `${when}${g.faults ? `; ${plural(g.faults, "fault")}` : ""}${runs}`),
         el("div.diffs"),
         g.conditions.length ? disclosure(`Triggers (${g.conditions.length})`, el("ul", {}, g.conditions.map((c) => el("li", {}, c)))) : null,
-        g.rows.length ? disclosure(`Values (${g.rows.length})`, table(g), ".values") : null);
+        g.rows.length ? disclosure(`Values (${g.rows.length})${spans(g)}`, table(g), ".values") : null);
     }
 
     #linked(event, id) {
@@ -200,6 +200,17 @@ const Review = (() => {
   }
 
   const disclosure = (title, content, name = "") => el(`details${name}`, {}, el("summary", {}, title), content);
+
+  /** The span of each hole that holds numbers: `: by - 245.0 to - 12.0`; a seed's says nothing. */
+  function spans(g) {
+    const told = g.heads.slice(2).flatMap((head, i) => {
+      const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);
+      if (head.endsWith("seed") || cells.some(([n]) => Number.isNaN(n))) return [];
+      cells.sort(([a], [b]) => a - b);
+      return [`${head} ${cells[0][1]} to ${cells.at(-1)[1]}`];
+    });
+    return told.length ? `: ${told.join(", ")}` : "";
+  }
 
   function table(g) {
     return el("div.scroll", { tabindex: 0, role: "region", "aria-label": `Values of ${g.id}` },

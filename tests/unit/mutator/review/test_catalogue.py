@@ -1,0 +1,146 @@
+"""Groups of what a library or a campaign injects, and what a decision about one is bound to."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.plan import make_plan
+from mutator.review.catalogue import Group, fault_hunks, of_library, of_plan
+from mutator.workspace import Workspace
+
+SENSOR = ("sensor/*",)
+
+
+def of_toy(toy: Workspace, *specs: str) -> dict[str, Group]:
+    groups = of_library(toy, toy.manifest("toycar"), specs=specs or SENSOR)
+    return {group.id: group for group in groups}
+
+
+def test_a_library_is_few_groups(toycar: Workspace) -> None:
+    """Variants are told by place, model and what it is given; each under contexts and from a time on."""
+    found = sorted(group.what for group in of_toy(toycar).values())
+    sense = "toycar/sensing.py Sensor.sense"
+    kinds = [
+        f"{sense} after_assign gap: offset(by, low, target=gap)",
+        f"{sense} after_assign gap: offset(by, target=gap)",
+        f"{sense} after_assign offset: offset(by, target=offset)",
+    ]
+    assert found == sorted(
+        [f"{kind}; {when}" for kind in kinds for when in ("state, while", "time, to_end")]
+        + [f"{sense} before_call self.publish: omission(); {when}, to_end" for when in ("state", "time")]
+        + ["the probe, observing at toycar/go.py Drive.step after_assign now"]
+    )
+
+
+def test_a_group_is_the_same_in_a_campaign(toycar: Workspace) -> None:
+    """What was approved for the library is approved for a campaign of it, whatever it picks."""
+    library = of_toy(toycar)
+    picked = of_plan(toycar, make_plan(toycar, "small", limit=3))
+    assert 1 < len(picked) <= 5
+    for group in picked:
+        assert group.bound == library[group.id].bound
+    probe = picked[-1]
+    assert probe.what.startswith("the probe")
+    assert probe.runs == 3 == sum(group.runs or 0 for group in picked[:-1])
+
+
+def test_the_canary_is_reviewed_too(toycar: Workspace) -> None:
+    """It runs before all others, so its group is there even where no experiment is of it."""
+    plan = make_plan(toycar, "small", only='fault_type == "silence" and method == "guided"')
+    canary = next(g for g in of_plan(toycar, plan) if "after_assign offset" in g.what)
+    assert canary.runs == 0
+
+
+def test_what_a_reader_sees_is_the_fault(toycar: Workspace) -> None:
+    """The diff holds the injected lines of the fault alone; probe and import are a group of their own."""
+    groups = of_toy(toycar)
+    for group in groups.values():
+        is_probe = group.what.startswith("the probe")
+        assert ("_fi.observe" in group.diff) is ("+from toycar import _fi" in group.diff) is is_probe
+    assert fault_hunks("") == ""
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "changed", "untouched"),
+    [
+        ("templates/offset.py.j2", "signed }}", "signed }} + 0.0", ["template", "diff"], "omission"),
+        ("templates/omission.py.j2", "not ", "not not not ", ["template", "diff"], "offset"),
+        ("tree/toycar/sensing.py", "gap = world.gap", "gap = world.gap * 1", ["target function", "diff"], ""),
+        ("tree/toycar/sensing.py", "self.reading = (100.0", "self.reading = (99.0", [], "omission"),
+        ("tree/toycar/sensing.py", '"""What', '"""Nearly all of what', [], "offset"),
+        ("templates/_fi.py.j2", "_TINY = 1e-9", "_TINY = 1e-8", [], "offset"),
+    ],
+)
+def test_what_a_decision_is_bound_to(
+    toycar: Workspace, file: str, old: str, new: str, changed: list[str], untouched: str
+) -> None:
+    """Template, target function and diff; nothing that is elsewhere, be it in the same file."""
+    before = of_toy(toycar)
+    path = toycar.library.parent / file
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    after = of_toy(toycar)
+    assert before.keys() == after.keys()
+    found = {name: before[name].bound.changed(after[name].bound) for name in before}
+    faults = {name: what for name, what in found.items() if before[name].trigger}
+    assert [] in faults.values() or untouched == ""
+    assert {tuple(what) for what in faults.values()} <= {(), tuple(changed)}
+    assert any(faults.values()) is bool(changed)
+    for name, group in before.items():
+        if untouched and untouched in group.what:
+            assert not found[name]
+    probe = next(name for name in before if not before[name].trigger)
+    assert bool(found[probe]) is file.endswith("_fi.py.j2")
+
+
+def test_values_are_not_bound(toycar: Workspace) -> None:
+    """Another seed draws other values, and the groups stay what they are."""
+    manifest = toycar.manifest("toycar")
+    one, other = (of_library(toycar, manifest, specs=SENSOR, seed=seed) for seed in (0, 1))
+    assert [group.bound for group in one] == [group.bound for group in other]
+    assert [group.faults for group in one] != [group.faults for group in other]
+
+
+def test_a_template_that_chooses_lines_by_numbers(toycar: Workspace) -> None:
+    """Its group has a diff for each choice, and all of them are bound."""
+    template = toycar.templates / "offset.py.j2"
+    text = template.read_text()
+    template.write_text(text + "{% if by > 30 %}\n    {{ target }} = {{ target }}\n{% endif %}\n")
+    groups = of_toy(toycar, "sensor/distance").values()
+    both = next(
+        g
+        for g in groups
+        if g.what.startswith("toycar/sensing.py Sensor.sense after_assign gap: offset(by, t")
+    )
+    assert len(both.shapes) == 2
+    assert sorted(m for shape in both.shapes for m in shape.members) == sorted(f.id for f in both.faults)
+
+
+def test_specs_are_chosen(toycar: Workspace, tmp_path: Path) -> None:
+    """By globs and files; what is neither is told."""
+    path = tmp_path / "mine.yaml"
+    path.write_text((toycar.library / "faults/sensor/lane.yaml").read_text())
+    by_file, by_name = of_toy(toycar, str(path)), of_toy(toycar, "sensor/l*")
+    assert by_file.keys() == by_name.keys()
+    with pytest.raises(MutatorError, match="no fault spec 'sensor/none'"):
+        of_toy(toycar, "sensor/none")
+
+
+def test_another_target_has_other_groups(toycar: Workspace) -> None:
+    """An id names the target, too: decisions about one are none about another."""
+    manifest = toycar.manifest("toycar")
+    ids = {
+        g.id for m in (manifest, replace(manifest, name="other")) for g in of_library(toycar, m, specs=SENSOR)
+    }
+    assert len(ids) == 2 * len(of_toy(toycar))
+
+
+@pytest.mark.slow
+def test_the_whole_library_is_at_most_200_groups(clone: Workspace) -> None:
+    """All faults in both readings, under contexts and at random times."""
+    groups = of_library(clone, clone.manifest("openpilot"))
+    assert 50 < len(groups) <= 200
+    assert len({group.id for group in groups}) == len(groups)
+    assert sum(len(group.faults) for group in groups) > 1500
