@@ -1,5 +1,6 @@
 """Groups of what a library or a campaign injects, and what a decision about one is bound to."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,16 +12,23 @@ from mutator.review.catalogue import Group, fault_hunks, of_library, of_plan
 from mutator.workspace import Workspace
 
 SENSOR = ("sensor/*",)
+Groups = dict[str, Group]
 
 
-def of_toy(toy: Workspace, *specs: str) -> dict[str, Group]:
+def of_toy(toy: Workspace, *specs: str) -> Groups:
     groups = of_library(toy, toy.manifest("toycar"), specs=specs or SENSOR)
     return {group.id: group for group in groups}
 
 
-def test_a_library_is_few_groups(toycar: Workspace) -> None:
+@pytest.fixture(scope="module")
+def groups(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Groups:
+    """Those of the toy as it is; not to be changed."""
+    return of_toy(copy_toycar(tmp_path_factory.mktemp("groups")))
+
+
+def test_a_library_is_few_groups(groups: Groups) -> None:
     """Variants are told by place, model and what it is given; each under contexts and from a time on."""
-    found = sorted(group.what for group in of_toy(toycar).values())
+    found = sorted(group.what for group in groups.values())
     sense = "toycar/sensing.py Sensor.sense"
     kinds = [
         f"{sense} after_assign gap: offset(by, low, target=gap)",
@@ -34,13 +42,12 @@ def test_a_library_is_few_groups(toycar: Workspace) -> None:
     )
 
 
-def test_a_group_is_the_same_in_a_campaign(toycar: Workspace) -> None:
+def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) -> None:
     """What was approved for the library is approved for a campaign of it, whatever it picks."""
-    library = of_toy(toycar)
     picked = of_plan(toycar, make_plan(toycar, "small", limit=3))
     assert 1 < len(picked) <= 5
     for group in picked:
-        assert group.bound == library[group.id].bound
+        assert group.bound == groups[group.id].bound
     probe = picked[-1]
     assert probe.what.startswith("the probe")
     assert probe.runs == 3 == sum(group.runs or 0 for group in picked[:-1])
@@ -53,9 +60,8 @@ def test_the_canary_is_reviewed_too(toycar: Workspace) -> None:
     assert canary.runs == 0
 
 
-def test_what_a_reader_sees_is_the_fault(toycar: Workspace) -> None:
+def test_what_a_reader_sees_is_the_fault(groups: Groups) -> None:
     """The diff holds the injected lines of the fault alone; probe and import are a group of their own."""
-    groups = of_toy(toycar)
     for group in groups.values():
         is_probe = group.what.startswith("the probe")
         assert ("_fi.observe" in group.diff) is ("+from toycar import _fi" in group.diff) is is_probe
@@ -74,10 +80,10 @@ def test_what_a_reader_sees_is_the_fault(toycar: Workspace) -> None:
     ],
 )
 def test_what_a_decision_is_bound_to(
-    toycar: Workspace, file: str, old: str, new: str, changed: list[str], untouched: str
+    toycar: Workspace, groups: Groups, file: str, old: str, new: str, changed: list[str], untouched: str
 ) -> None:
     """Template, target function and diff; nothing that is elsewhere, be it in the same file."""
-    before = of_toy(toycar)
+    before = groups
     path = toycar.library.parent / file
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
@@ -95,12 +101,11 @@ def test_what_a_decision_is_bound_to(
     assert bool(found[probe]) is file.endswith("_fi.py.j2")
 
 
-def test_values_are_not_bound(toycar: Workspace) -> None:
+def test_values_are_not_bound(toycar: Workspace, groups: Groups) -> None:
     """Another seed draws other values, and the groups stay what they are."""
-    manifest = toycar.manifest("toycar")
-    one, other = (of_library(toycar, manifest, specs=SENSOR, seed=seed) for seed in (0, 1))
-    assert [group.bound for group in one] == [group.bound for group in other]
-    assert [group.faults for group in one] != [group.faults for group in other]
+    other = of_library(toycar, toycar.manifest("toycar"), specs=SENSOR, seed=1)
+    assert [group.bound for group in other] == [group.bound for group in groups.values()]
+    assert [group.faults for group in other] != [group.faults for group in groups.values()]
 
 
 def test_a_template_that_chooses_lines_by_numbers(toycar: Workspace) -> None:
@@ -108,12 +113,8 @@ def test_a_template_that_chooses_lines_by_numbers(toycar: Workspace) -> None:
     template = toycar.templates / "offset.py.j2"
     text = template.read_text()
     template.write_text(text + "{% if by > 30 %}\n    {{ target }} = {{ target }}\n{% endif %}\n")
-    groups = of_toy(toycar, "sensor/distance").values()
-    both = next(
-        g
-        for g in groups
-        if g.what.startswith("toycar/sensing.py Sensor.sense after_assign gap: offset(by, t")
-    )
+    found = of_toy(toycar, "sensor/distance").values()
+    both = next(group for group in found if "offset(by, target=gap); state" in group.what)
     assert len(both.shapes) == 2
     assert sorted(m for shape in both.shapes for m in shape.members) == sorted(f.id for f in both.faults)
 
@@ -128,13 +129,11 @@ def test_specs_are_chosen(toycar: Workspace, tmp_path: Path) -> None:
         of_toy(toycar, "sensor/none")
 
 
-def test_another_target_has_other_groups(toycar: Workspace) -> None:
+def test_another_target_has_other_groups(toycar: Workspace, groups: Groups) -> None:
     """An id names the target, too: decisions about one are none about another."""
-    manifest = toycar.manifest("toycar")
-    ids = {
-        g.id for m in (manifest, replace(manifest, name="other")) for g in of_library(toycar, m, specs=SENSOR)
-    }
-    assert len(ids) == 2 * len(of_toy(toycar))
+    other = of_library(toycar, replace(toycar.manifest("toycar"), name="other"), specs=SENSOR)
+    assert {group.what for group in other} == {group.what for group in groups.values()}
+    assert not {group.id for group in other} & groups.keys()
 
 
 @pytest.mark.slow

@@ -1,0 +1,235 @@
+"""`review`: groups listed, shown, decided about, walked through, and as a page; `run --require-reviewed`."""
+
+import base64
+import gzip
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from mutator.cli import review_walk
+from mutator.review.catalogue import of_library
+from mutator.workspace import Workspace
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+JANE = ("--by", "Jane Doe")
+
+
+def ids(cli: Cli, *words: object) -> list[str]:
+    return [group["group"] for group in cli("review", *words, "--json").json]
+
+
+@pytest.fixture(scope="session")
+def known(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
+) -> dict[str, str]:
+    """The groups of the toy: what they are about, by id, as listed when all are new."""
+    toy = copy_toycar(tmp_path_factory.mktemp("known"))
+    groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
+    return {group.id: group.what for group in groups}
+
+
+def about(known: dict[str, str], words: str) -> str:
+    return next(name for name, what in known.items() if words in what)
+
+
+def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """`review` alone lists; approved groups come last, those whose template has changed before them."""
+    first, *rest = known
+    cli("review", "approve", first, *JANE)
+    lines = cli("review").out.splitlines()
+    assert [line.split()[0] for line in lines[1:-1]] == [*rest, first]
+    assert lines[0].split() == ["group", "state", "what", "when", "faults", "runs"]
+    assert lines[-1] == "9 groups: 8 new, 1 approved"
+    (root / "templates/offset.py.j2").write_text("{{ target }} = {{ target }} {{ by | signed }}\n")
+    states = [group["state"] for group in cli("review", "list", "--json").json]
+    assert states == ["new"] * 8 + ["changed"]
+
+
+def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Filters name what the table tells; the start of an id is enough where only one group has it."""
+    silent = about(known, "omission(); time")
+    only = 'model == "omission" and trigger == "time"'
+    assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
+    assert cli("review", "show", silent[:8], "--json").json[0]["group"] == silent
+    for word, said in (("zz", "no group 'zz'"), ("", "9 groups start with ''")):
+        answer = cli("review", "show", word)
+        assert (answer.code, said in answer.err) == (2, True)
+    assert "unknown column `color`" in cli("review", "--only", "color == 1").err
+
+
+def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Diff with holes, a row of values for each fault, the conditions; for a program, too."""
+    longer = about(known, "offset(by, target=gap); state")
+    answer = cli("review", "show", longer)
+    assert f"group {longer}: new" in answer.out
+    assert "+            gap = gap ⟨by⟩  # fi:⟨id⟩" in answer.out
+    assert re.search(r"^sensor/distance/longer \d m +as_described +\+ \d\.0$", answer.out, re.MULTILINE)
+    assert re.search(r"^  hwt .*\(near\)$", answer.out, re.MULTILINE)
+    [group] = cli("review", "show", longer, "--json").json
+    assert group["values"][0]["by"].startswith("+ ")
+    assert len(group["values"]) == group["faults"] == 8  # four, in either reading
+
+
+def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """All of the library, specs of it, or a campaign; of a campaign the runs are counted."""
+    assert set(ids(cli, "--spec", "sensor/lane")) < known.keys()
+    campaign = cli("review", "--campaign", "small", "--json").json
+    assert {group["group"] for group in campaign} <= known.keys()
+    assert all(group["runs"] for group in campaign)
+    assert "--campaign together with --spec" in cli("review", "--campaign", "small", "--spec", "a").err
+
+
+def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Who approved or rejected what, with a remark; a change says what has changed since."""
+    group = about(known, "omission(); time")
+    answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much")
+    assert answer.out.splitlines()[0] == f"{group} rejected by Jane Doe: too much"
+    file = root / "fault_library/reviews/toycar.yaml"
+    assert answer.out.splitlines()[1].endswith("8 new, 1 rejected")
+    assert f'group: "{group}"' in file.read_text()
+    tree = root / "tree/toycar/sensing.py"
+    tree.write_text(tree.read_text().replace("offset = world.offset", "offset = 1.0 * world.offset"))
+    [data] = cli("review", "show", group, "--json").json
+    assert (data["state"], data["changed"], data["remark"]) == (
+        "changed",
+        ["target function", "diff"],
+        "too much",
+    )
+    shown = cli("review", "show", group).out
+    assert "rejected by Jane Doe: too much (changed since: target function, diff)" in shown
+    assert cli("review", "approve", group, *JANE, "--json").json[0]["state"] == "approved"
+
+
+def test_no_name_is_no_decision(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Somebody must have looked."""
+    group = next(iter(known))
+    assert cli("review", "approve", group).code == 2
+    assert "who has reviewed" in cli("review", "approve", group, "--by", " ").err
+    assert not (root / "fault_library/reviews").exists()
+
+
+def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """A hand edit that went wrong stops the command."""
+    cli("review", "approve", next(iter(known)), *JANE)
+    file = root / "fault_library/reviews/toycar.yaml"
+    file.write_text(file.read_text().replace("approved", "okay"))
+    answer = cli("review")
+    assert (answer.code, "toycar.yaml:8: " in answer.err) == (2, True)
+
+
+def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
+    """Without one nothing is asked, and the error names what does without."""
+    answer = cli("review", "walk", *JANE)
+    assert answer.code == 2
+    assert "no terminal to ask in" in answer.err
+    assert "mutator review approve" in answer.err
+
+
+@pytest.fixture
+def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Somebody at a terminal who presses these keys, with these remarks."""
+
+    class Tty:
+        def __init__(self, stream: Any) -> None:
+            self._stream = stream
+
+        def __getattr__(self, name: str) -> Any:
+            return (lambda: True) if name == "isatty" else getattr(self._stream, name)
+
+    def press(pressed: str, *remarks: str) -> None:
+        left: Iterator[str] = iter(pressed)
+        said = iter(remarks)
+        sys = review_walk.sys
+        monkeypatch.setattr(
+            review_walk, "sys", type("Sys", (), {"stdin": Tty(sys.stdin), "stdout": Tty(sys.stdout)})
+        )
+        monkeypatch.setattr(typer, "getchar", lambda: next(left))
+        monkeypatch.setattr(typer, "prompt", lambda *a, **k: next(said))
+
+    return press
+
+
+def test_a_walk_asks_group_by_group(
+    cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
+) -> None:
+    """a, r, s and q do what they say, another key asks again; each decision is kept at once."""
+    first, second, third, *_ = known
+    keys("axrsq", "good", "")
+    answer = cli("review", "walk", *JANE)
+    assert answer.code == 0
+    assert "1 of 9:  [a] approve  [r] reject  [s] skip  [q] quit" in answer.out
+    states = {group["group"]: group["state"] for group in cli("review", "--json").json}
+    assert [states[name] for name in (first, second, third)] == ["approved", "rejected", "new"]
+    keys("q")
+    again = cli("review", "walk", *JANE, "--only", 'model != "omission"').out
+    assert f"group {first}" not in again
+
+
+def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]) -> None:
+    """Groups, states, diffs, values and options are in one file that needs no other; twice the same."""
+    out = tmp_path / "review.html"
+    first = next(iter(known))
+    cli("review", "approve", first, *JANE)
+    words = ("--campaign", "small", "--reading", "as_coded")
+    assert cli("review", "page", "--out", out, *words, "--json").json["groups"] == 7
+    text = out.read_text()
+    assert not re.search(r'(src|href)="(?!data:|#)', re.sub(r"<script.*?</script>", "", text, flags=re.S))
+    [packed] = re.findall(r'<script type="application/octet-stream\+gzip" id="review">(.*?)</script>', text)
+    data = json.loads(gzip.decompress(base64.b64decode(packed)))
+    assert data["options"] == "--campaign small --reading as_coded"
+    groups = {group["id"]: group for group in data["groups"]}
+    for shown in cli("review", "show", *groups, *words, "--json").json:
+        told = groups[shown["group"]]
+        assert (told["diff"], told["state"], told["runs"]) == (shown["diff"], shown["state"], shown["runs"])
+        assert [dict(zip(told["heads"], row, strict=True)) for row in told["rows"]] == shown["values"]
+    again = out.with_name("again.html")
+    cli("review", "page", "--out", again, *words)
+    assert again.read_bytes() == out.read_bytes()
+    assert cli("review", "page", "--out", tmp_path / "no" / "page.html").code == 2
+
+
+@pytest.mark.slow
+def test_only_what_is_approved_is_run(cli: Cli, root: Path, tmp_path: Path) -> None:
+    """Refused, with names, numbers and commands, until all is approved; again when a template changes."""
+    out = tmp_path / "run"
+    words = ("run", "small", "--out", out, "--require-reviewed")
+    refused = cli(*words)
+    assert (refused.code, (out / "run.json").exists()) == (1, False)
+    groups = ids(cli, "--campaign", "small")
+    assert f"{len(groups)} groups of mutants are not approved" in refused.err
+    for group in cli("review", "--campaign", "small", "--json").json:
+        assert re.search(rf"{group['group']}  new, {group['runs']} experiments?: ", refused.err)
+    command = re.search(r"`mutator (review approve .*) --by NAME`", refused.err)
+    assert command is not None
+    cli(*command[1].split(), *JANE)
+    assert cli("review", "reject", groups[0], "--by", "Joe").code == 0
+    refused = cli(*words)
+    assert refused.code == 1
+    assert "a group of mutants is not approved" in refused.err
+    assert f"{groups[0]}  rejected" in refused.err
+    cli("review", "approve", groups[0], "--by", "Joe")
+    assert cli(*words).code == 0
+    kept = json.loads((out / "reviewed.json").read_text())
+    assert sorted(entry["group"] for entry in kept["groups"]) == sorted(groups)
+    assert {entry["by"] for entry in kept["groups"]} == {"Jane Doe", "Joe"}
+    assert cli(*words).code == 0  # again, with nothing left to do
+
+    template = root / "templates/omission.py.j2"
+    template.write_text(template.read_text().replace("not ", "not not not "))
+    refused = cli("run", "small", "--out", tmp_path / "other", "--require-reviewed")
+    assert refused.code == 1
+    changed = [
+        g["group"] for g in cli("review", "--campaign", "small", "--json").json if g["state"] == "changed"
+    ]
+    assert changed
+    assert re.findall(r"^  (\w{12})  (\w+)", refused.err, re.MULTILINE) == [
+        (name, "changed") for name in changed
+    ]
+    shutil.rmtree(root / "fault_library/reviews")
+    assert cli("run", "small", "--out", out, "--require-reviewed").code != 0
