@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from mutator.cli.console import Terminal
+from mutator.cli.review_choice import columns
 
 if TYPE_CHECKING:
     from mutator.review.catalogue import Group
@@ -14,24 +15,6 @@ if TYPE_CHECKING:
 STYLES = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
 ROWS = 24  # of values that a terminal is shown
 CONDITIONS = 6
-
-
-def columns(review: "Review", group: "Group") -> dict[str, object]:
-    """What the filters know of a group; several of one kind stand with commas between them."""
-    decision = review.decisions.get(group.id)
-    return {
-        "group": group.id,
-        "state": review.state(group).value,
-        "by": decision.by if decision else None,
-        "file": ", ".join(group.files),
-        "function": ", ".join(group.functions),
-        "model": ", ".join(group.models),
-        "trigger": group.trigger,
-        "hold": group.hold,
-        "spec": ", ".join(group.specs),
-        "faults": len(group.faults),
-        "runs": group.runs,
-    }
 
 
 def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from mutator.cli.console import Terminal, short_path
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator.cli.reviews import Loaded
+    from mutator.cli.review_choice import Loaded
 
 KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 

@@ -222,7 +222,10 @@ const Review = (() => {
   /** A word of a shell's command line. */
   const quoted = (text) => (/^[\w.@/-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 
-  Packed.read("review").then((data) => new Page(data));
+  Packed.read("review").then((data) => {
+    new Page(data);
+    document.documentElement.dataset.ready = "";
+  });
 
   return { quoted };
 })();

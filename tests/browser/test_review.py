@@ -1,0 +1,97 @@
+"""The page of groups as a reviewer uses it."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.review.catalogue import of_library
+from mutator.review.decisions import Verdict, load_review
+from mutator.review.page import write_page
+from mutator.workspace import Workspace
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+    """The toy's nine groups; one of them is approved."""
+    folder = tmp_path_factory.mktemp("review")
+    toy = copy_toycar(folder)
+    groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
+    review = load_review(toy, "toycar").decided(groups[:1], Verdict.APPROVED, "Jane <b>Doe</b>", "")
+    write_page(folder / "review.html", review, review.in_turn(groups), ["--spec", "sensor/*"])
+    return folder / "review.html"
+
+
+@pytest.fixture
+def open_page(browser: Any, file: Path) -> Iterator[Callable[..., Any]]:
+    """Opens the page; an error in the console fails the test."""
+    errors: list[str] = []
+    contexts = []
+
+    def opened(fragment: str = "", **options: Any) -> Any:
+        contexts.append(browser.new_context(**options))
+        page = contexts[-1].new_page()
+        page.on("console", lambda m: errors.append(m.text) if m.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(f"{file.as_uri()}#{fragment}")
+        page.wait_for_selector("html[data-ready]")
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+    assert errors == []
+
+
+def shown(page: Any) -> int:
+    return int(page.locator(".group:visible").count())
+
+
+def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[..., Any]) -> None:
+    """Words and states narrow the list; the address of what is seen shows the same again."""
+    page = open_page()
+    assert (shown(page), page.inner_text("#found")) == (9, "9 groups")
+    page.fill("#find", "omission time")
+    assert (shown(page), page.inner_text("#found")) == (1, "1 of 9 groups")
+    page.fill("#find", "")
+    page.click("[data-state=approved]")
+    assert "approved by Jane <b>Doe</b>" in page.inner_text(".group:visible")
+    page.click("#split")
+    again = open_page(page.url.partition("#")[2])
+    assert shown(again) == 1
+    assert again.locator(".group:visible .diff.split").count() == 1
+
+
+def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
+    """Keys go from group to group and mark them; the commands name them as a shell needs it."""
+    page = open_page("q=longer")
+    for key in "jajr":
+        page.keyboard.press(key)
+    page.fill("#by", "Jane O'Neil")
+    page.fill("#remark", "fine")
+    ids = page.locator(".group:visible h2").all_inner_texts()
+    said = "--spec 'sensor/*' --by 'Jane O'\\''Neil' --remark fine"
+    assert page.locator("#commands code").all_inner_texts() == [
+        f"mutator review approve {ids[0]} {said}",
+        f"mutator review reject {ids[1]} {said}",
+    ]
+    page.keyboard.press("Escape")
+    page.keyboard.press("r")
+    assert page.locator("#commands code").count() == 1
+
+
+def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
+    """The diff has its holes; the table of values opens by key, with the span above it."""
+    page = open_page("q=longer+time")
+    page.keyboard.press("j")
+    assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]
+    page.keyboard.press("v")
+    assert page.locator(".group:visible .values tbody tr:visible").count() == 8
+    assert page.inner_text(".group:visible .values summary").startswith("Values (8): by + ")
+
+
+def test_a_narrow_screen_needs_no_scrolling_sideways(open_page: Callable[..., Any]) -> None:
+    """What is wide scrolls in its own box."""
+    page = open_page(viewport={"width": 400, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") == 400
