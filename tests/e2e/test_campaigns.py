@@ -270,6 +270,8 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
     [
         (["--campaign", "small"], 4, "--campaign needs --campaign-out DIR"),
         (["--campaign-out", "out"], 4, "--campaign-out without --campaign"),
+        (["--require-reviewed"], 4, "--require-reviewed without --campaign"),
+        (["--campaign", "small", "--campaign-out", "out", "--require-reviewed"], 1, "not approved"),
         (["--campaign", "nosuch", "--campaign-out", "out"], 2, "no campaign 'nosuch'"),
         (["--campaign", "small", "--campaign-out", "tree"], 2, "no run folder, and not empty (toycar)"),
         (["--campaign", "small", "--campaign-out", "newer", "-n", "2"], 2, "written by a newer mutator"),
