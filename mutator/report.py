@@ -167,10 +167,14 @@ def _planned(folder: RunFolder) -> str:
 
 def _facts(folder: RunFolder, rows: Sequence[Row], engine: "EngineTold | None") -> list[tuple[str, str]]:
     """What the results come from, and what they could be made again with."""
+    from mutator.review import gate
+
+    reviewed = gate.told(folder.path)
     head, versions = folder.head, folder.provenance
     facts = {
         "experiments": f"{len(rows)} of {folder.planned} planned",
         **({"proof": engine.state} if engine else {}),
+        **({"reviewed": reviewed} if reviewed else {}),
         "campaign": head["campaign"],
         "plan": head["plan"],
         "seed": head["seed"],

@@ -8,6 +8,7 @@ from mutator import proof
 from mutator.errors import MutatorError
 from mutator.ids import digest
 from mutator.jsonio import read_json, write_json
+from mutator.review import gate
 from mutator.runfolder import HEAD, RunFolder
 from mutator.workspace import Workspace
 
@@ -16,8 +17,8 @@ FILE = "made_from.json"
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """Digest of all that a report depends on: results, run.json, records, timings, proof, pictures
-    that it shows, the library's cited numbers, and mutator's own sources."""
+    """Digest of all that a report depends on: results, run.json, records, timings, proof, reviews,
+    pictures that it shows, the library's cited numbers, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
@@ -26,7 +27,8 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     results = [digest((run / name).read_bytes()) for name in (HEAD, "results.csv")]
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", proof.FOLDER)]
-    return digest([SCHEMA, own, results, engine, plots, references])
+    reviewed = _files(run, gate.FILE)
+    return digest([SCHEMA, own, results, engine, plots, references, reviewed])
 
 
 def read(out: Path) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import pytest
 from mutator import planfile, report, report_page
 from mutator.columns import COLUMNS
 from mutator.errors import MutatorError
+from mutator.review import gate
 from mutator.workspace import Workspace
 
 HERE = Workspace.find(Path(__file__).parents[3])
@@ -182,6 +183,15 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
             assert fact in text
+
+
+def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
+    """Approvals that a run kept are told in both forms, and one that has none says nothing of them."""
+    assert "reviewed" not in report.write(run, None).markdown.read_text()
+    gate.write(run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]})
+    written = report.ensure(run, None)
+    for text in (written.markdown.read_text(), written.page.read_text()):
+        assert "all 2 groups approved, by Jane (1), Joe (1)" in text
 
 
 def test_the_report_is_the_same_each_time(run: Path) -> None:
