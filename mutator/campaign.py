@@ -129,7 +129,9 @@ class _LimitsModel(StrictModel):
     steps: int = Field(default=20_000, ge=1)
 
 
-class _CampaignModel(StrictModel):
+class CampaignModel(StrictModel):
+    """A campaign file, but for its key `schema`."""
+
     name: str = Field(pattern=r"^[a-z0-9_]+$")
     about: str
     target: str
@@ -147,7 +149,7 @@ class _CampaignModel(StrictModel):
     chunk: int = Field(20, ge=1, le=1000)
 
     @model_validator(mode="after")
-    def _check(self) -> "_CampaignModel":
+    def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
             raise ValueError("proportional without sample: say how many")
         return self
@@ -155,7 +157,7 @@ class _CampaignModel(StrictModel):
 
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file strictly; MutatorError with file and line for anything wrong with it."""
-    model, source = read(path, _CampaignModel, SCHEMA)
+    model, source = read(path, CampaignModel, SCHEMA)
     for key in ("scenarios", "setting", "methods"):
         values = getattr(model, key)
         for i, value in enumerate(values):

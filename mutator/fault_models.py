@@ -114,7 +114,9 @@ class _ExampleModel(StrictModel):
     after: str
 
 
-class _FaultModelModel(StrictModel):
+class FaultModelModel(StrictModel):
+    """The YAML of a fault model, but for its key `schema`."""
+
     name: str
     kind: Literal["insert", "guard"]
     about: str
@@ -136,7 +138,7 @@ def load_fault_models(folder: Path) -> FaultModels:
 
 
 def _load(path: Path) -> FaultModel:
-    model, source = read(path, _FaultModelModel, SCHEMA)
+    model, source = read(path, FaultModelModel, SCHEMA)
     if model.name != path.stem:
         raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', as the file is named")
     template_path = path.with_suffix(".py.j2")

@@ -24,6 +24,7 @@ class Channel:
     name: str
     unit: str
     tolerance: float = 0.0
+    about: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,6 +128,7 @@ class TargetManifest:
 class _ChannelModel(StrictModel):
     unit: str
     tolerance: float = Field(0.0, ge=0.0, allow_inf_nan=False)
+    about: str = ""
 
 
 class _ChangeModel(StrictModel):
@@ -149,7 +151,9 @@ class _FilmModel(StrictModel):
     still: list[str]
 
 
-class _ManifestModel(StrictModel):
+class ManifestModel(StrictModel):
+    """A manifest file, but for its key `schema`."""
+
     name: str
     about: str = ""
     root: str
@@ -173,7 +177,7 @@ class _ManifestModel(StrictModel):
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
-    model, source = read(path, _ManifestModel, SCHEMA)
+    model, source = read(path, ManifestModel, SCHEMA)
     folder = (root or path.parent / model.root).resolve()
     if not folder.is_dir():
         raise source.error(
@@ -213,7 +217,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     )
 
 
-def _check_names(model: _ManifestModel, source: Source) -> None:
+def _check_names(model: ManifestModel, source: Source) -> None:
     if not model.package.isidentifier():
         raise source.error(("package",), f"'{model.package}'", expected="a Python package's name")
     for key, command in (("entry", model.entry), ("film", model.film)):
@@ -227,7 +231,7 @@ def _check_names(model: _ManifestModel, source: Source) -> None:
             raise source.error((key,), f"'{name}'", expected="a bare file name, made in {out}")
 
 
-def _check_events(model: _ManifestModel, source: Source) -> None:
+def _check_events(model: ManifestModel, source: Source) -> None:
     """Hazards become columns of the results, alerts one cell's words: names that fit there, each once."""
     for key in ("hazards", "alerts"):
         names = [name.lower() for name in getattr(model, key)]
@@ -243,7 +247,7 @@ def _check_events(model: _ManifestModel, source: Source) -> None:
 
 
 def _channels(channels: Mapping[str, _ChannelModel]) -> tuple[Channel, ...]:
-    return tuple(Channel(name=n, unit=c.unit, tolerance=c.tolerance) for n, c in channels.items())
+    return tuple(Channel(name=name, **channel.model_dump()) for name, channel in channels.items())
 
 
 def _film(model: _FilmModel | None) -> Film | None:

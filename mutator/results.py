@@ -4,10 +4,10 @@ import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mutator import planfile
-from mutator.columns import COLUMNS, plan_row
+from mutator.columns import COLUMNS, EXTRA, TIMINGS, plan_row, type_of
 from mutator.jsonio import write_atomic
 from mutator.model import Experiment, Record, Status
 from mutator.records import TIMINGS_SCHEMA, read_lines, read_records
@@ -18,11 +18,7 @@ if TYPE_CHECKING:
     import pyarrow as pa  # type: ignore[import-untyped]
 
 _DERIVED = ("results.csv", "results.parquet", "timings.parquet")
-_EXTRA = ("variant", "aim", "condition", "detail")
 _HAZARDS = ("H1", "H2", "H3")
-_FLAGS = ("activated", "manifested")
-_COUNTS = ("seed", "activations")
-_TIMES = ("value", "reaction_time")  # and all that begin with t_ or max_dev_
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
@@ -94,8 +90,9 @@ def build(run: Path) -> Path:
     rows = [row(e, records[e.id], hazards) for e in experiments if e.id in records]
     columns = _columns(folder)
     write_atomic(folder.path / "results.csv", _csv(rows, columns))
-    flags = {*_FLAGS, *(name.lower() for name in (*_HAZARDS, *hazards))}
-    schema = pa.schema([(name, pa.int8() if name in flags else _type(name, pa)) for name in columns])
+    types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
+    flags = {name.lower() for name in hazards}
+    schema = pa.schema([(name, types["flag" if name in flags else type_of(name)]) for name in columns])
     write_atomic(folder.path / "results.parquet", _parquet(rows, schema))
     write_atomic(folder.path / "timings.parquet", _timings(folder.path))
     return folder.path / "results.csv"
@@ -106,7 +103,7 @@ def _columns(folder: RunFolder) -> list[str]:
     hazards = [name.lower() for name in folder.head["hazards"] if name not in _HAZARDS]
     own = [column for name in hazards for column in (name, f"t_{name}")]
     own += deviation_columns(folder.head["compared"]).values()
-    return [*COLUMNS, *(name for name in own if name not in COLUMNS), *_EXTRA]
+    return [*COLUMNS, *(name for name in own if name not in COLUMNS), *(column.name for column in EXTRA)]
 
 
 def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
@@ -115,14 +112,6 @@ def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue().encode()
-
-
-def _type(name: str, pa: Any) -> "pa.DataType":
-    if name in _TIMES or name.startswith(("t_", "max_dev_")):
-        return pa.float64()
-    if name in _COUNTS:
-        return pa.int64()
-    return pa.string()
 
 
 def _parquet(rows: list[dict[str, object]], schema: "pa.Schema") -> bytes:
@@ -145,13 +134,6 @@ def _timings(run: Path) -> bytes:
     newest: dict[str, dict[str, object]] = {}
     for path in sorted((run / "timings").glob("*.jsonl")):
         newest |= {line["experiment_id"]: line for line in read_lines(path, TIMINGS_SCHEMA)}
-    schema = pa.schema(
-        [
-            ("experiment_id", pa.string()),
-            ("cpu_s", pa.float64()),
-            ("wall_s", pa.float64()),
-            ("host", pa.string()),
-            ("worker", pa.string()),
-        ]
-    )
+    types = {"text": pa.string(), "number": pa.float64()}
+    schema = pa.schema([(column.name, types[column.type]) for column in TIMINGS])
     return _parquet([newest[name] for name in sorted(newest)], schema)

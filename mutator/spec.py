@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -143,21 +143,18 @@ class _VariantModel(StrictModel):
     as_coded: _ReadingModel | None = None
 
 
-class _SpecModel(StrictModel):
+class SpecModel(StrictModel):
+    """A spec file, but for its key `schema`."""
+
     module: str
     fault_type: str
     about: str
     variants: dict[str, _VariantModel]
 
 
-def json_schema() -> dict[str, Any]:
-    """JSON Schema of a spec file, but for its key `schema`."""
-    return _SpecModel.model_json_schema()
-
-
 def load_spec(path: Path) -> FaultSpec:
     """Read one spec strictly (file:line errors). Models, ranges and anchors are checked by `expand`."""
-    model, source = read(path, _SpecModel, SCHEMA)
+    model, source = read(path, SpecModel, SCHEMA)
     for key in ("module", "fault_type"):
         _check_name(getattr(model, key), source, (key,))
     if not model.variants:

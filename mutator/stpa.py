@@ -95,7 +95,9 @@ class _RowModel(StrictModel):
     actions: dict[str, _VerdictsModel]
 
 
-class _TableModel(StrictModel):
+class TableModel(StrictModel):
+    """The file of a context table, but for its key `schema`."""
+
     name: str
     about: str = ""
     constants: dict[str, float]
@@ -107,7 +109,9 @@ class _HazardModel(StrictModel):
     leads_to: list[str]
 
 
-class _HazardsModel(StrictModel):
+class HazardsModel(StrictModel):
+    """The file of accidents and hazards, but for its key `schema`."""
+
     accidents: dict[str, str]
     hazards: dict[str, _HazardModel]
 
@@ -118,7 +122,7 @@ def load_context_table(path: Path) -> ContextTable:
     MutatorError also for contexts that leave something uncovered or overlap, where that can be proved, and
     for rows that do not judge the same control actions.
     """
-    model, source = read(path, _TableModel, CONTEXT_SCHEMA)
+    model, source = read(path, TableModel, CONTEXT_SCHEMA)
     for name in model.constants:
         if not _CONSTANT.match(name) or name in VARIABLES:
             raise source.error(
@@ -190,7 +194,7 @@ def _condition(text: str, constants: Mapping[str, float], source: Source, row: s
 
 def load_hazards(path: Path) -> HazardList:
     """Read the accidents and hazards; a hazard that leads to an unknown accident is an error."""
-    model, source = read(path, _HazardsModel, HAZARDS_SCHEMA)
+    model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
     for name, hazard in model.hazards.items():
         for i, accident in enumerate(hazard.leads_to):
             if accident not in model.accidents:

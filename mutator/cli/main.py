@@ -1,8 +1,4 @@
-"""`mutator`: the verbs put together, and what becomes of an error.
-
-Exit codes: 0 fine, 1 a check failed, 2 wrong input, 3 harness errors present (also a defect of mutator
-itself), 130 interrupted.
-"""
+"""`mutator`: the verbs put together, and what becomes of an error."""
 
 import errno
 import os
@@ -19,10 +15,23 @@ from mutator import __version__
 from mutator.cli import campaigns, compare, experiments, exports, faults, library, reviews, run_folders, stpa
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
-from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
+from mutator.errors import (
+    EXIT_CHECK_FAILED,
+    EXIT_HARNESS_ERRORS,
+    EXIT_OK,
+    EXIT_WRONG_INPUT,
+    MutatorError,
+)
 from mutator.interrupts import terminable
 
 EXIT_INTERRUPTED = 130
+EXIT_CODES = {
+    EXIT_OK: "fine",
+    EXIT_CHECK_FAILED: "a check failed, or the command found a difference that it was asked for",
+    EXIT_WRONG_INPUT: "wrong input: the message says what to mend",
+    EXIT_HARNESS_ERRORS: "harness errors or experiments left, or a defect of mutator itself",
+    EXIT_INTERRUPTED: "interrupted",
+}
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (

@@ -25,12 +25,12 @@ _ONLY_STRAIGHT = (
     "take the standard plant",
 )
 
-_FASTEST = 400.0  # in any speed unit
-_LONGEST = 600.0  # s
-_FARTHEST = 1e5  # m
+FASTEST = 400.0  # in any speed unit
+LONGEST = 600.0  # s
+FARTHEST = 1e5  # m
 
 _SPEED_KEYS = {f"speed_{unit}": f"a speed in {unit}" for unit in SPEED_UNITS}
-_KEYS = {
+KEYS = {
     "schema": f"the format of this file, {SCHEMA}",
     "name": "the scenario's short name",
     "title": "one line on what happens",
@@ -41,23 +41,23 @@ _KEYS = {
     "plant": "standard (also when left out), or reference: the original's simulator with its errors",
     "road": "grade and curvature; left out: flat and straight",
 }
-_HOST_KEYS = {**_SPEED_KEYS, "lateral_offset_m": "the distance from the lane's middle in m, left positive"}
-_LEAD_KEYS = {
+HOST_KEYS = {**_SPEED_KEYS, "lateral_offset_m": "the distance from the lane's middle in m, left positive"}
+LEAD_KEYS = {
     "gap_m": "the distance to the lead's rear in m at the start",
     **_SPEED_KEYS,
     "at_s": "the times of the speeds in seconds",
 }
-_BUTTON_KEYS = {
+BUTTON_KEYS = {
     "button": f"one of {', '.join(BUTTONS)}",
     "press_s": "when it goes down, in seconds",
     "release_s": "when it comes up, in seconds",
 }
-_ROAD_KEYS = {"grade": "slope over time", "curvature": "bends over distance"}
-_GRADE_KEYS = {
+ROAD_KEYS = {"grade": "slope over time", "curvature": "bends over distance"}
+GRADE_KEYS = {
     "at_s": "times in seconds",
     "mps2": "deceleration by the slope, uphill positive",
 }
-_CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature in 1/m, left positive"}
+CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature in 1/m, left positive"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,9 +117,9 @@ def load_scenario(path: Path) -> Scenario:
 
 def parse_scenario(text: str, where: str, digest: str) -> Scenario:
     """The scenario in `text`; `where` names its source in errors."""
-    root = read_yaml(text, where, _KEYS)
+    root = read_yaml(text, where, KEYS)
     root.text("schema", (SCHEMA,))
-    host = root.section("host", _HOST_KEYS)
+    host = root.section("host", HOST_KEYS)
     grade, curvature = _road(root)
     scenario = Scenario(
         name=root.text("name"),
@@ -128,7 +128,7 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
         steps=_step(root, "duration_s", DT_CTRL),
         speed=_host_speed(host),
         lateral_offset=host.number("lateral_offset_m", -10.0, 10.0, default=0.0),
-        lead=_lead(root.section("lead", _LEAD_KEYS)) if "lead" in root else None,
+        lead=_lead(root.section("lead", LEAD_KEYS)) if "lead" in root else None,
         buttons=_buttons(root) if "buttons" in root else (),
         grade=grade,
         curvature=curvature,
@@ -154,27 +154,27 @@ def _possible(scenario: Scenario, plant: str) -> bool:
 
 def _host_speed(section: Section) -> float:
     key = section.quantity("speed", tuple(SPEED_UNITS))
-    return section.number(key, 0.0, _FASTEST) * SPEED_UNITS[key.removeprefix("speed_")]
+    return section.number(key, 0.0, FASTEST) * SPEED_UNITS[key.removeprefix("speed_")]
 
 
 def _lead(section: Section) -> Lead:
     key = section.quantity("speed", tuple(SPEED_UNITS))
     factor = SPEED_UNITS[key.removeprefix("speed_")]
     if section.is_list(key):
-        speeds = section.numbers(key, 0.0, _FASTEST)
-        times = section.ascending("at_s", 0.0, _LONGEST)
+        speeds = section.numbers(key, 0.0, FASTEST)
+        times = section.ascending("at_s", 0.0, LONGEST)
         section.check("at_s", len(times) == len(speeds), f"{len(speeds)} times", "give one for each speed")
     else:
-        speeds, times = (section.number(key, 0.0, _FASTEST),), (0.0,)
+        speeds, times = (section.number(key, 0.0, FASTEST),), (0.0,)
         if "at_s" in section:
             section.check("at_s", False, "no times for a single speed", "remove it, or give a list of speeds")
-    gap = section.number("gap_m", 0.0, _FARTHEST)
+    gap = section.number("gap_m", 0.0, FARTHEST)
     return Lead(gap=gap, times=times, speeds=tuple(speed * factor for speed in speeds))
 
 
 def _buttons(root: Section) -> tuple[ButtonPress, ...]:
     presses: list[ButtonPress] = []
-    for section in root.sections("buttons", _BUTTON_KEYS):
+    for section in root.sections("buttons", BUTTON_KEYS):
         press, release = _step(section, "press_s"), _step(section, "release_s")
         section.check("release_s", release > press, "a time after press_s", "let go after pressing")
         if presses:
@@ -189,16 +189,16 @@ def _buttons(root: Section) -> tuple[ButtonPress, ...]:
 def _road(root: Section) -> tuple[Table | None, Table | None]:
     if "road" not in root:
         return None, None
-    road = root.section("road", _ROAD_KEYS)
+    road = root.section("road", ROAD_KEYS)
     grade = curvature = None
     if "grade" in road:
-        section = road.section("grade", _GRADE_KEYS)
+        section = road.section("grade", GRADE_KEYS)
         grade = _table(
-            section, "at_s", section.ascending("at_s", 0.0, _LONGEST), section.numbers("mps2", -5.0, 5.0)
+            section, "at_s", section.ascending("at_s", 0.0, LONGEST), section.numbers("mps2", -5.0, 5.0)
         )
     if "curvature" in road:
-        section = road.section("curvature", _CURVATURE_KEYS)
-        places = section.ascending("at_m", 0.0, _FARTHEST)
+        section = road.section("curvature", CURVATURE_KEYS)
+        places = section.ascending("at_m", 0.0, FARTHEST)
         curvature = _table(section, "at_m", places, section.numbers("per_m", -0.05, 0.05))
     return grade, curvature
 
@@ -210,6 +210,6 @@ def _table(section: Section, key: str, at: tuple[float, ...], values: tuple[floa
 
 def _step(section: Section, key: str, earliest: float = 0.0) -> int:
     """A time in s, a whole number of steps."""
-    steps = section.number(key, earliest, _LONGEST) / DT_CTRL
+    steps = section.number(key, earliest, LONGEST) / DT_CTRL
     section.check(key, abs(steps - round(steps)) < 1e-6, "a multiple of 0.01", "a step is 10 ms")
     return round(steps)

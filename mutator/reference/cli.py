@@ -1,0 +1,91 @@
+"""The page of the command line, written from what `--help` is written from."""
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import pytest
+from typer.main import get_command
+
+from mutator import pytest_plugin
+from mutator.cli.main import EXIT_CODES, GROUPS, app
+from mutator.cli.options import PLACE_OPTIONS
+from mutator.reference.tables import generated
+from mutator.workspace import Workspace
+
+_PLACES = "Options that say where library, templates and target are may stand before or after the verb.\n"
+
+
+def command_line(workspace: Workspace) -> str:
+    """docs/reference/cli.md."""
+    command: Any = get_command(app)
+    parts = [
+        generated("Command line"),
+        "`mutator --help` and `mutator VERB --help` say the same.\n",
+        *(f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}" for title, names in GROUPS),
+        "\n## Exit codes\n",
+        "| code | meaning |",
+        "|---|---|",
+        *(f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items()),
+        "\nAn error is one line on standard error: `file:line: what was found; what was expected; what to do`. With "
+        "`--json`\nstandard output is one JSON document. Progress goes to standard error.\n",
+        "## Where things are\n",
+        _PLACES,
+        *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),
+    ]
+    for _, names in GROUPS:
+        for name in names:
+            parts += _verb(command, name)
+    return "\n".join([*parts, *_plugin()]).rstrip() + "\n"
+
+
+def _verb(group: Any, name: str) -> Iterator[str]:
+    command = group.commands[name]
+    yield f"## {name}\n"
+    with command.make_context(name, [], parent=group.make_context("mutator", [name]), resilient_parsing=True) as ctx:
+        usage = " ".join(command.get_usage(ctx).removeprefix("Usage: ").split())
+    yield f"```text\n{usage}\n```\n"
+    yield f"{_paragraphs(command.help)}\n"
+    own = [param for param in command.params if param.name not in (*PLACE_OPTIONS, "help")]
+    yield from _options(command, own)
+    if command.epilog:
+        title, _, lines = command.epilog.replace("\b", "").strip().partition("\n")
+        examples, _, rest = lines.partition("\n\n")
+        yield f"{title}\n\n```sh\n" + "\n".join(map(_example, examples.splitlines())) + "\n```\n"
+        if rest:
+            yield f"{rest.strip()}\n"
+
+
+def _example(line: str) -> str:
+    """A line of the examples; words that stand far behind the command are made a comment."""
+    command, gap, comment = re.match(r"  (.*?)(?:( {3,})(\S.*))?$", line).groups()  # type: ignore[union-attr]
+    return f"{command}{gap}# {comment}" if gap else command
+
+
+def _options(command: Any, params: Iterable[Any]) -> Iterator[str]:
+    rows = []
+    with command.make_context("mutator", [], resilient_parsing=True) as ctx:
+        for param in params:
+            if record := param.get_help_record(ctx):
+                left, right = (text.replace("|", r"\|") for text in record)
+                rows.append(f"| `{' '.join(left.split())}` | {' '.join(right.split())} |")
+    if rows:
+        yield from ("| argument or option | meaning |", "|---|---|", *rows, "")
+
+
+def _paragraphs(text: str) -> str:
+    return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+
+
+def _plugin() -> Iterator[str]:
+    """What the plugin adds to pytest."""
+    parser = pytest.Parser(_ispytest=True)
+    pytest_plugin.pytest_addoption(parser)
+    yield "## pytest\n"
+    yield "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign as `mutator run` does, without its table.\n"
+    yield "| option | meaning |"
+    yield "|---|---|"
+    for option in parser.getgroup("mutator").options:
+        facts = option.attrs()
+        yield f"| `{' '.join(option.names())} {facts['metavar']}` | {facts['help']} |"
+    yield ""

@@ -1,0 +1,98 @@
+"""Pages of the file formats: fault specs, campaigns, manifests, the hazard analysis."""
+
+from collections.abc import Iterator
+
+from mutator import campaign, manifest, spec, stpa, stpa_analysis, units
+from mutator.reference.tables import generated, sections
+from mutator.workspace import Workspace
+
+STRICT = """\
+The YAML is plain: no tags, anchors or aliases, no key twice, `true` and `false` as the only booleans.
+An unknown key, a wrong type, a unit of the wrong dimension or a value out of range is an error with file and
+line. Numbers carry their unit in the last part of their key (`distance_m`, `by_kph`); a number without a unit
+has a key without one.
+"""
+_SAME = (
+    "The YAML is strict, as that of [fault specs](fault-spec.md), and "
+    "[an editor can check it](../how-to/edit-with-completion.md)."
+)
+
+
+def fault_spec(workspace: Workspace) -> str:
+    """docs/reference/fault-spec.md."""
+    example = (workspace.library / "faults" / "radar" / "chaff.yaml").read_text(encoding="utf-8")
+    return _page(
+        generated("Fault specs"),
+        "A fault spec is one YAML file: a fault type of a module, in one or more variants. The library keeps it "
+        "at\n`fault_library/faults/<module>/<fault_type>.yaml`; `mutator try FILE --scenario S1` takes one from "
+        "anywhere.\n",
+        STRICT,
+        f"The first key is `schema: {spec.SCHEMA}`. A file of a newer schema is refused.\n"
+        "[An editor can check it](../how-to/edit-with-completion.md) while you write.\n",
+        f"```yaml\n{example.rstrip()}\n```\n",
+        *sections("fault-spec.md", spec.SpecModel),
+        "## Units\n",
+        *_units(),
+        "## Fault models\n",
+        "Offset, scale, stuck and so on, with their parameters and examples: [Fault models](fault-models.md).\n",
+    )
+
+
+def campaigns(workspace: Workspace) -> str:
+    """docs/reference/campaign.md."""
+    example = (workspace.library / "campaigns" / "quickstart.yaml").read_text(encoding="utf-8")
+    return _page(
+        generated("Campaigns"),
+        "Which faults, in which scenarios, under which triggers, within which limits. The library keeps a "
+        "campaign at\n`fault_library/campaigns/<name>.yaml`; `mutator run FILE --out DIR` takes one from "
+        "anywhere.\n",
+        f"The first key is `schema: {campaign.SCHEMA}`. {_SAME}\n",
+        f"```yaml\n{example.rstrip()}\n```\n",
+        "Its experiments are all combinations of the selected faults, scenarios, methods and contexts, of which a "
+        "`sample` takes some.\nThe same file and options make the same plan everywhere.\n",
+        *sections("campaign.md", campaign.CampaignModel),
+    )
+
+
+def manifests(workspace: Workspace) -> str:
+    """docs/reference/target-manifest.md."""
+    return _page(
+        generated("Target manifests"),
+        "All that the harness knows of a controller tree, at `fault_library/targets/<name>.yaml`. "
+        "[Another controller tree](../how-to/add-a-target.md)\nsays how to write one; what the manifests of this "
+        "library record is in [Channels](channels.md).\n",
+        f"The first key is `schema: {manifest.SCHEMA}`. {_SAME}\n",
+        *sections("target-manifest.md", manifest.ManifestModel),
+    )
+
+
+def hazard_analysis(workspace: Workspace) -> str:
+    """docs/reference/hazard-analysis.md."""
+    return _page(
+        generated("Files of the hazard analysis"),
+        "The files of `fault_library/stpa/`. [The hazard analysis](../explanation/hazard-analysis.md) says what "
+        "they mean together,\n[Change the hazard analysis](../how-to/change-the-hazard-analysis.md) how to write "
+        "them; `mutator stpa` prints and checks them.\n",
+        f"{_SAME} The first key of each is `schema`, with the file's kind: `{stpa.HAZARDS_SCHEMA}`, "
+        f"`{stpa.CONTEXT_SCHEMA}`,\n`control_structure/1`, `unsafe_control_actions/1`, `causal_factors/1`.\n",
+        *sections(
+            "hazard-analysis.md",
+            stpa.HazardsModel,
+            stpa.TableModel,
+            stpa_analysis.StructureModel,
+            stpa_analysis.UnsafeActionsModel,
+            stpa_analysis.FactorsModel,
+        ),
+    )
+
+
+def _units() -> Iterator[str]:
+    yield "| suffix | unit | quantity |"
+    yield "|---|---|---|"
+    for unit in units.UNITS.values():
+        yield f"| `_{unit.suffix}` | {unit.symbol} | {unit.dimension} |"
+    yield ""
+
+
+def _page(*parts: str) -> str:
+    return "\n".join(parts).rstrip() + "\n"

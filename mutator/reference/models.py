@@ -1,0 +1,73 @@
+"""The page of the fault models, written from their templates."""
+
+import difflib
+from collections.abc import Iterator
+
+from mutator import fault_models
+from mutator.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema
+from mutator.reference.tables import generated, sections
+from mutator.workspace import Workspace
+
+INTRODUCTION = """\
+What a fault does to a statement. A model is two files in `templates/`: `<name>.py.j2`, the template, and
+`<name>.yaml`, its parameters and examples ([add one](../how-to/add-a-fault-model.md)). A model that inserts
+puts lines before or after the anchored statement; one that guards wraps the statement itself.
+
+A parameter in *the variable's unit* may be given in any unit of the same dimension. `target` may be left out
+where the anchor names the variable. A *variable* is a name that the function of the anchor knows; an *import*
+is the dotted name of a module of the target and of something defined in it, which the injected lines import.
+
+In the examples, lines with `+` are what the model adds to a source. `_fi` is
+[the probe](../explanation/concepts.md#proof-before-counting): `active` asks whether the trigger holds.
+"""
+
+
+def fault_models_page(workspace: Workspace) -> str:
+    """docs/reference/fault-models.md."""
+    models = list(workspace.fault_models())
+    parts = [generated("Fault models"), INTRODUCTION]
+    parts += ["| model | what it does |", "|---|---|"]
+    parts += [f"| [{model.name}](#{model.name}) | {_sentence(model.about)} |" for model in models]
+    parts.append("")
+    for model in models:
+        parts += _model(model)
+    parts += [
+        "## The YAML of a model\n",
+        f"The first key is `schema: {fault_models.SCHEMA}`.\n",
+        *sections("fault-models.md", fault_models.FaultModelModel, below=2),
+    ]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _model(model: FaultModel) -> Iterator[str]:
+    yield f"## {model.name}\n"
+    does = "Inserts." if model.kind.value == "insert" else "Guards."
+    yield f"{' '.join(model.about.split())} {does}\n"
+    params = [param for param in model.params if param.type != "seed"]
+    if params:
+        yield "| parameter | type | unit | meaning |"
+        yield "|---|---|---|---|"
+        yield from map(_param, params)
+        yield ""
+    for example in model.examples:
+        yield f"For example, {example.about}:\n"
+        yield f"```diff\n{_change(example)}\n```\n"
+
+
+def _param(param: ParamSchema) -> str:
+    unit = {None: "-", TARGET_UNIT: "the variable's"}.get(param.unit, param.unit)
+    low = [] if param.min is None else [f"at least {param.min:g}"]
+    high = [] if param.max is None else [f"at most {param.max:g}"]
+    kind = param.type + (f" ({', '.join(low + high)})" if low or high else "")
+    about = param.about + (" (may be left out)" if param.optional else "")
+    return f"| `{param.name}` | {kind} | {unit} | {about} |"
+
+
+def _change(example: Example) -> str:
+    """Before and after as one: what the model does to the example's source."""
+    lines = difflib.ndiff(example.before.splitlines(), example.after.splitlines())
+    return "\n".join((line[0] + line[2:]).rstrip() for line in lines if not line.startswith("?"))
+
+
+def _sentence(text: str) -> str:
+    return " ".join(text.split()).partition(". ")[0].rstrip(".")

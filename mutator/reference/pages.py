@@ -1,0 +1,41 @@
+"""Which files of the documentation are generated, and from what."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from mutator.reference import cli, formats, models, recorded
+from mutator.reference.schemas import FORMATS, editor_schema
+from mutator.workspace import Workspace
+
+FOLDER = Path("docs") / "reference"
+SCHEMAS = FOLDER / "schemas"
+PAGES: dict[str, Callable[[Workspace], str]] = {
+    "campaign.md": formats.campaigns,
+    "channels.md": recorded.channels,
+    "cli.md": cli.command_line,
+    "fault-models.md": models.fault_models_page,
+    "fault-spec.md": formats.fault_spec,
+    "hazard-analysis.md": formats.hazard_analysis,
+    "results.md": recorded.results,
+    "target-manifest.md": formats.manifests,
+}
+
+
+def generated_files(workspace: Workspace) -> dict[Path, str]:
+    """Path, relative to the clone, and text of each."""
+    files = {FOLDER / name: make(workspace) for name, make in PAGES.items()}
+    known = workspace.fault_models()
+    for kind in FORMATS:
+        text = json.dumps(editor_schema(kind, known), indent=1, ensure_ascii=False)
+        files[SCHEMAS / f"{kind.name}.json"] = text + "\n"
+    return files
+
+
+def write(workspace: Workspace) -> Iterator[Path]:
+    """Write them into the clone of the library; gives the paths."""
+    clone = workspace.library.parent
+    for path, text in generated_files(workspace).items():
+        (clone / path).parent.mkdir(parents=True, exist_ok=True)
+        (clone / path).write_text(text, encoding="utf-8")
+        yield path

@@ -1,0 +1,94 @@
+"""Pages of what is recorded: the columns of results, and the channels of each target."""
+
+from collections.abc import Iterable, Iterator
+
+from mutator.columns import EXTRA, PLAN_COLUMNS, RESULTS, TIMINGS, Column
+from mutator.manifest import Channel, TargetManifest
+from mutator.reference.tables import generated
+from mutator.trigger import VARIABLES
+from mutator.workspace import Workspace
+
+_ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
+OBSERVED = {
+    "t": ("s", "time of simulation"),
+    "d_rel": ("m", "distance to the vehicle ahead"),
+    "v_ego": ("m/s", "the car's own speed"),
+    "v_lead": ("m/s", "speed of the vehicle ahead"),
+    "hwt": ("s", "headway time, `d_rel / v_ego`; infinite at standstill"),
+    "rs": ("m/s", "relative speed, `v_ego - v_lead`: positive when closing in"),
+}
+
+
+def results(workspace: Workspace) -> str:
+    """docs/reference/results.md."""
+    left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
+    return "\n".join(
+        [
+            generated("Result columns"),
+            "`results.csv` and `results.parquet` of a [run folder](run-folder.md) have one row for each experiment "
+            "that has a record,\nsorted by id. An empty cell means that there is nothing to tell. A *flag* is 0 or 1. "
+            "Times are seconds of simulation since\nits start. What the words mean is in "
+            "[concepts](../explanation/concepts.md#what-became-of-it).\n",
+            *_columns((*RESULTS, *EXTRA)),
+            "A target with more hazards than H1 to H3, or other actuator outputs, has for each hazard its name and "
+            "`t_` and its name,\nfor each output `max_dev_` and the first word of its name (the whole name where two "
+            "begin alike), before `variant`.\n",
+            f"`plan.csv` has what is known before a run: {left_out}.\n",
+            "## timings.parquet\n",
+            "What each experiment cost, in its newest run. It is kept apart because it differs from run to run.\n",
+            *_columns(TIMINGS),
+        ]
+    )
+
+
+def _columns(columns: Iterable[Column]) -> Iterator[str]:
+    yield "| column | type | Parquet | unit | meaning |"
+    yield "|---|---|---|---|---|"
+    for column in columns:
+        cells = (f"`{column.name}`", column.type, _ARROW[column.type], column.unit or "-", column.about)
+        yield f"| {' | '.join(cells)} |"
+    yield ""
+
+
+def channels(workspace: Workspace) -> str:
+    """docs/reference/channels.md."""
+    manifests = [workspace.manifest(name) for name in workspace.target_names()]
+    parts = [
+        generated("Channels and units"),
+        "What is observed, recorded and compared of each target of the library, as its "
+        "[manifest](target-manifest.md) says.\nInside everything is SI and radians; other units are for files and "
+        "tables alone, and stand in the names there\n([units](fault-spec.md#units)).\n",
+        "## What triggers can ask\n",
+        "Ground truth, the same for every target; `hwt` and `rs` are derived.\n",
+        "| variable | unit | meaning |",
+        "|---|---|---|",
+        *(f"| `{name}` | {OBSERVED[name][0]} | {OBSERVED[name][1]} |" for name in VARIABLES),
+        "",
+    ]
+    for manifest in manifests:
+        parts += _target(manifest)
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _target(manifest: TargetManifest) -> Iterator[str]:
+    yield f"## {manifest.name}\n"
+    yield (
+        f"A trace is an array for each channel in `{manifest.trace_file}`, with a value for each step of "
+        f"{manifest.step_s:g} s; `{manifest.time_channel}` is the time in s.\n"
+    )
+    yield "| channel | unit | role | meaning |"
+    yield "|---|---|---|---|"
+    yield from (_channel(channel, "compared with golden") for channel in manifest.compared)
+    yield from (_channel(channel, "plotted") for channel in manifest.plotted)
+    yield ""
+    yield f"Hazards: {', '.join(manifest.hazards)}. Alerts that count: {', '.join(manifest.alerts)}.\n"
+    yield "| change of the scenario | arguments it adds |"
+    yield "|---|---|"
+    yield from (f"| `{name}` | `{' '.join(words)}` |" for name, words in manifest.changes.items())
+    yield ""
+
+
+def _channel(channel: Channel, role: str) -> str:
+    if channel.tolerance:
+        role += f", to {channel.tolerance:g}"
+    return f"| `{channel.name}` | {channel.unit} | {role} | {channel.about or '-'} |"

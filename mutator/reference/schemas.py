@@ -1,0 +1,155 @@
+"""JSON Schemas of the YAML files, for editors, made from the models that check these files.
+
+A schema says what a file looks like. What it names (places, hazards, contexts) is checked by `mutator check`.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from mutator import campaign, fault_models, manifest, spec, stpa, stpa_analysis, units
+from mutator.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
+from mutator.injections import DIMENSIONLESS
+from mutator.reference.words import ABOUT
+from mutator.yamlio import StrictModel
+
+DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors know best
+_MODEL = re.compile(r"^_?(\w+?)Model$")
+_LINK = re.compile(r"\[([^]]+)\]\([^)]+\)")
+_DRAWN = {
+    "type": "object",
+    "required": ["draw", "written_in", "read_as"],
+    "properties": {
+        "draw": {"type": "string", "pattern": "^-?[a-z][a-z0-9_]*$"},
+        "written_in": {"enum": list(units.UNITS)},
+        "read_as": {"enum": list(units.UNITS)},
+    },
+    "additionalProperties": False,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """A kind of YAML file: its model, the value of its key `schema`, and what such files match in a clone."""
+
+    model: type[StrictModel]
+    schema: str
+    files: str
+
+    @property
+    def name(self) -> str:
+        """Name of its JSON Schema: `fault_spec` of `fault_spec/1`."""
+        return self.schema.partition("/")[0]
+
+
+FORMATS = tuple(
+    Format(model=model, schema=schema, files=files)
+    for model, schema, files in (
+        (spec.SpecModel, spec.SCHEMA, "fault_library/faults/*/*.yaml"),
+        (campaign.CampaignModel, campaign.SCHEMA, "fault_library/campaigns/*.yaml"),
+        (manifest.ManifestModel, manifest.SCHEMA, "fault_library/targets/*.yaml"),
+        (fault_models.FaultModelModel, fault_models.SCHEMA, "templates/*.yaml"),
+        (stpa.HazardsModel, stpa.HAZARDS_SCHEMA, "fault_library/stpa/hazards.yaml"),
+        (stpa.TableModel, stpa.CONTEXT_SCHEMA, "fault_library/stpa/contexts/*.yaml"),
+        *(
+            (model, f"{name}/1", f"fault_library/stpa/{name}.yaml")
+            for name, model in (
+                ("control_structure", stpa_analysis.StructureModel),
+                ("unsafe_control_actions", stpa_analysis.UnsafeActionsModel),
+                ("causal_factors", stpa_analysis.FactorsModel),
+            )
+        ),
+    )
+)
+
+
+def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
+    """Every model that a file of `model` is made of, by its short name (`Variant`), the file's own first.
+
+    Each is a JSON Schema whose properties have descriptions. KeyError for a key that `ABOUT` does not tell of.
+    """
+    whole = model.model_json_schema(by_alias=True)
+    parts = {model.__name__: whole} | whole.pop("$defs", {})
+    return {short_name(name): _told(short_name(name), part) for name, part in parts.items()}
+
+
+def short_name(name: str) -> str:
+    """`Variant` of `_VariantModel`; the name of an enumeration is left as it is."""
+    match = _MODEL.match(name)
+    return match[1] if match else name
+
+
+def _told(name: str, part: dict[str, Any]) -> dict[str, Any]:
+    part = _clean(part)
+    for key, value in part.get("properties", {}).items():
+        value["description"] = ABOUT[f"{name}.{key}"]
+    return part
+
+
+def _clean(value: Any) -> Any:
+    """Without pydantic's titles and Python's docstrings, references by short names."""
+    if isinstance(value, list):
+        return [_clean(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    kept = {key: _clean(inner) for key, inner in value.items() if key not in ("title", "description", "properties")}
+    if "properties" in value:  # its keys are names, not words of JSON Schema
+        kept["properties"] = {key: _clean(inner) for key, inner in value["properties"].items()}
+    if "$ref" in kept:
+        kept["$ref"] = f"#/definitions/{short_name(kept['$ref'].rpartition('/')[2])}"
+    return kept
+
+
+def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
+    """The JSON Schema of one kind of file; injections know the parameters of `models`."""
+    parts = definitions(kind.model)
+    if "Injection" in parts:
+        _with_models(parts["Injection"], models)
+    for part in parts.values():
+        for value in part.get("properties", {}).values():
+            value["description"] = _LINK.sub(r"\1", value["description"])
+    whole = parts.pop(short_name(kind.model.__name__))
+    key = {"const": kind.schema, "description": "The format of this file and its version."}
+    whole["properties"] = {"schema": key} | whole["properties"]
+    whole["required"] = ["schema", *whole["required"]]
+    head = {"$schema": DRAFT, "title": kind.schema}
+    return head | whole | ({"definitions": parts} if parts else {})
+
+
+def _with_models(injection: dict[str, Any], models: FaultModels) -> None:
+    """Offer the fault models; for each, its parameters. An unknown model is left to `mutator check`."""
+    properties = injection["properties"]
+    properties["model"]["anyOf"] = [{"enum": [model.name for model in models]}, {"type": "string"}]
+    properties["unit"]["anyOf"] = [{"enum": [*units.UNITS, DIMENSIONLESS]}, {"type": "null"}]
+    injection["allOf"] = [_parameters(model) for model in models]
+
+
+def _parameters(model: FaultModel) -> dict[str, Any]:
+    known = {"required": ["model"], "properties": {"model": {"const": model.name}}}
+    patterns = {
+        f"^({'|'.join(keys(param))})$": _value(param) | {"description": param.about}
+        for param in model.params
+        if param.type != "seed"
+    }
+    params = {"patternProperties": patterns, "additionalProperties": False}
+    return {"if": known, "then": {"properties": {"params": params}}}
+
+
+def keys(param: ParamSchema) -> Iterator[str]:
+    """How a spec may write a parameter: with the suffixes of all units that may fit."""
+    if param.unit in (None, TARGET_UNIT):
+        yield param.name
+    if param.unit is not None:
+        own = units.UNITS.get(param.unit)
+        for unit in units.UNITS.values():
+            if own is None or unit.dimension == own.dimension:
+                yield f"{param.name}_{unit.suffix}"
+
+
+def _value(param: ParamSchema) -> dict[str, Any]:
+    if param.type in NAMES:
+        return {"type": "string"}
+    if param.type == "boolean":
+        return {"type": "boolean"}
+    return {"anyOf": [{"type": "number"}, {"type": "string"}, _DRAWN]}
