@@ -28,7 +28,7 @@ def results(workspace: Workspace) -> str:
             "`results.csv` and `results.parquet` of a [run folder](run-folder.md) have one row for each experiment "
             "that has a record,\nsorted by id. An empty cell means that there is nothing to tell. A *flag* is 0 or 1. "
             "Times are seconds of simulation since\nits start. What the words mean is in "
-            "[concepts](../explanation/concepts.md#what-became-of-it).\n",
+            "[Verdicts](../explanation/verdicts.md).\n",
             *_columns((*RESULTS, *EXTRA)),
             "A target with more hazards than H1 to H3, or other actuator outputs, has for each hazard its name and "
             "`t_` and its name,\nfor each output `max_dev_` and the first word of its name (the whole name where two "

@@ -1,9 +1,12 @@
 """What README and docs print is what the commands print; what they link exists.
 
+A page is worked through as a reader would: its commands are given in its order, a block that follows a line
+with the name of a file (`` `late.yaml`: ``) is written to that file, one with a difference is applied.
 After a change that alters the output, `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py` writes it into
 the pages; read the difference before it is kept.
 """
 
+import json
 import os
 import re
 import shutil
@@ -13,17 +16,27 @@ from pathlib import Path
 
 import pytest
 
+from mutator.reference.pages import SCHEMAS
+from mutator.reference.schemas import FORMATS
+
 CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
 BENCHMARKS = CLONE / "benchmarks" / "README.md"
 PAGES = [README, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
-COMPARISON = CLONE / "docs" / "how-to" / "compare-with-openpilot.md"
+HOW_TO = CLONE / "docs" / "how-to"
+COMPARISON = HOW_TO / "compare-with-openpilot.md"
+WORKED_THROUGH = [README, TUTORIAL, TUTORIAL.with_name("first-fault.md"), COMPARISON, *sorted(HOW_TO.glob("add-a-*.md"))]
+INDEX = CLONE / "docs" / "README.md"
 
 CAMPAIGN = "mutator run quickstart "  # whose table is in both pages
 TABLE = re.compile(r"^```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-LINK = re.compile(r"\]\(([^)#:]+)(?:#([^)]+))?\)")
+FENCE = re.compile(r"(?:^([^\n]*)\n\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
+# Also `[text]: page.md`, and images; not what is on the web.
+LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 # What differs from machine to machine: how long it took.
 TIME = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b")
 
@@ -34,13 +47,29 @@ def name(page: Path) -> str:
 
 def sessions(page: Path) -> list[tuple[str, list[str]]]:
     """The commands of a page with the lines they are said to print."""
+    return [step for step in steps(page) if isinstance(step[1], list)]  # type: ignore[misc]
+
+
+def steps(page: Path) -> list[tuple[str, list[str] | str]]:
+    """What a reader does, in order: (command, lines it prints), (file, its text) or ("", a difference)."""
+    found: list[tuple[str, list[str] | str]] = []
+    for before, kind, text in FENCE.findall(page.read_text(encoding="utf-8")):
+        if kind == "console":
+            found += _commands(text)
+        elif kind == "diff" and FILE.search(before):
+            found.append(("", text))
+        elif kind and (file := FILE.search(before)):
+            found.append((file[1], text))
+    return found
+
+
+def _commands(block: str) -> list[tuple[str, list[str]]]:
     found: list[tuple[str, list[str]]] = []
-    for block in BLOCK.findall(page.read_text(encoding="utf-8")):
-        for line in block.splitlines():
-            if line.startswith("$ "):
-                found.append((line[2:], []))
-            else:
-                found[-1][1].append(line)
+    for line in block.splitlines():
+        if line.startswith("$ "):
+            found.append((line[2:], []))
+        else:
+            found[-1][1].append(line)
     return found
 
 
@@ -49,7 +78,23 @@ def work(tmp_path: Path) -> Path:
     """A folder with what the commands of the docs need of a clone."""
     for folder in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    toy = Path("tests") / "toy"
+    shutil.copytree(CLONE / toy, tmp_path / toy, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path
+
+
+def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
+    """Do in `folder` what the page says; gives the commands with what they printed."""
+    printed = []
+    for what, text in steps(page):
+        if isinstance(text, list):
+            printed.append((what, run(what, folder)))
+        elif what:
+            (folder / what).parent.mkdir(parents=True, exist_ok=True)
+            (folder / what).write_text(text, encoding="utf-8")
+        else:
+            subprocess.run(["patch", "-p1", "--no-backup-if-mismatch"], cwd=folder, input=text, text=True, check=True)
+    return printed
 
 
 def run(command: str, folder: Path) -> str:
@@ -87,12 +132,12 @@ def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [README, TUTORIAL, COMPARISON], ids=name)
+@pytest.mark.parametrize("page", WORKED_THROUGH, ids=name)
 def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Path) -> None:
     """The console sessions of a page, run in its order, give exactly the output that is printed there."""
     found = sessions(page)
-    assert len(found) >= (2 if page == COMPARISON else 5)
-    printed = [(command, run(command, work)) for command, _ in found]
+    assert len(found) >= 2
+    printed = work_through(page, work)
     if os.environ.get("UPDATE_DOCS"):
         rewrite(page, printed)
         pytest.skip("the page was written anew")
@@ -109,15 +154,44 @@ def test_the_readme_shows_the_table_of_the_tutorial() -> None:
     assert table.splitlines()[:-1] == shown[:-1]  # the last line is the report's path
 
 
+def anchors(page: Path) -> set[str]:
+    """Names of a page's headings, as the web sites that show Markdown make them; fences are no headings."""
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def links(page: Path) -> list[tuple[Path, str]]:
+    """Files that a page links, with anchors; its own anchors, too."""
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    return [((page.parent / target).resolve() if target else page, anchor) for target, anchor in LINK.findall(text)]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page: Path) -> None:
     """Each relative link is a file of the clone, each anchor a heading in it."""
-    for target, anchor in LINK.findall(page.read_text(encoding="utf-8")):
-        file = page.parent / target
-        assert file.exists(), f"{name(page)}: {target}"
-        if anchor:
-            headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
-            assert anchor in [heading.lower().replace(" ", "-") for heading in headings]
+    for file, anchor in links(page):
+        assert file.exists(), f"{name(page)}: {file}"
+        assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
+
+
+def test_every_page_can_be_reached() -> None:
+    """The index of the documentation names every page, but for what belongs to one that it names."""
+    listed = {file for file, _ in links(INDEX)}
+    pages = {page for page in PAGES if INDEX.parent in page.parents and page != INDEX}
+    assert pages - listed == set()
+    shown = {file for page in PAGES for file, _ in links(page)}
+    rest = {file for file in INDEX.parent.rglob("*.*") if file not in PAGES and file.parent != CLONE / SCHEMAS}
+    assert rest - shown == set(), "no page shows or links these"
+
+
+def test_editors_are_told_of_every_schema() -> None:
+    """The settings that the guide prints map each schema to the files that it is made for."""
+    page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
+    [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
+    expected = {f"./{SCHEMAS.as_posix()}/{kind.name}.json": kind.files for kind in FORMATS}
+    expected[f"./{SCHEMAS.as_posix()}/scenario.json"] = "fault_library/scenarios/*.yaml"
+    assert settings["yaml.schemas"] == expected
 
 
 def test_every_benchmark_is_told_of() -> None:
