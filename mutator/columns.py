@@ -22,7 +22,12 @@ class Column:
 
 
 RESULTS = (
-    Column("experiment_id", "text", "", "the experiment; a content hash: the same input has the same id everywhere"),
+    Column(
+        "experiment_id",
+        "text",
+        "",
+        "the experiment; a content hash: the same input has the same id everywhere",
+    ),
     Column("fault_id", "text", "", "its fault, a content hash as well"),
     Column("module", "text", "", "the module of the fault spec"),
     Column("fault_type", "text", "", "the fault type of the spec"),
@@ -48,7 +53,9 @@ RESULTS = (
     Column("t_h3", "number", "s", "when first"),
     Column("alerts", "text", "", "names of the alerts in the order of their times, joined by `;`"),
     Column("t_alert", "number", "s", "time of the first alert"),
-    Column("reaction_time", "number", "s", "first hazard minus first alert; empty unless the alert came first"),
+    Column(
+        "reaction_time", "number", "s", "first hazard minus first alert; empty unless the alert came first"
+    ),
     Column("max_dev_gas", "number", "the channel's", "largest difference of gas from golden"),
     Column("max_dev_brake", "number", "the channel's", "largest difference of the brake from golden"),
     Column("max_dev_steer", "number", "the channel's", "largest difference of steering from golden"),
@@ -72,7 +79,7 @@ _TYPES = {column.name: column.type for column in (*RESULTS, *EXTRA)}
 
 
 def type_of(name: str) -> ColumnType:
-    """Type of a column of the results; one that it does not know is a time or a difference of a target's own."""
+    """Type of a column of the results; any other name is a time or a difference of a target's own."""
     return _TYPES.get(name, "number")
 
 

@@ -95,18 +95,20 @@ class Expansion:
                 if fnmatchcase(numbered[1].spec, selection.spec):
                     variants.setdefault(numbered[1].spec, []).append(numbered)
             if not variants:
-                raise self._unmatched(("faults", i, "spec"), selection.spec)
+                raise self._unmatched(("faults", i, "spec"), selection.spec, [fault.spec for _, fault in library])
             for faults in variants.values():
                 wanted = spread(len(faults), selection.values or len(faults))
                 selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
         return list(selected.values())
 
-    def _unmatched(self, keys: Keys, pattern: str) -> MutatorError:
+    def _unmatched(self, keys: Keys, pattern: str, known: list[str]) -> MutatorError:
+        whole = f"{pattern}/*"
+        fits = any(fnmatchcase(name, whole) for name in known)
         return self.campaign.error(
             keys,
             f"no fault in the library is named like '{pattern}'",
             expected="<module>/<fault_type>/<variant>, with * for any text",
-            remedy="see `mutator list`",
+            remedy=f"write '{whole}' for all its variants" if fits else "see `mutator list`",
         )
 
     def _triggers(self) -> tuple[Trigger, ...]:

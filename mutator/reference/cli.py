@@ -27,8 +27,8 @@ def command_line(workspace: Workspace) -> str:
         "| code | meaning |",
         "|---|---|",
         *(f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items()),
-        "\nAn error is one line on standard error: `file:line: what was found; what was expected; what to do`. With "
-        "`--json`\nstandard output is one JSON document. Progress goes to standard error.\n",
+        "\nAn error, on standard error, says file and line, what was found, what was expected, and what "
+        "to do. With `--json`\nstandard output is one JSON document. Progress goes to standard error.\n",
         "## Where things are\n",
         _PLACES,
         *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),
@@ -42,7 +42,9 @@ def command_line(workspace: Workspace) -> str:
 def _verb(group: Any, name: str) -> Iterator[str]:
     command = group.commands[name]
     yield f"## {name}\n"
-    with command.make_context(name, [], parent=group.make_context("mutator", [name]), resilient_parsing=True) as ctx:
+    with command.make_context(
+        name, [], parent=group.make_context("mutator", [name]), resilient_parsing=True
+    ) as ctx:
         usage = " ".join(command.get_usage(ctx).removeprefix("Usage: ").split())
     yield f"```text\n{usage}\n```\n"
     yield f"{_paragraphs(command.help)}\n"
@@ -82,7 +84,10 @@ def _plugin() -> Iterator[str]:
     parser = pytest.Parser(_ispytest=True)
     pytest_plugin.pytest_addoption(parser)
     yield "## pytest\n"
-    yield "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign as `mutator run` does, without its table.\n"
+    yield (
+        "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign as `mutator run` does, "
+        "without its table.\n"
+    )
     yield "| option | meaning |"
     yield "|---|---|"
     for option in parser.getgroup("mutator").options:

@@ -23,8 +23,10 @@ def fault_spec(workspace: Workspace) -> str:
     example = (workspace.library / "faults" / "radar" / "chaff.yaml").read_text(encoding="utf-8")
     return _page(
         generated("Fault specs"),
-        "A fault spec is one YAML file: a fault type of a module, in one or more variants. The library keeps it "
-        "at\n`fault_library/faults/<module>/<fault_type>.yaml`; `mutator try FILE --scenario S1` takes one from "
+        "A fault spec is one YAML file: a fault type of a module, in one or more variants. The "
+        "library keeps it "
+        "at\n`fault_library/faults/<module>/<fault_type>.yaml`; `mutator try FILE --scenario S1` "
+        "takes one from "
         "anywhere.\n",
         STRICT,
         f"The first key is `schema: {spec.SCHEMA}`. A file of a newer schema is refused.\n"
@@ -34,7 +36,8 @@ def fault_spec(workspace: Workspace) -> str:
         "## Units\n",
         *_units(),
         "## Fault models\n",
-        "Offset, scale, stuck and so on, with their parameters and examples: [Fault models](fault-models.md).\n",
+        "Offset, scale, stuck and so on, with their parameters and examples: [Fault "
+        "models](fault-models.md).\n",
     )
 
 
@@ -48,7 +51,8 @@ def campaigns(workspace: Workspace) -> str:
         "anywhere.\n",
         f"The first key is `schema: {campaign.SCHEMA}`. {_SAME}\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        "Its experiments are all combinations of the selected faults, scenarios, methods and contexts, of which a "
+        "Its experiments are all combinations of the selected faults, scenarios, methods and "
+        "contexts, of which a "
         "`sample` takes some.\nThe same file and options make the same plan everywhere.\n",
         *sections("campaign.md", campaign.CampaignModel),
     )
@@ -59,7 +63,8 @@ def manifests(workspace: Workspace) -> str:
     return _page(
         generated("Target manifests"),
         "All that the harness knows of a controller tree, at `fault_library/targets/<name>.yaml`. "
-        "[Another controller tree](../how-to/add-a-target.md)\nsays how to write one; what the manifests of this "
+        "[Another controller tree](../how-to/add-a-target.md)\nsays how to write one; what the "
+        "manifests of this "
         "library record is in [Channels](channels.md).\n",
         f"The first key is `schema: {manifest.SCHEMA}`. {_SAME}\n",
         *sections("target-manifest.md", manifest.ManifestModel),
@@ -70,8 +75,10 @@ def hazard_analysis(workspace: Workspace) -> str:
     """docs/reference/hazard-analysis.md."""
     return _page(
         generated("Files of the hazard analysis"),
-        "The files of `fault_library/stpa/`. [The hazard analysis](../explanation/hazard-analysis.md) says what "
-        "they mean together,\n[Change the hazard analysis](../how-to/change-the-hazard-analysis.md) how to write "
+        "The files of `fault_library/stpa/`. [The hazard "
+        "analysis](../explanation/hazard-analysis.md) says what "
+        "they mean together,\n[Change the hazard analysis](../how-to/change-the-hazard-analysis.md) "
+        "how to write "
         "them; `mutator stpa` prints and checks them.\n",
         f"{_SAME} The first key of each is `schema`, with the file's kind: `{stpa.HAZARDS_SCHEMA}`, "
         f"`{stpa.CONTEXT_SCHEMA}`,\n`control_structure/1`, `unsafe_control_actions/1`, `causal_factors/1`.\n",

@@ -25,17 +25,22 @@ def results(workspace: Workspace) -> str:
     return "\n".join(
         [
             generated("Result columns"),
-            "`results.csv` and `results.parquet` of a [run folder](run-folder.md) have one row for each experiment "
-            "that has a record,\nsorted by id. An empty cell means that there is nothing to tell. A *flag* is 0 or 1. "
+            "`results.csv` and `results.parquet` of a [run folder](run-folder.md) have one row for "
+            "each experiment "
+            "that has a record,\nsorted by id. An empty cell means that there is nothing to tell. A "
+            "*flag* is 0 or 1. "
             "Times are seconds of simulation since\nits start. What the words mean is in "
             "[Verdicts](../explanation/verdicts.md).\n",
             *_columns((*RESULTS, *EXTRA)),
-            "A target with more hazards than H1 to H3, or other actuator outputs, has for each hazard its name and "
-            "`t_` and its name,\nfor each output `max_dev_` and the first word of its name (the whole name where two "
+            "A target with more hazards than H1 to H3, or other actuator outputs, has for each "
+            "hazard its name and "
+            "`t_` and its name,\nfor each output `max_dev_` and the first word of its name (the "
+            "whole name where two "
             "begin alike), before `variant`.\n",
             f"`plan.csv` has what is known before a run: {left_out}.\n",
             "## timings.parquet\n",
-            "What each experiment cost, in its newest run. It is kept apart because it differs from run to run.\n",
+            "What each experiment cost, in its newest run. It is kept apart because it differs from "
+            "run to run.\n",
             *_columns(TIMINGS),
         ]
     )
@@ -56,7 +61,8 @@ def channels(workspace: Workspace) -> str:
     parts = [
         generated("Channels and units"),
         "What is observed, recorded and compared of each target of the library, as its "
-        "[manifest](target-manifest.md) says.\nInside everything is SI and radians; other units are for files and "
+        "[manifest](target-manifest.md) says.\nInside everything is SI and radians; other units are "
+        "for files and "
         "tables alone, and stand in the names there\n([units](fault-spec.md#units)).\n",
         "## What triggers can ask\n",
         "Ground truth, the same for every target; `hwt` and `rs` are derived.\n",

@@ -43,31 +43,26 @@ class Format:
         return self.schema.partition("/")[0]
 
 
-FORMATS = tuple(
-    Format(model=model, schema=schema, files=files)
-    for model, schema, files in (
-        (spec.SpecModel, spec.SCHEMA, "fault_library/faults/*/*.yaml"),
-        (campaign.CampaignModel, campaign.SCHEMA, "fault_library/campaigns/*.yaml"),
-        (manifest.ManifestModel, manifest.SCHEMA, "fault_library/targets/*.yaml"),
-        (fault_models.FaultModelModel, fault_models.SCHEMA, "templates/*.yaml"),
-        (stpa.HazardsModel, stpa.HAZARDS_SCHEMA, "fault_library/stpa/hazards.yaml"),
-        (stpa.TableModel, stpa.CONTEXT_SCHEMA, "fault_library/stpa/contexts/*.yaml"),
-        *(
-            (model, f"{name}/1", f"fault_library/stpa/{name}.yaml")
-            for name, model in (
-                ("control_structure", stpa_analysis.StructureModel),
-                ("unsafe_control_actions", stpa_analysis.UnsafeActionsModel),
-                ("causal_factors", stpa_analysis.FactorsModel),
-            )
-        ),
-    )
+_FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
+    (spec.SpecModel, spec.SCHEMA, "faults/*/*.yaml"),
+    (campaign.CampaignModel, campaign.SCHEMA, "campaigns/*.yaml"),
+    (manifest.ManifestModel, manifest.SCHEMA, "targets/*.yaml"),
+    (stpa.HazardsModel, stpa.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
+    (stpa.TableModel, stpa.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
+    (stpa_analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
+    (stpa_analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
+    (stpa_analysis.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
+)
+FORMATS = (
+    *(Format(model=model, schema=schema, files=f"fault_library/{files}") for model, schema, files in _FILES),
+    Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
 )
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
     """Every model that a file of `model` is made of, by its short name (`Variant`), the file's own first.
 
-    Each is a JSON Schema whose properties have descriptions. KeyError for a key that `ABOUT` does not tell of.
+    Each is a JSON Schema whose properties have descriptions. KeyError for a key that `ABOUT` does not know.
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})
@@ -93,7 +88,11 @@ def _clean(value: Any) -> Any:
         return [_clean(item) for item in value]
     if not isinstance(value, dict):
         return value
-    kept = {key: _clean(inner) for key, inner in value.items() if key not in ("title", "description", "properties")}
+    kept = {
+        key: _clean(inner)
+        for key, inner in value.items()
+        if key not in ("title", "description", "properties")
+    }
     if "properties" in value:  # its keys are names, not words of JSON Schema
         kept["properties"] = {key: _clean(inner) for key, inner in value["properties"].items()}
     if "$ref" in kept:

@@ -137,7 +137,8 @@ ABOUT = {
     "Campaign.scenarios": "Names of scenarios, each once.",
     "Campaign.setting": "Changes of the manifest that every run is made with, fault-free ones included.",
     "Campaign.faults": "Which faults; each selection adds some.",
-    "Campaign.reading": "Which of the two [readings](../explanation/concepts.md#readings); `--reading` overrides it.",
+    "Campaign.reading": "Which of the two [readings](../explanation/concepts.md#readings); "
+    "`--reading` overrides it.",
     "Campaign.methods": "`guided`, `random` or both.",
     "Campaign.triggers": "When faults become active.",
     "Campaign.sample": "How many experiments are taken, each variant as often as another; without it, all.",
@@ -153,7 +154,8 @@ ABOUT = {
     "Triggers.rows": "Which of its contexts; without it, all.",
     "Triggers.armed_after_s": "Before that time no trigger fires and no random time is drawn.",
     "Triggers.random_until_s": "The latest random time.",
-    "Triggers.hold_s": "How long a fault stays active once triggered; without it, while its context holds, or "
+    "Triggers.hold_s": "How long a fault stays active once triggered; without it, while its context "
+    "holds, or "
     "from its random time to the end.",
     "Arming.as_described": "With the reading of the text.",
     "Arming.as_coded": "With the reading of the code.",
@@ -214,7 +216,8 @@ ABOUT = {
     "Table.about": "What it is about.",
     "Table.constants": "Name -> number, for use in the conditions.",
     "Table.contexts": "Id -> context.",
-    "Row.when": "A condition over `t` (s), `d_rel` (m), `v_ego`, `v_lead` (m/s), `hwt` (s), `rs` (m/s) and the "
+    "Row.when": "A condition over `t` (s), `d_rel` (m), `v_ego`, `v_lead` (m/s), `hwt` (s), `rs` "
+    "(m/s) and the "
     "constants.",
     "Row.about": "What it is, in words.",
     "Row.actions": "Control action -> verdict; every row judges the same actions.",

@@ -26,7 +26,13 @@ PAGES = [README, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 HOW_TO = CLONE / "docs" / "how-to"
 COMPARISON = HOW_TO / "compare-with-openpilot.md"
-WORKED_THROUGH = [README, TUTORIAL, TUTORIAL.with_name("first-fault.md"), COMPARISON, *sorted(HOW_TO.glob("add-a-*.md"))]
+WORKED_THROUGH = [
+    README,
+    TUTORIAL,
+    TUTORIAL.with_name("first-fault.md"),
+    COMPARISON,
+    *sorted(HOW_TO.glob("add-a-*.md")),
+]
 INDEX = CLONE / "docs" / "README.md"
 
 CAMPAIGN = "mutator run quickstart "  # whose table is in both pages
@@ -93,7 +99,9 @@ def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
             (folder / what).parent.mkdir(parents=True, exist_ok=True)
             (folder / what).write_text(text, encoding="utf-8")
         else:
-            subprocess.run(["patch", "-p1", "--no-backup-if-mismatch"], cwd=folder, input=text, text=True, check=True)
+            subprocess.run(
+                ["patch", "-p1", "--no-backup-if-mismatch"], cwd=folder, input=text, text=True, check=True
+            )
     return printed
 
 
@@ -164,7 +172,10 @@ def anchors(page: Path) -> set[str]:
 def links(page: Path) -> list[tuple[Path, str]]:
     """Files that a page links, with anchors; its own anchors, too."""
     text = CODE.sub("", page.read_text(encoding="utf-8"))
-    return [((page.parent / target).resolve() if target else page, anchor) for target, anchor in LINK.findall(text)]
+    return [
+        ((page.parent / target).resolve() if target else page, anchor)
+        for target, anchor in LINK.findall(text)
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
@@ -181,7 +192,9 @@ def test_every_page_can_be_reached() -> None:
     pages = {page for page in PAGES if INDEX.parent in page.parents and page != INDEX}
     assert pages - listed == set()
     shown = {file for page in PAGES for file, _ in links(page)}
-    rest = {file for file in INDEX.parent.rglob("*.*") if file not in PAGES and file.parent != CLONE / SCHEMAS}
+    rest = {
+        file for file in INDEX.parent.rglob("*.*") if file not in PAGES and file.parent != CLONE / SCHEMAS
+    }
     assert rest - shown == set(), "no page shows or links these"
 
 

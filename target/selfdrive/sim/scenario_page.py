@@ -1,7 +1,7 @@
 """Writes the reference of scenario files: a page, and a JSON Schema for editors.
 
-`python -m selfdrive.sim.scenario_page [--out docs/reference]` writes scenario.md and schemas/scenario.json from
-the keys and bounds that the parser has.
+`python -m selfdrive.sim.scenario_page [--out docs/reference]` writes scenario.md and schemas/scenario.json
+from the keys and bounds that the parser has.
 """
 
 import argparse
@@ -17,13 +17,13 @@ TEXT = f"""\
 
 <!-- Written by `python -m selfdrive.sim.scenario_page`; do not edit by hand. -->
 
-What host, lead, driver and road do, in a file of `fault_library/scenarios/`. Scenarios belong to the target, which
-alone reads them; this is what the target that ships with the harness understands.
+What host, lead, driver and road do, in a file of `fault_library/scenarios/`. Scenarios belong to the target,
+which alone reads them; this is what the target that ships with the harness understands.
 [Add a scenario](../how-to/add-a-scenario.md) has an example, and
 [an editor can check the files](../how-to/edit-with-completion.md).
 
-Numbers carry their unit in their key. Times are multiples of {DT_CTRL:g} s. The order of keys does not matter, and an
-unknown key is an error with file and line.
+Numbers carry their unit in their key, and times are multiples of {DT_CTRL:g} s. An unknown key is an error with
+file and line.
 """
 
 
@@ -77,7 +77,11 @@ SECTIONS: dict[str, tuple[dict[str, str], dict[str, dict[str, Any]], tuple[str, 
         {"grade": {"$ref": "#/definitions/grade"}, "curvature": {"$ref": "#/definitions/curvature"}},
         (),
     ),
-    "grade": (s.GRADE_KEYS, {"at_s": _numbers(0.0, s.LONGEST), "mps2": _numbers(-5.0, 5.0)}, ("at_s", "mps2")),
+    "grade": (
+        s.GRADE_KEYS,
+        {"at_s": _numbers(0.0, s.LONGEST), "mps2": _numbers(-5.0, 5.0)},
+        ("at_s", "mps2"),
+    ),
     "curvature": (
         s.CURVATURE_KEYS,
         {"at_m": _numbers(0.0, s.FARTHEST), "per_m": _numbers(-0.05, 0.05)},
@@ -91,13 +95,23 @@ def schema() -> dict[str, Any]:
     """The JSON Schema of a scenario file."""
     parts = {name: _object(name) for name in SECTIONS}
     whole = parts.pop("scenario")
-    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": s.SCHEMA, **whole, "definitions": parts}
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": s.SCHEMA,
+        **whole,
+        "definitions": parts,
+    }
 
 
 def _object(name: str) -> dict[str, Any]:
     meanings, types, needed = SECTIONS[name]
     properties = {key: {**types[key], "description": meaning} for key, meaning in meanings.items()}
-    part = {"type": "object", "properties": properties, "required": list(needed), "additionalProperties": False}
+    part = {
+        "type": "object",
+        "properties": properties,
+        "required": list(needed),
+        "additionalProperties": False,
+    }
     if name in ONE_SPEED:
         part["oneOf"] = [{"required": [key]} for key in _SPEED]
     return part

@@ -144,6 +144,7 @@ def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> 
     ("old", "new", "line", "told"),
     [
         ("spec: sensor/*", "spec: sensr/*", 7, "no fault in the library is named like 'sensr/*'"),
+        ("spec: sensor/*", "spec: sensor/lane", 7, "write 'sensor/lane/*' for all its variants"),
         ("[A, B]", "[A, Z]", 5, "no scenario 'Z'"),
         ("table: near_far", "table: nowhere", 10, "no context table 'nowhere'"),
         ("table: near_far", "table: near_far\n  rows: [near, afar]", 11, "afar"),

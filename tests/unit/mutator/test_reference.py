@@ -28,7 +28,9 @@ def told(kind: Format) -> dict[str, dict[str, Any]]:
     return {name: part for name, part in definitions(kind.model).items() if "properties" in part}
 
 
-@pytest.mark.parametrize("path", [*(FOLDER / page for page in PAGES), *(SCHEMAS / f"{f.name}.json" for f in FORMATS)])
+@pytest.mark.parametrize(
+    "path", [*(FOLDER / page for page in PAGES), *(SCHEMAS / f"{f.name}.json" for f in FORMATS)]
+)
 def test_what_is_generated_is_up_to_date(path: Path) -> None:
     """A committed page or schema is what its source would give now."""
     generated = _generated()[path]
@@ -46,7 +48,11 @@ def _generated() -> dict[Path, str]:
 
 def test_nothing_else_says_that_it_is_generated() -> None:
     """A page or schema whose source is gone is gone, too. (Scenarios are the target's: it has its own.)"""
-    pages = [path for path in (CLONE / "docs").rglob("*.md") if "python -m mutator.reference`; do" in path.read_text()]
+    pages = [
+        path
+        for path in (CLONE / "docs").rglob("*.md")
+        if "python -m mutator.reference`; do" in path.read_text()
+    ]
     found = {path.relative_to(CLONE) for path in (*pages, *(CLONE / SCHEMAS).glob("*"))}
     assert found - {SCHEMAS / "scenario.json"} == {*_generated()}
 
