@@ -1,6 +1,6 @@
 """From a campaign to its experiments: faults selected and expanded, triggers made, random times drawn."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 
@@ -95,15 +95,15 @@ class Expansion:
                 if fnmatchcase(numbered[1].spec, selection.spec):
                     variants.setdefault(numbered[1].spec, []).append(numbered)
             if not variants:
-                raise self._unmatched(("faults", i, "spec"), selection.spec, [fault.spec for _, fault in library])
+                raise self._unmatched(("faults", i, "spec"), selection.spec, library)
             for faults in variants.values():
                 wanted = spread(len(faults), selection.values or len(faults))
                 selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
         return list(selected.values())
 
-    def _unmatched(self, keys: Keys, pattern: str, known: list[str]) -> MutatorError:
+    def _unmatched(self, keys: Keys, pattern: str, library: Sequence[_Numbered] = ()) -> MutatorError:
         whole = f"{pattern}/*"
-        fits = any(fnmatchcase(name, whole) for name in known)
+        fits = any(fnmatchcase(fault.spec, whole) for _, fault in library)
         return self.campaign.error(
             keys,
             f"no fault in the library is named like '{pattern}'",

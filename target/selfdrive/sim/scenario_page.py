@@ -22,8 +22,8 @@ which alone reads them; this is what the target that ships with the harness unde
 [Add a scenario](../how-to/add-a-scenario.md) has an example, and
 [an editor can check the files](../how-to/edit-with-completion.md).
 
-Numbers carry their unit in their key, and times are multiples of {DT_CTRL:g} s. An unknown key is an error with
-file and line.
+Numbers carry their unit in their key, and times are multiples of {DT_CTRL:g} s. An unknown key is an error
+with file and line.
 """
 
 
