@@ -9,10 +9,13 @@ the pages; read the difference before it is kept.
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,6 +38,7 @@ WORKED_THROUGH = [
 ]
 INDEX = CLONE / "docs" / "README.md"
 
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 CAMPAIGN = "mutator run quickstart "  # whose table is in both pages
 TABLE = re.compile(r"^```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -153,6 +157,23 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
         assert [TIME.sub("TIME", line) for line in lines_of(output)] == [
             TIME.sub("TIME", line) for line in said
         ], command
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        command
+        for page in (README, TUTORIAL)
+        for command, _ in sessions(page)
+        if re.match(r"mutator (list|diff) [^|]*$", command)
+    ],
+)
+def test_what_costs_little_is_always_tried(cli: Cli, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lists and diffs in README and tutorial are those of the library and target as they are."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(CLONE))
+    said = {command: said for page in (README, TUTORIAL) for command, said in sessions(page)}
+    answer = cli(*shlex.split(command)[1:])
+    assert (answer.code, lines_of(answer.out)) == (0, said[command])
 
 
 def test_the_readme_shows_the_table_of_the_tutorial() -> None:
