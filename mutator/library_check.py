@@ -1,5 +1,6 @@
 """Is everything in the library usable? What `mutator check` asks."""
 
+import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -99,8 +100,17 @@ def _unbuildable(
         keys = (*variant.keys, fault.reading)
         build(manifest, models, fault, always())
     except MutatorError as error:
-        got = f"{fault.spec} ({fault.reading}): {error}"
-        yield spec.source.error(keys, got, remedy="correct the spec or the target")
+        got = f"{fault.spec} ({fault.reading}): {error.got}{_where(error, manifest)}"
+        remedy = error.remedy or "correct the spec or the target"
+        yield spec.source.error(keys, got, expected=error.expected, remedy=remedy)
+
+
+def _where(error: MutatorError, manifest: TargetManifest) -> str:
+    """Where in the target an error is, as specs name its files: ` (pkg/radar.py:28)`."""
+    if not error.where:
+        return ""
+    path = error.where.removeprefix(f"{manifest.root}{os.sep}")
+    return f" ({path})" if error.line is None else f" ({path}:{error.line})"
 
 
 def _unknown_hazards(

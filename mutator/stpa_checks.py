@@ -255,5 +255,5 @@ def _unreached(analysis: Analysis, specs: tuple[FaultSpec, ...]) -> Iterator[Mut
             yield spec.source.error(
                 (),
                 f"fault spec '{spec.name}' stands for no causal factor",
-                remedy=f"name it in {analysis.factors_source.path}",
+                remedy=f"name it in {analysis.factors_source.path.name}",
             )

@@ -142,6 +142,14 @@ def show_error(error: MutatorError) -> None:
         terminal.note(f"  to do: {error.remedy}")
 
 
+def told(error: MutatorError) -> str:
+    """An error as one of several: one line, its file as the user would type it."""
+    where = short_path(error.where) or None
+    return str(
+        MutatorError(error.got, where=where, line=error.line, expected=error.expected, remedy=error.remedy)
+    )
+
+
 def _rich_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool) -> "Table":
     from rich import box
     from rich.table import Table

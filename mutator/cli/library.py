@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator.cli.choose import context_tables, target_name
-from mutator.cli.console import Terminal, short_path
+from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -147,7 +147,7 @@ def check(
     if as_json:
         terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
     for problem in problems:
-        terminal.say(str(problem), style="red")
+        terminal.say(told(problem), style="red")
     if problems:
         terminal.say(f"{len(problems)} problem(s)", style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)

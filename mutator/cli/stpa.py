@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator.cli.choose import target_name
-from mutator.cli.console import Terminal, short_path
+from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -66,7 +66,7 @@ def stpa(
     if svg:
         terminal.say(f"control structure: {short_path(svg)}")
     for problem in problems:
-        terminal.say(str(problem), style="red")
+        terminal.say(told(problem), style="red")
     if problems:
         terminal.say(f"{len(problems)} problem(s)", style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)

@@ -233,8 +233,7 @@ def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
     assert len(problems) == 3, "two variants, one of them in two readings"
     assert problems[0].startswith(
         "fault_library/faults/sensor/distance.yaml:14: sensor/distance/longer (as_described): "
-        "target/toycar/sensor.py:12: no assignment to 'gap' in Sensor.measure; expected one of 'distance' "
-        "(line 14)"
+        "no assignment to 'gap' in Sensor.measure (toycar/sensor.py:12); expected one of 'distance' (line 14)"
     )
 
 
