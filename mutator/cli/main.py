@@ -27,9 +27,9 @@ from mutator.interrupts import terminable
 EXIT_INTERRUPTED = 130
 EXIT_CODES = {
     EXIT_OK: "fine",
-    EXIT_CHECK_FAILED: "a check failed, or the command found a difference that it was asked for",
-    EXIT_WRONG_INPUT: "wrong input: the message says what to mend",
-    EXIT_HARNESS_ERRORS: "harness errors or experiments left, or a defect of mutator itself",
+    EXIT_CHECK_FAILED: "a check failed",
+    EXIT_WRONG_INPUT: "wrong input",
+    EXIT_HARNESS_ERRORS: "harness errors or experiments left",
     EXIT_INTERRUPTED: "interrupted",
 }
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
@@ -42,7 +42,7 @@ GROUPS = (
     ("After a campaign", ("compare", "export")),
     ("One experiment", ("show", "rerun")),
 )
-EXAMPLES = """\b
+EXAMPLES = f"""\b
 Examples:
   mutator list                                    what the library holds
   mutator try radar/chaff --scenario S1           one fault: diff, verdict, plot
@@ -50,9 +50,9 @@ Examples:
   mutator show 3f9a                               one of its experiments, by the start of its id
 
 \b
-Exit codes: 0 fine, 1 a check failed, 2 wrong input, 3 harness errors or experiments left,
-130 interrupted. Where things are is said by options, before or after the command, or by the
-environment; inside a clone neither is needed.
+Exit codes: {", ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())}.
+Where things are is said by options, before or after the command, or by the environment; inside
+a clone neither is needed.
 """
 
 

@@ -27,7 +27,9 @@ def command_line(workspace: Workspace) -> str:
         "| code | meaning |",
         "|---|---|",
         *(f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items()),
-        "\nAn error, on standard error, says file and line, what was found, what was expected, and what "
+        "\n1 is also a difference that a command was asked to look for; 3 also a defect of mutator itself, "
+        "which is told with\na traceback.\n",
+        "An error, on standard error, says file and line, what was found, what was expected, and what "
         "to do. With `--json`\nstandard output is one JSON document. Progress goes to standard error.\n",
         "## Where things are\n",
         _PLACES,
