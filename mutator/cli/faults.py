@@ -187,7 +187,7 @@ Examples:
 @with_place
 def generate(
     specs: Annotated[
-        list[str] | None, typer.Argument(metavar="[SPEC]...", help="Specs, globs over them, or spec files.")
+        list[str] | None, typer.Argument(metavar="SPEC", help="Specs, globs over them, or spec files.")
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new or empty folder.")] = ...,  # type: ignore[assignment]
     campaign: Annotated[

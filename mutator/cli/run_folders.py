@@ -41,7 +41,7 @@ Examples:
 
 
 def merge(
-    shards: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The run folder of each shard.")],
+    shards: Annotated[list[Path], typer.Argument(metavar="DIR", help="The run folder of each shard.")],
     out: OutRun,
     as_json: Json = False,
 ) -> None:
@@ -116,7 +116,7 @@ Examples:
 
 
 def clean(
-    runs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Run folders.")],
+    runs: Annotated[list[Path], typer.Argument(metavar="DIR", help="Run folders.")],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
 ) -> None:
     """Delete run folders.

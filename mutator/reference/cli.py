@@ -62,7 +62,7 @@ def _verb(group: Any, name: str) -> Iterator[str]:
 
 def _example(line: str) -> str:
     """A line of the examples; words that stand far behind the command are made a comment."""
-    command, gap, comment = re.match(r"  (.*?)(?:( {3,})(\S.*))?$", line).groups()  # type: ignore[union-attr]
+    command, gap, comment = re.match(r"  (.*?)(?:( {2,})(\S.*))?$", line).groups()  # type: ignore[union-attr]
     return f"{command}{gap}# {comment}" if gap else command
 
 
