@@ -1,8 +1,10 @@
 "use strict";
-/* Filters the table of changed experiments by text and by kinds of change; the choice is kept in the fragment. */
+/* Filters the table of changed experiments by text and by kinds of change, and shows the first of what is left;
+   the choice is kept in the fragment. */
 (() => {
   const table = document.getElementById("changed");
   if (!table) return;
+  const limit = Number(table.dataset.limit);
   const words = document.getElementById("words");
   const shown = document.getElementById("shown");
   const buttons = [...document.querySelectorAll("button[data-change]")];
@@ -10,17 +12,18 @@
     row, text: row.textContent.toLowerCase(), changes: row.dataset.changes.split(" "),
   }));
 
-  /** Show the rows that have all chosen changes and all words. */
+  /** Show the rows that have all chosen changes and all words, as many as the limit allows. */
   function filter() {
     const chosen = buttons.filter((b) => b.getAttribute("aria-pressed") === "true").map((b) => b.dataset.change);
     const parts = words.value.toLowerCase().split(/\s+/).filter(Boolean);
     let count = 0;
     for (const { row, text, changes } of rows) {
       const fits = chosen.every((c) => changes.includes(c)) && parts.every((p) => text.includes(p));
-      row.hidden = !fits;
       count += fits;
+      row.hidden = !fits || count > limit;
     }
-    shown.textContent = `${count} of ${rows.length}`;
+    const more = count > limit ? `, the first ${limit} are shown` : "";
+    shown.textContent = `${count} of ${rows.length}${more}`;
     return new URLSearchParams({ ...(chosen.length && { c: chosen.join(",") }), ...(parts.length && { q: parts.join(" ") }) });
   }
 

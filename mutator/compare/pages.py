@@ -17,6 +17,7 @@ from mutator.tables import Row
 from mutator.web import asset
 
 LISTED = 50  # experiments of one kind of change that the Markdown names; page and CSV have all
+SHOWN = 500  # rows of the page's table that are seen at once: a browser needs seconds to lay out thousands
 _BAD = frozenset(gate.value for gate in Gate)
 
 
@@ -130,6 +131,7 @@ def page(comparison: Comparison) -> str:
         counts=[(change.value, counts[change]) for change in Change if counts[change]],
         reasons=reasons(comparison),
         lines=list(map(_shown, comparison.changed)),
+        limit=SHOWN,
         bad=_BAD,
         base_css=Markup(asset("base.css")),
         script=Markup(_own("page.js")),

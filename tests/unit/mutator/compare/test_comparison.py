@@ -185,3 +185,15 @@ def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, P
     one, two = (pages.write(c, tmp_path / name) for c, name in ((found, "a"), (compare(*runs), "b")))
     for a, b in ((one.page, two.page), (one.markdown, two.markdown), (one.pairs, two.pairs)):
         assert a.read_bytes() == b.read_bytes()
+
+
+def test_a_page_of_many_changes_shows_the_first(
+    found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also without scripts no more rows than the limit are seen, and the page says so; none is left out."""
+    monkeypatch.setattr(pages, "SHOWN", 3)
+    text = pages.write(found, tmp_path / "out").page.read_text()
+    rows = [line for line in text.splitlines() if line.startswith("<tr data-changes=")]
+    assert len(rows) == len(found.changed) > 3
+    assert ["hidden>" in row for row in rows] == [False] * 3 + [True] * (len(rows) - 3)
+    assert f"At most 3 of the {len(rows)} are seen at once" in text

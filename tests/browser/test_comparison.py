@@ -1,0 +1,52 @@
+"""The page of a comparison with thousands of changes, as a reader uses it."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.compare import pages
+from mutator.compare.comparison import Comparison, compare
+from mutator.model import Experiment, Outcome
+from mutator.workspace import Workspace
+
+HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.0),)}
+COPIES = 100  # of the toy's 24 pairs
+
+
+def worse(e: Experiment) -> dict[str, Any]:
+    return HAZARD if e.fault.fault_type == "silence" else {"outcome": Outcome.SDC}
+
+
+@pytest.fixture
+def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Comparison:
+    """Every pair changed, some to a hazard, each of them many times."""
+    few = compare(write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after", worse))
+    return dataclasses.replace(
+        few, matching=dataclasses.replace(few.matching, pairs=few.matching.pairs * COPIES)
+    )
+
+
+def test_thousands_of_changes(browser: Any, found: Comparison, tmp_path: Path) -> None:
+    """No more rows than the limit are laid out, new hazards first; filters search all of them."""
+    page = browser.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(pages.write(found, tmp_path / "out").page.as_uri())
+    total, seen = len(found.changed), page.locator("#changed tr:visible")
+    assert total == 24 * COPIES
+    assert seen.count() == 1 + pages.SHOWN
+    assert "silence" in seen.nth(1).inner_text()
+    assert page.inner_text("#shown") == f"{total} of {total}, the first {pages.SHOWN} are shown"
+    last = found.changed[-1].b
+    page.fill("#words", last.id)
+    assert seen.count() == 1 + COPIES
+    assert last.fault.spec in seen.nth(1).inner_text()
+    page.fill("#words", "")
+    page.click("[data-change=new-hazard]")
+    hazards = sum(pair.b.fault.fault_type == "silence" for pair in found.pairs)
+    assert page.inner_text("#shown").startswith(f"{hazards} of {total}")
+    page.close()
+    assert errors == []
