@@ -12,6 +12,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.merge import merge
 from mutator.plan import Choices, make_plan
 from mutator.records import read_records
+from mutator.review import gate
 from mutator.runfolder import RunFolder
 from mutator.workspace import Workspace
 
@@ -53,6 +54,18 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
     assert patches == {p.name: p.read_bytes() for p in (runs["whole"] / "patches").rglob("*.patch")}
     heads = [json.loads((run / "run.json").read_text()) for run in (tmp_path / "out", runs["whole"])]
     assert heads[0] == heads[1]
+
+
+def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
+    """The merged run says who approved what if every shard does, not what is true of one shard alone."""
+    said = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
+    shards = [copies["1/2"], copies["2/2"]]
+    gate.write(shards[0], said)
+    merge(shards, tmp_path / "half")
+    assert gate.told(tmp_path / "half") == ""
+    gate.write(shards[1], said)
+    merge(shards, tmp_path / "out")
+    assert gate.told(tmp_path / "out") == "all 1 groups approved, by Jane Doe (1)"
 
 
 def test_shards_are_disjoint_and_all(runs: Runs) -> None:
