@@ -60,7 +60,9 @@ def make_folder(path: Path) -> None:
 
 
 def write_atomic(path: Path, data: bytes) -> None:
-    """Write the whole file or leave the old one; DiskFull when there is no room."""
+    """Write the whole file or leave the old one; DiskFull if there is no room, MutatorError for a folder."""
+    if path.is_dir():
+        raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     with full_disk_told(path):
         try:

@@ -101,3 +101,6 @@ def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
     assert '<failure type="hazard"' in Path("j.xml").read_text()
     assert cli("export", after, "--format", "junit", "--failures", "harness_error").code == 2
     assert cli("export", after, "--format", "pdf").code == 2
+    for folder in (".", "after"):
+        refused = cli("export", after, "--format", "csv", "--out", folder)
+        assert (refused.code, "expected: a file to write" in refused.err) == (2, True)
