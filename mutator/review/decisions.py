@@ -67,7 +67,7 @@ class _DecisionModel(StrictModel):
     group: str = Field(pattern=r"^[0-9a-f]{12}$")
     what: str
     decision: Literal["approved", "rejected"]
-    by: str = Field(min_length=1)
+    by: str = Field(pattern=r"\S")  # somebody must have looked
     remark: str
     diff: str = Field(pattern=r"^[0-9a-f]{16}$")
     function: str = Field(pattern=r"^[0-9a-f]{16}$")

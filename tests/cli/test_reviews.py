@@ -115,12 +115,14 @@ def test_no_name_is_no_decision(cli: Cli, root: Path, known: dict[str, str]) -> 
 
 
 def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A hand edit that went wrong stops the command."""
+    """A hand edit that went wrong stops the command: a word that is no decision, nobody who has looked."""
     cli("review", "approve", next(iter(known)), *JANE)
     file = root / "fault_library/reviews/toycar.yaml"
-    file.write_text(file.read_text().replace("approved", "okay"))
-    answer = cli("review")
-    assert (answer.code, "toycar.yaml:8: " in answer.err) == (2, True)
+    good = file.read_text()
+    for line, old, new in ((8, "approved", "okay"), (9, "Jane Doe", " ")):
+        file.write_text(good.replace(old, new))
+        answer = cli("review")
+        assert (answer.code, f"toycar.yaml:{line}: " in answer.err) == (2, True)
 
 
 def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
