@@ -165,7 +165,7 @@ def _mapped(path: Path, shape: tuple[int, int, int]) -> np.ndarray | None:
             frames = np.memmap(file, np.uint8, "r", len(header), shape)
     except FileNotFoundError:
         return None
-    return frames.view(np.ndarray) if check == _check(sum(map(_sum, frames))) else None
+    return frames.view(np.ndarray) if check == _check(_total(frames)) else None
 
 
 def _header(shape: tuple[int, int, int]) -> bytes:
@@ -173,6 +173,11 @@ def _header(shape: tuple[int, int, int]) -> bytes:
     header = BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "|u1", "fortran_order": False, "shape": shape})
     return header.getvalue()
+
+
+def _total(frames: np.ndarray) -> int:
+    """The sum of all frames' sums; of all at once where no frame ends within a word, which is quicker."""
+    return _sum(frames) if frames[0].size % CHECK.itemsize == 0 else sum(map(_sum, frames))
 
 
 def _sum(frame: np.ndarray) -> int:

@@ -30,13 +30,23 @@ def mark_points(road: np.ndarray) -> Points:
     """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
     side = _mean(road, SIDE)
     single = _inner(_mean(road, SINGLE[0]))
-    darker, brighter = _sides(side, SINGLE[1])
-    ground = 0.5 * (darker + brighter)
-    light = ground + np.float32(DARK)
-    contrast = np.maximum(single - brighter, _inner(_mean(road, DOUBLE[0])) - _sides(side, DOUBLE[1])[1])
+    sides = _sides(side, SINGLE[1])
+    # Most results take the place of one that is not needed any more: new memory costs as much as the sums.
+    contrast = np.maximum(*sides)
+    np.subtract(single, contrast, out=contrast)
+    other = np.maximum(*_sides(side, DOUBLE[1]))
+    np.subtract(_inner(_mean(road, DOUBLE[0])), other, out=other)
+    np.maximum(contrast, other, out=contrast)
+    ground = np.add(*sides)
+    ground *= np.float32(0.5)
+    light = np.add(ground, np.float32(DARK), out=other)
     contrast /= light
-    texture = cv2.blur(np.abs(single - ground) / light, NEIGHBOURHOOD)
-    sure = contrast / (texture + np.float32(LEAST))
+    rough = np.subtract(single, ground, out=ground)
+    np.abs(rough, out=rough)
+    rough /= light
+    texture = cv2.blur(rough, NEIGHBOURHOOD, dst=light)
+    texture += np.float32(LEAST)
+    sure = np.divide(contrast, texture, out=texture)
     sure -= np.float32(QUIET)
     sure *= np.float32(1.0 / (CLEAR - QUIET))
     return _crests(sure, contrast)
@@ -52,10 +62,9 @@ def _inner(picture: np.ndarray) -> np.ndarray:
 
 
 def _sides(side: np.ndarray, apart: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of the road to the left and to the right of each inner point, the darker and the brighter one."""
+    """The road to the left and to the right of each inner point."""
     end = side.shape[1]
-    left, right = side[:, EDGE - apart : end - EDGE - apart], side[:, EDGE + apart : end - EDGE + apart]
-    return np.minimum(left, right), np.maximum(left, right)
+    return side[:, EDGE - apart : end - EDGE - apart], side[:, EDGE + apart : end - EDGE + apart]
 
 
 def _crests(sure: np.ndarray, contrast: np.ndarray) -> Points:

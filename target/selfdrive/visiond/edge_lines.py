@@ -39,13 +39,9 @@ class EdgeLines:
 
     def __init__(self, model: CameraModel, region: RoadRegion) -> None:
         self._model = model
+        self._region = region
         rows = np.arange(region.shape[0]) + region.first_row
-        scales = np.array([model.metres_per_pixel(row) for row in rows])
-        # Of every pixel: to look up is quicker than to divide.
-        row, column = np.indices(region.shape, float)
-        self._row = (row + region.first_row).ravel()
-        self._column = (column + region.first_column).ravel()
-        self._scale = np.repeat(scales, region.shape[1])
+        self._scale = np.array([model.metres_per_pixel(row) for row in rows])
 
     def nearest(
         self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
@@ -59,7 +55,7 @@ class EdgeLines:
             return None, None
         if not clustered.all():
             at, rising, labels = at[clustered], rising[clustered], labels[clustered]
-        points = Points(self._row.take(at), self._column.take(at), rising, self._scale.take(at))
+        points = self._points(at, rising)
         size, spread, a, b = _fit(points.row, points.column, labels)
         y, slope = self._model.line_on_road(a, b)
         usable = (size >= MIN_PIXELS) & (spread >= MIN_SPREAD) & (np.abs(slope) <= MAX_SLOPE)
@@ -71,6 +67,18 @@ class EdgeLines:
             clusters = np.stack((away, a, b), axis=1)[order].tolist()
             sides.append(self._first_line(clusters, points))
         return sides[0], sides[1]
+
+    def _points(self, at: np.ndarray, rising: np.ndarray) -> Points:
+        """The pixels with these numbers."""
+        region = self._region
+        row = at // region.shape[1]
+        column = at - row * region.shape[1]
+        return Points(
+            (row + region.first_row).astype(float),
+            (column + region.first_column).astype(float),
+            rising,
+            self._scale.take(row),
+        )
 
     def _first_line(self, clusters: list[list[float]], points: Points) -> RoadLine | None:
         """The line of the first of the clusters (m away, a, b) that is one, or a better one close to it."""

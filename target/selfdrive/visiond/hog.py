@@ -34,11 +34,16 @@ class _Tables:
 
 
 def _tables() -> _Tables:
-    step = np.arange(_STEPS) - (_STEPS // 2)
+    """Calculated for a quarter of the gradients, to the right and down; the others are its mirror images."""
+    step = np.arange(_STEPS // 2 + 1)
     dx, dy = step[np.newaxis, :], step[:, np.newaxis]
-    turned = np.degrees(np.arctan2(dy, dx)) % 180.0
-    orientation = np.minimum(turned * BINS / 180.0, BINS - 1).astype(np.uint8)
-    return _Tables(orientation.ravel(), (np.hypot(dx, dy) / CELL**2).ravel())
+    orientation = (np.degrees(np.arctan2(dy, dx)) * (BINS / 180.0)).astype(np.uint8)
+    mirrored = BINS - 1 - orientation
+    mirrored[0] = 0  # along a row left is right, as orientations have no sign
+    down = np.hstack((mirrored[:, :0:-1], orientation))
+    length = np.hypot(dx, dy) / CELL**2
+    length = np.hstack((length[:, :0:-1], length))
+    return _Tables(np.vstack((down[:0:-1, ::-1], down)).ravel(), np.vstack((length[:0:-1], length)).ravel())
 
 
 class Hog:

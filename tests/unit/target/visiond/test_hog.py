@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from selfdrive.visiond.hog import BINS, CELL, FEATURES, STRIDE, WINDOW, Hog, windows
+from selfdrive.visiond.hog import BINS, CELL, FEATURES, STRIDE, WINDOW, Hog, _tables, windows
 from skimage.feature import hog
 
 TOLERANCE = 1e-6  # features are at most 1
@@ -48,3 +48,12 @@ def test_turning_the_light_up_changes_no_feature():
     tables = Hog(64, 96)
     before = tables.blocks(picture).copy()
     assert np.abs(tables.blocks(brighter) - before).max() <= TOLERANCE
+
+
+def test_the_tables_have_the_angle_and_length_of_every_gradient():
+    """Also of those that are mirror images of the ones that were calculated, to the last bit."""
+    dx, dy = np.arange(-255, 256)[np.newaxis, :], np.arange(-255, 256)[:, np.newaxis]
+    turned = np.degrees(np.arctan2(dy, dx)) % 180.0
+    tables = _tables()
+    assert np.array_equal(tables.orientation, (turned * BINS / 180.0).astype(np.uint8).ravel())
+    assert np.array_equal(tables.length, (np.hypot(dx, dy) / CELL**2).ravel())
