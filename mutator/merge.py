@@ -16,6 +16,7 @@ from mutator.plan import make_run_folder
 from mutator.records import read_records
 from mutator.review.gate import FILE as REVIEWED
 from mutator.runfolder import HEAD, RunFolder
+from mutator.wording import counted
 
 _SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
 _REMEDY = "give the folder of each shard of one plan, once"
@@ -115,7 +116,7 @@ def _check_complete(folder: RunFolder) -> None:
     proof.judge(folder, records)
     if left := sum(len(piece.ids) for piece in proof.left(folder)):
         raise MutatorError(
-            f"unfinished: {left} experiments of its proof are left to run",
+            f"unfinished: of its proof {counted(left, 'experiment')} left to run",
             where=folder.path,
             expected="a finished shard",
             remedy="run it to its end with the command it was begun with",

@@ -18,10 +18,10 @@ import yaml
 from markupsafe import Markup
 
 from mutator import planfile, report_series
-from mutator.cli.diffs import readable
 from mutator.errors import MutatorError
 from mutator.ids import plain
 from mutator.model import Anchor, Experiment, Fault
+from mutator.patch import readable
 from mutator.review.groups import Shape, shapes
 from mutator.runfolder import RunFolder
 from mutator.tables import Row

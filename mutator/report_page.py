@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
 from mutator.web import asset
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.report import Content
@@ -68,7 +69,11 @@ def markdown(content: "Content") -> str:
 
 def _outcome_text(content: "Content") -> str:
     total = sum(content.outcomes.values())
-    return f"{total} experiments: " + ", ".join(f"{n} {name}" for name, n in content.outcomes.items()) + "."
+    return (
+        f"{counted(total, 'experiment')}: "
+        + ", ".join(f"{n} {name}" for name, n in content.outcomes.items())
+        + "."
+    )
 
 
 def _failed_text(content: "Content") -> str:

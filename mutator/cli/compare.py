@@ -8,6 +8,7 @@ import typer
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Only
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.compare.comparison import Comparison, Finding, Gate
@@ -127,7 +128,5 @@ def _judge(
     if failing:
         raise typer.Exit(EXIT_CHECK_FAILED)
     if gates and found.incomplete:
-        terminal.complain(
-            f"{found.incomplete} experiments have no result in one of the runs; finish it first"
-        )
+        terminal.complain(f"{counted(found.incomplete, 'result')} missing: finish both runs first")
         raise typer.Exit(EXIT_HARNESS_ERRORS)

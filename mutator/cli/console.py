@@ -13,7 +13,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mutator.cli import diffs
 from mutator.errors import MutatorError
 from mutator.ids import plain
 
@@ -96,7 +95,7 @@ class Terminal:
 
         text = Text()
         for line in patch.splitlines():
-            text.append(line + "\n", style=diffs.style(line))
+            text.append(line + "\n", style=_diff_style(line))
         self.out.print(text, soft_wrap=True, end="")
 
     @contextmanager
@@ -209,3 +208,14 @@ def _jsonable(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
     return value
+
+
+def _diff_style(line: str) -> str:
+    """Rich style of one line of a unified diff."""
+    if line.startswith(("+++", "---", "diff ", "index ", "new file")):
+        return "bold"
+    if line.startswith("@@"):
+        return "cyan"
+    if line.startswith("+"):
+        return "green"
+    return "red" if line.startswith("-") else ""

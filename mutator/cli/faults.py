@@ -8,9 +8,10 @@ import typer
 
 from mutator.cli import choose
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.diffs import readable
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 from mutator.errors import EXIT_HARNESS_ERRORS
+from mutator.patch import readable
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.model import Experiment
@@ -223,6 +224,6 @@ def generate(
     target, index = write_mutants(place.workspace(), request, out, terminal)
     if as_json:
         terminal.emit(index)
-    terminal.say(f"{len(index)} mutants in {out}; the list of them is {out / 'index.csv'}")
+    terminal.say(f"{counted(len(index), 'mutant')} in {out}; the list of them is {out / 'index.csv'}")
     first = out / index[0]["patch"]
     terminal.say(f"apply one: patch -p1 -d {short_path(target.root)} < {first}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.cli.console import Terminal
 from mutator.cli.review_choice import columns
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.review.catalogue import Group
@@ -55,7 +56,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     else:
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
         terminal.table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
-    terminal.say(f"{len(groups)} groups: {counts(review, groups)}")
+    terminal.say(f"{counted(len(groups), 'group')}: {counts(review, groups)}")
     gone = review.decisions.keys() - {group.id for group in groups}
     if gone:
         terminal.note(f"{len(gone)} decisions are about groups that are not listed")
@@ -81,8 +82,8 @@ def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
         terminal.say(told)
     for injection in group.injections:
         terminal.say(f"  {injection}", style="bold")
-    runs = "" if group.runs is None else f", {group.runs} experiments"
-    terminal.say(f"when: {_when(group)}; {len(group.faults)} faults{runs}")
+    runs = "" if group.runs is None else f", {counted(group.runs, 'experiment')}"
+    terminal.say(f"when: {_when(group)}; {counted(len(group.faults), 'fault')}{runs}")
     for line in conditions(group.triggers)[:CONDITIONS]:
         terminal.say(f"  {line}")
     if (more := len(conditions(group.triggers)) - CONDITIONS) > 0:

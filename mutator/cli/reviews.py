@@ -11,6 +11,7 @@ from mutator.cli import review_view as view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
 from mutator.cli.review_choice import COLUMNS, Wanted
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.review.decisions import Verdict
@@ -227,7 +228,9 @@ def page(
     write_page(out, found.review, found.groups, found.options)
     if as_json:
         terminal.emit({"page": str(out), "groups": len(found.groups)})
-    terminal.say(f"{len(found.groups)} groups in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)")
+    terminal.say(
+        f"{counted(len(found.groups), 'group')} in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)"
+    )
 
 
 def _wanted(

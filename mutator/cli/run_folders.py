@@ -10,6 +10,7 @@ import typer
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -58,7 +59,9 @@ def merge(
     planned = RunFolder.open(out).planned
     if as_json:
         terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
-    terminal.say(f"{planned} experiments of {len(shards)} shards: {short_path(results)}")
+    terminal.say(
+        f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {short_path(results)}"
+    )
     terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
 
 

@@ -109,9 +109,13 @@ class Comparison:
 
     @property
     def incomplete(self) -> int:
-        """Experiments that a run has planned or tried, and has no result of."""
+        """Results that are missing in one run or the other, of experiments that both have planned."""
         m = self.matching
-        return len(m.no_result_a) + len(m.no_result_b) + sum(not pair.usable for pair in self.pairs)
+        return (
+            len(m.no_result_a)
+            + len(m.no_result_b)
+            + sum(not row.usable for pair in self.pairs for row in (pair.row_a, pair.row_b))
+        )
 
 
 def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:

@@ -15,6 +15,7 @@ from mutator.jsonio import make_folder, write_atomic
 from mutator.report_page import markdown_table
 from mutator.tables import Row
 from mutator.web import asset
+from mutator.wording import counted
 
 LISTED = 50  # experiments of one kind of change that the Markdown names; page and CSV have all
 SHOWN = 500  # rows of the page's table that are seen at once: a browser needs seconds to lay out thousands
@@ -48,7 +49,7 @@ def summary(comparison: Comparison) -> str:
     """The comparison in a few sentences."""
     c = comparison
     counts = Counter(change for pair in c.pairs for change in pair.changes)
-    text = f"{len(c.pairs)} experiments are in both runs. "
+    text = f"In both runs: {counted(len(c.pairs), 'experiment')}. "
     if counts:
         listed = ", ".join(f"{change.value} {counts[change]}" for change in Change if counts[change])
         text += f"{len(c.changed)} of them changed: {listed}."

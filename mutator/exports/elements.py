@@ -19,6 +19,7 @@ from mutator.mutant import injection_edit, injection_id
 from mutator.records import read_records
 from mutator.runfolder import RunFolder
 from mutator.splice import Edit
+from mutator.wording import counted
 from mutator.workspace import Workspace
 
 SCHEMA_VERSION = "2.0"
@@ -107,7 +108,7 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
     of = {status: [r for r in known.values() if r.status is status] for status in Status}
     hazardous = [e for e, r in known.items() if r.hazards]
     active = [e for e, r in known.items() if r.activation]
-    drives = f"{len(experiments)} drives"
+    drives = counted(len(experiments), "drive")
     if hazardous:
         names = sorted({name for e in hazardous for name, _ in known[e].hazards})
         status, reason = "Killed", f"{', '.join(names)} in {len(hazardous)} of {drives}"

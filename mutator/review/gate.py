@@ -11,6 +11,7 @@ from mutator.jsonio import read_json, write_json
 from mutator.plan import Plan
 from mutator.review.catalogue import Group, of_plan
 from mutator.review.decisions import Review, State, load_review
+from mutator.wording import counted
 from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"
@@ -44,7 +45,7 @@ def told(run: Path) -> str:
         return ""
     groups = read_json(run / FILE, SCHEMA)["groups"]
     names = Counter(group["by"] for group in groups)
-    return f"all {len(groups)} groups approved, by " + ", ".join(
+    return f"all of {counted(len(groups), 'group')} approved, by " + ", ".join(
         f"{name} ({n})" for name, n in sorted(names.items())
     )
 

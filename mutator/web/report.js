@@ -37,7 +37,7 @@ const Report = (() => {
         filters.show(counts);
         find("found").textContent = state.isFiltered
           ? `${rows.length.toLocaleString("en")} of ${table.count.toLocaleString("en")} experiments`
-          : `${table.count.toLocaleString("en")} experiments`;
+          : `${table.count.toLocaleString("en")} experiment${table.count === 1 ? "" : "s"}`;
         if (search.value !== state.query) search.value = state.query;
       } else grid.show(grid.rows);
       experiment.show();

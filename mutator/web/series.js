@@ -163,7 +163,7 @@ const Series = (() => {
     if (!differ.length) place.append(el("p.quiet", {}, "No channel differs from the golden run."));
     draw(place.appendChild(el("div.plots")), data, first);
     if (!rest.length) return;
-    const fold = place.appendChild(el("details", {}, el("summary", {}, `${rest.length} channels without a difference`)));
+    const fold = place.appendChild(el("details", {}, el("summary", {}, `${rest.length === 1 ? "1 channel" : `${rest.length} channels`} without a difference`)));
     fold.addEventListener("toggle", () => draw(fold.appendChild(el("div.plots")), data, rest), { once: true });
   }
 

@@ -31,7 +31,7 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
     """What changed is in the terminal's tables, and written beside the second run."""
     answer = cli("compare", *runs)
     assert answer.code == 0, answer.err
-    for wanted in ("new-hazard", "sensor/silence", "24 experiments are in both runs"):
+    for wanted in ("new-hazard", "sensor/silence", "In both runs: 24 experiments"):
         assert wanted in answer.out
     for name in ("COMPARISON.md", "index.html", "pairs.csv", "unmatched.csv"):
         assert (Path("after") / "report" / "compare-before" / name).is_file()
@@ -63,7 +63,7 @@ def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run
     )
     answer = cli("compare", whole, part, "--fail-on", "new-hazard")
     assert answer.code == 3
-    assert "have no result" in answer.err
+    assert "results missing" in answer.err
     broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None}
     bad = write_run(
         workspace, Path("bad"), lambda e: broken if e.method == "random" else {}, campaign="small"

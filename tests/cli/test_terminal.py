@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from mutator.cli.console import Terminal
-from mutator.cli.diffs import readable
 from mutator.cli.progress import campaign_progress, duration
+from mutator.patch import readable
 from mutator.records import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json

@@ -65,7 +65,7 @@ def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
     assert gate.told(tmp_path / "half") == ""
     gate.write(shards[1], said)
     merge(shards, tmp_path / "out")
-    assert gate.told(tmp_path / "out") == "all 1 groups approved, by Jane Doe (1)"
+    assert gate.told(tmp_path / "out") == "all of 1 group approved, by Jane Doe (1)"
 
 
 def test_shards_are_disjoint_and_all(runs: Runs) -> None:

@@ -191,7 +191,7 @@ def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
     gate.write(run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]})
     written = report.ensure(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
-        assert "all 2 groups approved, by Jane (1), Joe (1)" in text
+        assert "all of 2 groups approved, by Jane (1), Joe (1)" in text
 
 
 def test_the_report_is_the_same_each_time(run: Path) -> None:

@@ -32,7 +32,7 @@ def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path)
     gate.write(tmp_path, gate.approvals(toycar, plan))
     total = len(of_plan(toycar, plan))
     assert gate.told(tmp_path) == (
-        f"all {total} groups approved, by Reviewer 1 (1), Reviewer None ({total - 1})"
+        f"all of {total} groups approved, by Reviewer 1 (1), Reviewer None ({total - 1})"
     )
 
 
