@@ -18,7 +18,7 @@ KEY, CHECK = 16, 8  # bytes
 _VALUE = struct.Struct(f"<q{MOST}d")
 ENTRY = KEY + CHECK + _VALUE.size  # 192 bytes
 WAYS = 8  # entries of a bucket, in any of which one may lie
-BUCKETS = 1 << 17  # 2^20 entries, 201 MB once all are in use; the file has no more bytes on disk than that
+BUCKETS = 1 << 19  # 2^22 entries, those of two large campaigns: 805 MB once all of them are in use
 _BUCKET = WAYS * ENTRY
 
 
