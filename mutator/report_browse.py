@@ -18,6 +18,7 @@ import yaml
 from markupsafe import Markup
 
 from mutator import planfile, report_series
+from mutator.columns import type_of
 from mutator.errors import MutatorError
 from mutator.ids import plain
 from mutator.model import Anchor, Experiment, Fault
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 STILLS_BYTES = 4_000_000  # of pictures in the page; more are links
-TEXT = ("experiment_id", "fault_id", "detail")  # never taken for numbers, however they look
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,15 +104,16 @@ def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, 
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """Numbers as they are (None: empty), anything else as codes of its distinct values in their order."""
-    if name not in TEXT and any(values):
+    """Numbers as they are (None: empty), ids as texts, anything else as codes of its distinct values in their
+    order. A name is never taken for a number, whatever it looks like: a variant may be called `nan`."""
+    if type_of(name) != "text" and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
         except ValueError:
             pass
-    words = sorted(set(values))
-    if len(words) == len(values):  # ids: codes would say nothing
+    if name == "experiment_id":  # codes of what is different in each row would say nothing
         return {"texts": list(values)}
+    words = sorted(set(values))
     code = {word: i for i, word in enumerate(words)}
     return {"words": words, "codes": [code[text] for text in values]}
 

@@ -56,11 +56,14 @@ def row(name: str) -> Row:
         ("scenario", ["S2", "S1", "S2"], {"words": ["S1", "S2"], "codes": [1, 0, 1]}),
         ("experiment_id", ["12", "34"], {"texts": ["12", "34"]}),
         ("alerts", ["", ""], {"words": [""], "codes": [0, 0]}),
-        ("value", ["3", "left"], {"texts": ["3", "left"]}),
+        ("value", ["3", "left"], {"words": ["3", "left"], "codes": [0, 1]}),
+        ("scenario", ["S2", "S1"], {"words": ["S1", "S2"], "codes": [1, 0]}),
+        ("variant", ["nan"], {"words": ["nan"], "codes": [0]}),
     ],
 )
 def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str], made: object) -> None:
-    """Ids stay texts, empty cells stay empty, and what is no finite number is told by its name."""
+    """Ids stay texts, empty cells stay empty, and what is no finite number is told by its name; names have a
+    dictionary, which filters need, also where no two are equal, and are no numbers."""
     assert column(name, values) == made
 
 
