@@ -1,6 +1,7 @@
 """The two forms of a report: Markdown for reading anywhere, one HTML page without outside help."""
 
 import base64
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,8 @@ NOTES = """\
 *Injected* counts the experiments that say something about their fault; a harness error, or a mutant that
 could not be made, is counted apart. *Activated*: an injected statement ran while triggered. *Manifested*: an
 actuator output then differed from the fault-free run. *Hazard, no alert*: no counted alert at all."""
+
+_TAG = re.compile(r"<(?=[A-Za-z/!?])")
 
 
 def markdown(content: "Content") -> str:
@@ -85,11 +88,17 @@ def _failed_text(content: "Content") -> str:
     return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
 
 
+def markdown_line(text: str) -> str:
+    """A text as one line of Markdown: the `<class 'float'>` of a message is no element, which would not be
+    seen."""
+    return _TAG.sub("&lt;", " ".join(text.splitlines()))
+
+
 def markdown_table(heads: list[str], lines: list[list[str]]) -> str:
     """A table of texts in Markdown, whatever is in them."""
 
     def row(cells: list[str]) -> str:
-        return "| " + " | ".join(c.replace("|", "\\|").replace("\n", " ") for c in cells) + " |"
+        return "| " + " | ".join(markdown_line(c).replace("|", "\\|") for c in cells) + " |"
 
     rule = "| " + " | ".join("---" for _ in heads) + " |"
     return "\n".join([row(heads), rule, *(row(line) for line in lines)])

@@ -12,7 +12,7 @@ from mutator.compare.comparison import Comparison, Gate, told
 from mutator.compare.pairs import Change, Pair, time_to_hazard
 from mutator.compare.sides import words
 from mutator.jsonio import make_folder, write_atomic
-from mutator.report_page import markdown_table
+from mutator.report_page import markdown_line, markdown_table
 from mutator.tables import Row
 from mutator.web import asset
 from mutator.wording import counted
@@ -106,7 +106,7 @@ def markdown(comparison: Comparison) -> str:
 
 
 def _listed(pairs: tuple[Pair, ...]) -> str:
-    lines = [f"- {words(p.b)}: {told(p)} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]]
+    lines = [f"- {words(p.b)}: {markdown_line(told(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]]
     more = len(pairs) - LISTED
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 

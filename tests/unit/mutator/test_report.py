@@ -122,7 +122,7 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not end well")[1]
     assert failed.index("harness_error") < failed.index("crashed")
-    assert "the disk \\| is <gone>" in failed
+    assert "the disk \\| is &lt;gone>" in failed
     counts = text.split("## By fault type")[1].split("##")[0]
     [line] = [line for line in counts.splitlines() if line.startswith("| radar/chaff ")]
     assert line == "| radar/chaff | 2 | 2 | 2 | 1 | 0 | 0 | 1 | 0 | 1 | 1 | 1 |"
@@ -301,3 +301,10 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
         assert "t_h1 > t_activation" in text
     assert "action_" not in written.markdown.read_text()
     assert "<figure" not in written.page.read_text().replace('el("figure"', "")
+
+
+def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
+    """Whatever ends a line, or would be taken for an element, in a cell is text."""
+    lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"]]
+    table = report_page.markdown_table(["said"], lines)
+    assert table.splitlines()[2:] == ["| a b c |", "| &lt;class 'float'> |", "| p < 0.05 |"]
