@@ -23,13 +23,18 @@ class Experiment {
       return;
     }
     if (row >= 0 && row === this.row && this.isOpen) return;
-    const wasOpen = this.isOpen;
+    const wasOpen = this.isOpen, hadFocus = this.place.contains(document.activeElement);
+    const button = document.activeElement?.getAttribute("aria-label"); // what goes on is pressed several times
     this.row = row;
     this.place.hidden = false;
     if (row < 0) this.#none(id);
     else this.#fill(row);
     this.place.scrollTop = 0;
-    if (!wasOpen) this.place.querySelector("h2").focus({ preventScroll: true });
+    // what had the keyboard is gone: without it, keys would scroll the page beneath
+    if (!wasOpen || hadFocus) {
+      const same = hadFocus && [...this.place.querySelectorAll("header button")].find((b) => b.getAttribute("aria-label") === button);
+      (same || this.place.querySelector("h2")).focus({ preventScroll: true });
+    }
     if (row >= 0) await this.#fillLate(row);
   }
 

@@ -99,6 +99,8 @@ class Grid {
     const shown = [];
     for (let at = first; at < last; at++) shown.push(this.#row(at));
     this.body.replaceChildren(...[space(first), ...shown, all ? null : space(this.rows.length - last)].filter(Boolean));
+    const more = all ? this.rows.length - last : 0;
+    if (more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: Grid.COLUMNS.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
     if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, "No experiment fits these filters.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
   }

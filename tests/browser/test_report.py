@@ -150,7 +150,15 @@ def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
     first = page.fragment
     assert first.startswith("e=")
     keys.press("j")
-    assert page.fragment != first
+    second = page.fragment
+    assert second != first
+    keys.press("ArrowRight")  # a key of the open experiment: it still has the keyboard
+    assert page.fragment not in (first, second)
+    page.page.focus("#experiment header button >> nth=0")
+    keys.press("Enter")
+    keys.press("Enter")
+    assert page.fragment == first
+    keys.press("j")
     keys.press("Escape")
     assert page.fragment == ""
     assert page.page.evaluate(focused) == "2"
@@ -177,6 +185,13 @@ def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path
     width = "document.documentElement.scrollWidth"
     assert page.evaluate(width) == 400
     assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # room for its words
+    page.eval_on_selector_all(
+        "#heat .cell", "all => all.forEach((c) => (c.textContent = '123456789/987654321'))"
+    )
+    assert (
+        page.evaluate("document.querySelector('#heat th[scope=row]').clientWidth") > 70
+    )  # and the map's rows
+    assert page.evaluate(width) == 400
     page.click("#grid tr[data-at] >> nth=0")
     page.wait_for_selector("#experiment .diff")
     assert page.evaluate("document.querySelector('#experiment').clientWidth") == 400
@@ -190,4 +205,7 @@ def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == COUNT
     assert not page.page.is_visible("#facets")
+    page.page.evaluate("Grid.PRINTED = 10")
+    page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.texts("#grid tbody tr")[10:] == ["and 14 more, which are not printed"]
     page.page.evaluate("dispatchEvent(new Event('afterprint'))")
