@@ -4,7 +4,8 @@
 
 const Series = (() => {
   const { el, svg } = Dom;
-  const LEFT = 62, RIGHT = 10, HEIGHT = 78, STRIP = 7, GAP = 4, LABELS = 40, AXIS = 24; // px
+  const LEFT = 62, RIGHT = 10, HEIGHT = 78, STRIP = 7, GAP = 4, LABEL = 12, LETTER = 6.6, AXIS = 24; // px
+  const BEYOND = 100; // so many times what a channel usually is: its axis is cut
   const waiting = new Map(); // experiment -> what to do with its series, once its script has run
 
   /** The series that the page carries of an experiment; null: none. */
@@ -49,18 +50,34 @@ const Series = (() => {
     return d;
   }
 
+  /** What `channel` is no larger than in 98 % of the time, at least 1. */
+  function usual(channel) {
+    const held = [channel.golden, channel.faulty].flatMap(([times, values]) =>
+      values.slice(0, -1).map((v, i) => [Math.abs(v), v === null ? 0 : times[i + 1] - times[i]]));
+    held.sort(([a], [b]) => a - b);
+    let left = 0.98 * held.reduce((sum, [, time]) => sum + time, 0);
+    return Math.max(1, held.find(([, time]) => (left -= time) <= 0)?.[0] ?? 1);
+  }
+
+  /** The axis of a channel, and what is told if it is cut: a headway time near standstill goes to any height,
+   *  and nothing else of the channel would be seen. */
   function range(channel) {
     const values = [...channel.golden[1], ...channel.faulty[1]].filter((v) => v !== null);
     let low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!(low <= high)) [low, high] = [0, 1];
+    const most = usual(channel);
+    let cut = "";
+    if (Math.max(-low, high) > BEYOND * most) {
+      cut = `axis cut, values ${low} to ${high}; `;
+      [low, high] = [Math.max(low, -2 * most), Math.min(high, 2 * most)];
+    }
     // a narrower range would show rounding as something
     const least = Math.max(1e-6, Math.abs(high) * 1e-3);
     const margin = Math.max((high - low) * 0.08, least);
-    return [low - margin, high + margin];
+    return { low: low - margin, high: high + margin, cut };
   }
 
-  function panel(channel, data, x, width) {
-    const [low, high] = range(channel);
+  function panel(channel, data, x, width, { low, high }) {
     const y = (v) => 4 + ((high - v) / (high - low)) * (HEIGHT - 8);
     const right = width - RIGHT, below = HEIGHT + GAP;
     const parts = [svg("rect", { x: LEFT, y: 0, width: right - LEFT, height: HEIGHT, class: "ground" })];
@@ -72,8 +89,9 @@ const Series = (() => {
       parts.push(svg("line", { x1: LEFT, x2: right, y1: y(tick), y2: y(tick), class: "rule" }));
       parts.push(svg("text", { x: LEFT - 6, y: y(tick) + 3.5, "text-anchor": "end" }, String(tick)));
     }
-    parts.push(svg("path", { d: path(channel.golden, x, y), class: "golden" }));
-    parts.push(svg("path", { d: path(channel.faulty, x, y), class: "faulty" }));
+    const lines = ["golden", "faulty"].map((run) => svg("path", { d: path(channel[run], x, y), class: run }));
+    // a picture of its own, so that lines end where it does
+    parts.push(svg("svg", { width: right + 2, height: HEIGHT }, lines));
     parts.push(svg("rect", { x: LEFT, y: below, width: right - LEFT, height: STRIP, class: "strip" }));
     const wide = (x(channel.until) - LEFT) / channel.strip.length;
     [...channel.strip].forEach((level, i) => {
@@ -86,13 +104,23 @@ const Series = (() => {
 
   const KINDS = ["trigger", "manifest", "alert", "hazard"];
 
-  function marks(data, x, width, height) {
-    return data.marks.map(([kind, t, label], i) => {
-      const at = x(t), isLate = at > width - 130;
-      return svg("g", { class: `mark ${KINDS.includes(kind) ? kind : ""}` },
-        svg("line", { x1: at, x2: at, y1: LABELS - 6, y2: height - AXIS }),
-        svg("text", { x: at + (isLate ? -3 : 3), y: 9 + 12 * (i % 3), "text-anchor": isLate ? "end" : "start" }, `${label} ${t.toFixed(2)}`));
+  /** The marks with their labels, each in the first line above the panels that has room for it. */
+  function placed(data, x, width) {
+    const lines = []; // of each the spans that are taken
+    return data.marks.map(([kind, t, label]) => {
+      const at = x(t), isLate = at > width - 130, text = `${label} ${t.toFixed(2)}`;
+      const from = isLate ? at - text.length * LETTER : at, to = from + text.length * LETTER;
+      let line = lines.findIndex((taken) => taken.every(([a, b]) => to < a || b < from));
+      if (line < 0) line = lines.push([]) - 1;
+      lines[line].push([from, to]);
+      return { kind, at, isLate, text, line };
     });
+  }
+
+  function drawn({ kind, at, isLate, text, line }, labels, height) {
+    return svg("g", { class: `mark ${KINDS.includes(kind) ? kind : ""}` },
+      svg("line", { x1: at, x2: at, y1: labels - 6, y2: height - AXIS }),
+      svg("text", { x: at + (isLate ? -3 : 3), y: 9 + LABEL * line, "text-anchor": isLate ? "end" : "start" }, text));
   }
 
   /** The value of a line at a time: that of the last point before it. */
@@ -107,24 +135,26 @@ const Series = (() => {
   }
 
   function drawing(data, channels, width) {
-    const step = HEIGHT + GAP + STRIP + 18, height = LABELS + channels.length * step + AXIS;
     const x = (t) => LEFT + ((t - data.start) / (data.end - data.start || 1)) * (width - LEFT - RIGHT);
+    const marks = placed(data, x, width), labels = 4 + LABEL * Math.max(1, ...marks.map(({ line }) => line + 1));
+    const step = HEIGHT + GAP + STRIP + 18, height = labels + channels.length * step + AXIS;
     const names = channels.map((c) => c.name).join(", ");
     const made = svg("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", class: "plot", "aria-label": `Golden and faulty run: ${names}` });
     channels.forEach((channel, i) => {
       const unit = channel.unit && channel.unit !== "-" ? ` [${channel.unit}]` : "";
       const largest = channel.largest ? `largest difference ${channel.largest}` : "no difference";
-      const g = svg("g", { transform: `translate(0,${LABELS + i * step + 12})` },
+      const axis = range(channel);
+      const g = svg("g", { transform: `translate(0,${labels + i * step + 12})` },
         svg("text", { x: LEFT, y: -4, class: "name" }, `${channel.name}${unit}`),
-        svg("text", { x: width - RIGHT, y: -4, "text-anchor": "end", class: "said" }, largest),
-        panel(channel, data, x, width));
+        svg("text", { x: width - RIGHT, y: -4, "text-anchor": "end", class: "said" }, axis.cut + largest),
+        panel(channel, data, x, width, axis));
       made.append(g);
     });
     for (const tick of ticks(data.start, data.end, Math.max(3, width / 110))) {
       made.append(svg("text", { x: x(tick), y: height - 8, "text-anchor": "middle" }, `${tick} s`));
     }
-    made.append(...marks(data, x, width, height));
-    const cursor = svg("line", { y1: LABELS, y2: height - AXIS, class: "cursor", visibility: "hidden" });
+    made.append(...marks.map((mark) => drawn(mark, labels, height)));
+    const cursor = svg("line", { y1: labels, y2: height - AXIS, class: "cursor", visibility: "hidden" });
     made.append(cursor);
     return { element: made, cursor, time: (px) => data.start + ((px - LEFT) / (width - LEFT - RIGHT)) * (data.end - data.start), x };
   }
