@@ -25,9 +25,9 @@ from markupsafe import Markup
 
 from mutator import report_browse, report_page, report_series, results, tables
 from mutator.columns import COLUMNS
+from mutator.diffs import readable
 from mutator.model import Experiment, Record
 from mutator.mutant import build
-from mutator.patch import readable
 from mutator.plan import make_plan
 from mutator.report import Content
 from mutator.report_browse import Browse

@@ -1,13 +1,11 @@
 """Patches: unified diffs, git style, written from the edits themselves; `patch -p1` applies them."""
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from mutator.splice import Piece
 
 _CONTEXT = 3
-_NEW_FILE = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
 _NO_NEWLINE = "\\ No newline at end of file\n"
 
 
@@ -82,12 +80,3 @@ def _name(path: str) -> str:
 def _line(sign: str, line: bytes) -> str:
     text = sign + line.decode("utf-8", "surrogateescape")
     return text if text.endswith("\n") else f"{text}\n{_NO_NEWLINE}"
-
-
-def readable(patch: str) -> tuple[str, str]:
-    """The patch without its new files, and a sentence on what was left out (empty if nothing was)."""
-    sections = re.split(r"^(?=diff --git )", patch, flags=re.MULTILINE)
-    kept = [s for s in sections if "\nnew file mode " not in s]
-    left_out = [m[1] for s in sections if s not in kept and (m := _NEW_FILE.search(s))]
-    note = f"not shown: {', '.join(left_out)}, the probe, which every mutant gets" if left_out else ""
-    return "".join(kept), note

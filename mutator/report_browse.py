@@ -19,10 +19,10 @@ from markupsafe import Markup
 
 from mutator import planfile, report_series
 from mutator.columns import type_of
+from mutator.diffs import readable
 from mutator.errors import MutatorError
 from mutator.ids import plain
 from mutator.model import Anchor, Experiment, Fault
-from mutator.patch import readable
 from mutator.review.groups import Shape, shapes
 from mutator.runfolder import RunFolder
 from mutator.tables import Row

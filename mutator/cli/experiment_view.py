@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.cli import choose
 from mutator.cli.console import STYLES, Terminal, short_path
+from mutator.diffs import readable
 from mutator.errors import MutatorError
-from mutator.patch import readable
 
 if TYPE_CHECKING:
     from mutator.manifest import TargetManifest

@@ -9,8 +9,8 @@ import typer
 from mutator.cli import choose
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
+from mutator.diffs import readable
 from mutator.errors import EXIT_HARNESS_ERRORS
-from mutator.patch import readable
 from mutator.wording import counted
 
 if TYPE_CHECKING:

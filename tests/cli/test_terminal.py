@@ -11,7 +11,7 @@ import pytest
 
 from mutator.cli.console import Terminal
 from mutator.cli.progress import campaign_progress, duration
-from mutator.patch import readable
+from mutator.diffs import readable
 from mutator.records import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
