@@ -21,6 +21,7 @@ from selfdrive.visiond.detector import LaneDetector, LaneLines, RoadLine
 # not picture_camera.py, which says what picture it is: what these do shows in the key, or comes after.
 SEEING = (
     "common/camera_model.py",
+    "common/compiled.py",
     "sim/detection_memory.py",
     "sim/effects/*.py",
     "sim/image_folder.py",
@@ -33,6 +34,7 @@ SEEING = (
     "sim/vision.py",
     "visiond/[!v]*.py",
     "visiond/voting.py",
+    "visiond/hog.c",
     "visiond/lane_net.npz",
 )
 # A line that carries this mark acts at some times and not at others, and whether it acted is counted: what

@@ -13,6 +13,7 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
+from selfdrive.common import compiled
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
@@ -72,6 +73,7 @@ def _open(options: argparse.Namespace) -> Run:
         scenario = on_plant(scenario, options.plant)
     if options.max_steps is not None:
         scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
+    compiled.use(None if options.forget else options.cache)
     simulator = Simulator()
     simulator.reset(scenario, options.seed, _pictures(options), options.film)
     return Run(simulator)
@@ -118,8 +120,12 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
     )
-    parser.add_argument("--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="rendered pictures")
-    parser.add_argument("--forget", action="store_true", help="look at every picture, also at known ones")
+    parser.add_argument(
+        "--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="pictures, compiled code"
+    )
+    parser.add_argument(
+        "--forget", action="store_true", help="take no detection and no compiled code from the cache"
+    )
     parser.add_argument("--film", type=Path, metavar="DIR", help="keep what the camera shows, to be watched")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 import selfdrive
+from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
@@ -103,8 +104,9 @@ def _detector(pictures: Pictures, library) -> LaneDetector:
         from selfdrive.visiond.paper_detector import PaperDetector as Detector
     else:
         from selfdrive.visiond.robust_detector import RobustDetector as Detector
-    detector = Detector(library.model)
     if pictures.forget or not sees_alike(Path(selfdrive.__path__[0])):
-        return detector
+        compiled.use(None)  # what acts at times acts in the Python code
+        return Detector(library.model)
     memory = DetectionMemory(cache_folder(pictures.cache))
-    return RememberingDetector(detector, (pictures.detector, library.model), memory)
+    made_of = (pictures.detector, library.model, compiled.in_use())
+    return RememberingDetector(Detector(library.model), made_of, memory)

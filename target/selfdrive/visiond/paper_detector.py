@@ -11,7 +11,7 @@ from selfdrive.messages import CameraView
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.edge_lines import EdgeLines
-from selfdrive.visiond.hog import FEATURES, Hog, windows
+from selfdrive.visiond.hog import FEATURES, build_hog, windows
 from selfdrive.visiond.lane_net import LaneNet
 from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
 from selfdrive.visiond.road_region import RoadRegion
@@ -28,7 +28,7 @@ class PaperDetector:
 
     def __init__(self, model: CameraModel) -> None:
         self._region = RoadRegion(model)
-        self._hog = Hog(*self._region.shape)
+        self._hog = build_hog(*self._region.shape)
         self._net = LaneNet.load()
         self._tile = tile_numbers(*self._region.shape)
         self._lines = EdgeLines(model, self._region)

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from selfdrive.common import compiled
+
 FEASIBILITY_TOL = 1e-3  # in the units of the bounds; DAQP may miss them by 1e-6 of its scaled rows
 STATIONARITY_TOL = 1e-6  # relative to the gradient
 LARGEST = 1e100  # square sum of a trajectory that still means something
@@ -115,7 +117,13 @@ def _linearise(
     return [(matrix[n] @ zu_k, matrix[n]) for n, zu_k in zip(kinds, zu, strict=True)]
 
 
-def _condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
+def integrators_of(ocp: Ocp) -> dict[int, ca.Function]:
+    """The integrator of each kind of interval, by its number of steps."""
+    step = _rk4(ocp)
+    return {n: _integrator(ocp, step, n) for n in dict.fromkeys(n for n, _ in ocp.intervals)}
+
+
+def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     """(trajectory, first state, p) -> the program in the change of the controls.
 
     Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their
@@ -148,6 +156,17 @@ def _condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     outputs = [ca.triu2symm(ca.horzcat(*columns[::-1])), ca.vertcat(*gradient[::-1]), states, derivative]
     # each intermediate value in a place of its own: sharing places saves memory but costs a tenth of the time
     return ca.Function("condense", [old, z0, p], outputs, {"live_variables": False})
+
+
+def _compiled(ocp: Ocp, function: ca.Function) -> ca.Function:
+    """The function, compiled where it is to be used and has been: its operations, in their order."""
+    library = compiled.library(ocp.name, made_of(function)) if compiled.in_use() else None
+    return ca.external(function.name(), str(library)) if library else function
+
+
+def made_of(function: ca.Function) -> bytes:
+    """Stands for all that the function calculates."""
+    return f"{ca.__version__} {function.serialize()}".encode()
 
 
 def _shifted(ocp: Ocp, integrate: ca.Function, new: ca.MX, p: ca.MX) -> ca.MX:
@@ -189,9 +208,8 @@ def build_solver(ocp: Ocp) -> ca.Function:
     n, nx = ocp.n_control, ocp.n_state
     old, z0 = ca.MX.sym("old", ocp.n_trajectory), ca.MX.sym("z0", nx)
     p = ca.MX.sym("p", ocp.n_param)
-    step = _rk4(ocp)
-    integrators = {k: _integrator(ocp, step, k) for k in dict.fromkeys(k for k, _ in ocp.intervals)}
-    hessian, gradient, states, derivative = _condense(ocp, integrators)(old, z0, p)
+    integrators = integrators_of(ocp)
+    hessian, gradient, states, derivative = _compiled(ocp, condense(ocp, integrators))(old, z0, p)
 
     bounded = [(nx * k + i, lo, hi) for k in range(1, n + 1) for i, lo, hi in ocp.state_bounds]
     index, low, high = (list(values) for values in zip(*bounded, strict=True))
