@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,11 +10,13 @@ from pathlib import Path
 
 import cv2
 import pytest
+from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.detection_memory import FILE
 from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond.hog import C_SOURCE
 
 from mutator import mutant
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
@@ -100,6 +103,17 @@ def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive, tmp_pa
     assert early[0] != late[0] and '"count": 14' in early[1] and '"count": 6' in late[1]
     assert [drive(place, time_s) for time_s in (0.3, 0.3, 0.7)] == [early, early, late]
     assert not (tmp_path / "cache" / FILE).exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+def test_a_fault_in_code_that_was_compiled_acts(drive: Drive, tmp_path: Path) -> None:
+    """Compiled helpers do not stand for a mutant of the code that they were made of."""
+    made_of = C_SOURCE.read_bytes()
+    compiled.make(tmp_path / "cache", "hog", made_of, made_of.decode(), lambda path: True)
+    place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
+    acted = drive(place, 0.3)
+    assert '"count": 14' in acted[1] and acted == drive(place, 0.3, "--forget")
 
 
 def test_a_fault_elsewhere_leaves_the_memory_in_use(drive: Drive, tmp_path: Path) -> None:

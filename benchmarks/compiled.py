@@ -1,0 +1,74 @@
+"""What compiled helpers save: runs of 30 s without and with them, in turn, whose traces must be the same.
+
+`python benchmarks/compiled.py [--rounds N] [--json FILE]`; it compiles them into a folder of its own first.
+CPU time of this process in one thread; medians, and the ratio of these. Exit code 1 where a trace differs.
+"""
+
+import argparse
+import json
+import statistics
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "target"))
+
+import cv2  # noqa: E402
+from selfdrive.common import compiled  # noqa: E402
+from selfdrive.sim.compile_helpers import compile_helpers  # noqa: E402
+from selfdrive.sim.detection_memory import FILE  # noqa: E402
+from selfdrive.sim.run import simulate  # noqa: E402
+from selfdrive.sim.scenario import load_scenario  # noqa: E402
+from selfdrive.sim.trace_file import pieces  # noqa: E402
+from selfdrive.sim.vision import DETECTORS, Pictures  # noqa: E402
+
+KINDS = (None, *DETECTORS)
+
+
+def run(kind: str | None, cache: Path, helpers: bool) -> tuple[float, bytes]:
+    """CPU seconds and the trace of one run whose pictures nobody has seen before."""
+    (cache / FILE).unlink(missing_ok=True)
+    compiled.use(cache if helpers else None)
+    pictures = Pictures(detector=kind, cache=cache) if kind else None
+    scenario = load_scenario(ROOT / "fault_library/scenarios/S1.yaml")
+    start = process_time()
+    result = simulate(scenario, 0, pictures)
+    return process_time() - start, b"".join(pieces(result.trace))
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--json", type=Path, help="file for the figures")
+    options = parser.parse_args()
+    cv2.setNumThreads(1)
+    figures, same = {}, True
+    with TemporaryDirectory() as folder:
+        cache = Path(folder)
+        for path in compile_helpers(cache):
+            print(path.name)
+        for kind in KINDS:
+            run(kind, cache, True)  # imports, frames
+            spent: dict[bool, list[float]] = {False: [], True: []}
+            for _ in range(options.rounds):
+                traces = set()
+                for helpers, times in spent.items():
+                    seconds, trace = run(kind, cache, helpers)
+                    times.append(seconds)
+                    traces.add(trace)
+                same &= len(traces) == 1
+            without, having = (statistics.median(times) for times in spent.values())
+            name = f"{kind} detector, nothing known" if kind else "without pictures"
+            figures[name] = {"without": spent[False], "with": spent[True]}
+            print(f"{name:34} {without:6.2f} s  compiled {having:6.2f} s  ratio {having / without:.2f}")
+    print("the same traces:", same)
+    if options.json:
+        options.json.write_text(json.dumps({"unit": "s", "runs": figures}, indent=1) + "\n")
+    return 0 if same else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
