@@ -4,8 +4,10 @@ A library lies in a folder of the cache under a digest of its C source and of ho
 was made of something else is never taken. `selfdrive.sim.compile_helpers` makes them; runs only look.
 """
 
+import ctypes
 import os
 import platform
+import shlex
 import subprocess
 from collections.abc import Callable
 from hashlib import sha256
@@ -39,11 +41,18 @@ def in_use() -> bool:
 
 
 def library(name: str, made_of: bytes) -> Path | None:
-    """The library `name` of what `made_of` stands for; None if there is none, or none is to be used."""
+    """The library `name` of what `made_of` stands for; None if there is none, or none is to be used.
+
+    One that cannot be loaded here, as it was made with another C library, is none.
+    """
     if _folder is None:
         return None
     path = _folder / _file(name, made_of)
-    return path if path.is_file() else None
+    try:
+        ctypes.CDLL(str(path))
+    except OSError:
+        return None
+    return path
 
 
 def make(cache: Path, name: str, made_of: bytes, source: str, exact: Callable[[Path], bool]) -> Path:
@@ -57,7 +66,7 @@ def make(cache: Path, name: str, made_of: bytes, source: str, exact: Callable[[P
         with TemporaryDirectory(dir=folder) as scratch:
             code, made = Path(scratch, f"{name}.c"), Path(scratch, f"{name}.so")
             code.write_text(source)
-            _run(os.environ.get("CC", "cc"), code, made)
+            _run(os.environ.get("CC") or "cc", code, made)
             if not exact(made):
                 raise ConfigError(
                     f"compiled, {name} gives other numbers",
@@ -70,7 +79,10 @@ def make(cache: Path, name: str, made_of: bytes, source: str, exact: Callable[[P
 def _run(compiler: str, code: Path, made: Path) -> None:
     try:
         subprocess.run(
-            [compiler, str(code), "-o", str(made), *OPTIONS], check=True, capture_output=True, text=True
+            [*shlex.split(compiler), str(code), "-o", str(made), *OPTIONS],
+            check=True,
+            capture_output=True,
+            text=True,
         )
     except FileNotFoundError:
         raise ConfigError(

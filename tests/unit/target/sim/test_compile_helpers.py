@@ -76,6 +76,14 @@ def test_a_library_is_found_only_for_what_it_was_made_of(hog_in):
     assert not compiled.in_use()
 
 
+def test_a_library_that_cannot_be_loaded_is_none(tmp_path, monkeypatch):
+    """The Python code calculates, as if nobody had compiled anything."""
+    monkeypatch.setattr(compile_helpers.compiled, "_run", lambda compiler, code, made: made.write_text("?"))
+    compiled.make(tmp_path, "hog", C_SOURCE.read_bytes(), "", lambda path: True)
+    compiled.use(tmp_path)
+    assert compiled.in_use() and type(build_hog(112, 480)) is Hog
+
+
 def test_without_a_compiler_it_says_so_and_leaves_nothing(tmp_path, monkeypatch, capsys):
     """The message names the compiler, what was expected and the remedy; exit code 2."""
     monkeypatch.setenv("CC", "no-such-compiler")
