@@ -34,7 +34,8 @@ NOTES = """\
 could not be made, is counted apart. *Activated*: an injected statement ran while triggered. *Manifested*: an
 actuator output then differed from the fault-free run. *Hazard, no alert*: no counted alert at all."""
 
-_TAG = re.compile(r"<(?=[A-Za-z/!?])")
+# What Markdown would take for an element, for italics or for bold; not in `code`, where nothing is taken so.
+_MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-9])_+|_+(?![A-Za-z0-9])")
 
 
 def markdown(content: "Content") -> str:
@@ -90,8 +91,16 @@ def _failed_text(content: "Content") -> str:
 
 def markdown_line(text: str) -> str:
     """A text as one line of Markdown: the `<class 'float'>` of a message is no element, which would not be
-    seen."""
-    return _TAG.sub("&lt;", " ".join(text.splitlines()))
+    seen, and an `__init__` is not bold."""
+    return _MARKUP.sub(_plain, " ".join(text.splitlines()))
+
+
+def _plain(found: re.Match[str]) -> str:
+    """Markup as the characters that it is made of."""
+    text = found[0]
+    if text[0] == "`":
+        return text
+    return "&lt;" if text == "<" else "".join("\\" + character for character in text)
 
 
 def markdown_table(heads: list[str], lines: list[list[str]]) -> str:

@@ -20,9 +20,8 @@ _MEASURES = (
     ("alerts_no_hazards", "activated"),
 )
 _WORDS = {"hazards_no_alerts": "hazards without alert", "alerts_no_hazards": "alerts without hazard"}
-_NOTE = (
-    "95 % Wilson intervals; in brackets count/whole. The paper's counts are cited, their intervals are ours."
-)
+_NOTE = "95 % Wilson intervals; in brackets count/whole."
+_CITED = f"{_NOTE} The paper's counts are cited, their intervals are ours."
 
 
 def summary_sheet(method: str, ours: Counts, paper: Paper | None) -> Sheet:
@@ -36,8 +35,8 @@ def summary_sheet(method: str, ours: Counts, paper: Paper | None) -> Sheet:
             lines.append((_WORDS.get(part, part), whole, source, *cells))
     return Sheet(
         name=f"summary_{method}",
-        title=f"Summary by scenario, {method} (the paper's table II)",
-        note=f"{_NOTE} The total is of the scenarios shown.",
+        title=f"Summary by scenario, {method}" + (" (the paper's table II)" if paper else ""),
+        note=f"{_CITED if paper else _NOTE} The total is of the scenarios shown.",
         heads=("what", "of", "from", *scenarios, "total"),
         lines=tuple(lines),
     )
@@ -57,8 +56,10 @@ def coverage_sheet(method: str, ours: Counts, paper: Paper | None) -> Sheet:
             lines.append((kind, source, *cells))
     return Sheet(
         name=f"coverage_{method}",
-        title=f"Hazard coverage by fault type, {method} (the paper's table III)",
-        note=f"{_NOTE} The paper divides by activated faults; hazards/injected is what experiments yield.",
+        title=f"Hazard coverage by fault type, {method}" + (" (the paper's table III)" if paper else ""),
+        note=f"{_CITED} The paper divides by activated faults; hazards/injected is what experiments yield."
+        if paper
+        else _NOTE,
         heads=("fault type", "from", "activated/injected", "hazards/activated", "hazards/injected"),
         lines=tuple(lines),
     )

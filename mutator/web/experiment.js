@@ -105,7 +105,7 @@ class Experiment {
   #commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
-    return el("div", {}, el("p", {}, "Drive it again and compare it with its record; then watch it step by step:"),
+    return el("div", {}, el("p", {}, "Drive it again and compare it with its record; see its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`),
       el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try()));
   }

@@ -11,18 +11,18 @@ class Grid {
     { name: "kind", title: "fault type", px: 196, narrow: true },
     { name: "variant", title: "variant", px: 86 },
     { name: "value", title: "value", px: 78, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
-    { name: "scenario", title: "scenario", px: 76, narrow: true },
+    { name: "scenario", title: "scenario", px: 80, narrow: true },
     { name: "method", title: "method", px: 74 },
     { name: "trigger", title: "trigger", px: 86 },
     { name: "ending", title: "outcome", px: 112, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "t_activation", title: "activated", px: 76, time: true },
-    { name: "t_manifest", title: "manifested", px: 86, time: true },
+    { name: "t_activation", title: "activated", px: 86, time: true },
+    { name: "t_manifest", title: "manifested", px: 100, time: true },
     { name: "hazards", title: "hazards", px: 72 },
-    { name: "t_hazard", title: "hazard at", px: 80, time: true },
+    { name: "t_hazard", title: "hazard at", px: 88, time: true },
     { name: "alerts", title: "alerts", px: 108, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
     { name: "t_alert", title: "alert at", px: 70, time: true },
     { name: "reaction_time", title: "reaction", px: 74, time: true },
-    { name: "experiment_id", title: "experiment", px: 80, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
+    { name: "experiment_id", title: "experiment", px: 100, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
   ];
 
   /** How an experiment ended, as a word on its colour. */
@@ -32,6 +32,7 @@ class Grid {
 
   constructor(place, table, state) {
     this.place = place;
+    place.style.setProperty("--rows", table.count); // a short table has a low window
     this.table = table;
     this.state = state;
     this.rows = [];

@@ -227,7 +227,17 @@ def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path
     page.wait_for_selector("#experiment .diff")
     assert page.evaluate("document.querySelector('#experiment').clientWidth") == 400
     assert page.evaluate("document.querySelector('#experiment').scrollWidth") == 400
+    page.eval_on_selector("#experiment .events td:last-child", "td => (td.textContent = 'alert'.repeat(20))")
+    assert page.evaluate("document.querySelector('#experiment').scrollWidth") == 400
     context.close()
+
+
+def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:
+    """No title of a column is cut; beneath the last row of a table that has few there is next to nothing."""
+    cut = "all => all.filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
+    assert page.page.eval_on_selector_all("#grid thead button", cut) == []
+    page.page.evaluate("document.querySelector('#grid').style.setProperty('--rows', 3)")
+    assert page.page.evaluate("document.querySelector('#grid').clientHeight") < 32 + 5 * 30
 
 
 def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:

@@ -95,9 +95,11 @@ def test_coverage_has_both_denominators(paper: Paper) -> None:
 
 
 def test_a_table_without_the_paper_has_only_ours() -> None:
-    """Fault types that the paper does not know make a table without empty lines."""
-    sheet = coverage_sheet("guided", by_kind(results(HIT)), None)
-    assert [line[1] for line in sheet.lines] == ["here", "here"]
+    """Fault types that the paper does not know make tables without empty lines, which do not speak of it."""
+    coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
+    assert [line[1] for line in coverage.lines] == ["here", "here"]
+    summary = summary_sheet("guided", by_scenario(results(HIT)), None)
+    assert "paper" not in coverage.markdown() + summary.markdown()
 
 
 def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
