@@ -24,7 +24,7 @@ from mutator import engines, proof, results
 from mutator.checks import run_checks
 from mutator.chunks import Pending, pending
 from mutator.engine import prepare_base
-from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.frozen import frozen
 from mutator.interrupts import terminable
 from mutator.jsonio import DiskFull, is_half_written
@@ -192,11 +192,17 @@ def session(
     notify: Notify | None = None,
 ) -> Iterator[Session]:
     """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
+    is_new = not out.exists()
     make_run_folder(out)
     with terminable(), owned(out):
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
-        folder = frozen(workspace, campaign, out, choices, reviewed=reviewed)
+        try:
+            folder = frozen(workspace, campaign, out, choices, reviewed=reviewed)
+        except MutatorError:
+            if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is left
+                shutil.rmtree(out, ignore_errors=True)
+            raise
         shutil.rmtree(folder.work, ignore_errors=True)
         # not everywhere: there may be thousands of patches
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))

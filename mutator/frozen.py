@@ -52,7 +52,8 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
             raise MutatorError(
                 f"--{name} {value}",
                 where=out,
-                expected=f"what this run was planned with ({name} {frozen})",
+                expected="what this run was planned with: "
+                + (f"no --{name}" if frozen is None else f"--{name} {frozen}"),
                 remedy=f"leave --{name} away, or use another folder",
             )
     scenarios = {scenario for scenario, _ in head["goldens"]}

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import traceback
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -218,7 +219,8 @@ class PlainController(Controller):
         except MutatorError as err:
             self._open.close()
             self.begun = None
-            pytest.exit(str(err), returncode=err.exit_code)
+            print(err, file=sys.stderr)  # pytest tells the reason of an exit twice
+            pytest.exit("no campaign was run", returncode=err.exit_code)
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:

@@ -52,6 +52,9 @@ def _asked(terminal: Terminal, where: str) -> str:
     choices = "  ".join(f"[{key}] {word}" for key, word in KEYS.items())
     while True:
         terminal.say(f"{where}:  {choices}", style="bold")
-        key = typer.getchar().lower()
+        try:
+            key = typer.getchar().lower()
+        except EOFError:  # Ctrl-D
+            return "q"
         if key in KEYS:
             return key

@@ -173,6 +173,21 @@ def test_a_walk_asks_group_by_group(
     assert f"group {first}" not in again
 
 
+def test_a_walk_ends_with_the_input(
+    cli: Cli, root: Path, keys: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-D is an answer as good as q: nothing is decided, and nothing is wrong."""
+
+    def over() -> str:
+        raise EOFError
+
+    keys("")
+    monkeypatch.setattr(typer, "getchar", over)
+    answer = cli("review", "walk", *JANE)
+    assert (answer.code, answer.err) == (0, "")
+    assert {group["state"] for group in cli("review", "--json").json} == {"new"}
+
+
 def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]) -> None:
     """Groups, states, diffs, values and options are in one file that needs no other; twice the same."""
     out = tmp_path / "review.html"

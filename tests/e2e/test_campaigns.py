@@ -239,6 +239,17 @@ def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) ->
     assert (summary.exit_code, summary.done) == (0, 2)
 
 
+def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path) -> None:
+    """A mistake in the campaign, or no approval, leaves nothing behind; a folder that was there stays."""
+    (tmp_path / "old").mkdir()
+    for out in (tmp_path / "new", tmp_path / "old"):
+        with pytest.raises(MutatorError, match="no campaign"):
+            campaign_run.run(toy, "nosuch", out)
+        with pytest.raises(MutatorError, match="not approved"):
+            campaign_run.run(toy, "small", out, reviewed=True)
+    assert [path.name for path in tmp_path.iterdir() if path.name in ("new", "old")] == ["old"]
+
+
 def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
     """A run goes on without saying its choices again; other ones, or another text, are refused."""
     assert campaign_run.run(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
@@ -248,8 +259,9 @@ def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
         Choices(only="value > 1"),
         Choices(reading="as_coded"),
     ):
-        with pytest.raises(MutatorError, match="planned with"):
+        with pytest.raises(MutatorError, match="planned with") as caught:
             campaign_run.run(toy, "small", finished, choices=choices)
+        assert "None" not in str(caught.value)
     with pytest.raises(MutatorError, match="another text"):
         campaign_run.run(toy, "toy", finished)
     assert campaign_run.run(toy, finished / "campaign.yaml", finished).exit_code == 0
@@ -287,7 +299,7 @@ def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int,
     (toy.library / "campaigns" / "unarmed.yaml").write_text(text)
     answer = pytest_campaign(toy, *words)
     assert answer.returncode == code, answer.stdout + answer.stderr
-    assert told in answer.stdout + answer.stderr
+    assert (answer.stdout + answer.stderr).count(told) == 1
     assert "Traceback" not in answer.stdout + answer.stderr
 
 
