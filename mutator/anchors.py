@@ -192,7 +192,7 @@ def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function,
             where=file.where,
             line=functions[0].line + 1,
             expected=f"one of those at {places}",
-            remedy="add `nth: 1` to `nth: " + str(len(functions)) + "`",
+            remedy=f"give `nth`, from 1 to {len(functions)}",
         )
     function = functions[(nth or 1) - 1]
     if function.entry is None:
@@ -241,9 +241,9 @@ def _no_single_hit(
     what, place = _what(verb, anchor.name), f"in {location.function}"
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
-        take = f"`nth: 1` to `nth: {len(hits)}`" if len(hits) > 1 else "`nth: 1`, or leave it out"
+        take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
         got = f"{what} matches {len(hits)} statements {place}: lines {lines}"
-        remedy = f"add {take}" if anchor.nth is None else f"nth is {anchor.nth}: take {take}"
+        remedy = f"give `nth`, {take}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {take}"
         line, expected = hits[0][1].first, "exactly one"
     elif pairs:
         statement = pairs[0][1]

@@ -72,11 +72,12 @@ class _Resolver:
         schema = self.model.param(param.name)
         if schema is None or schema.type == "seed":
             known = [p for p in self.model.params if p.type != "seed"]
+            names = [key for p in known for key in self.keys(p)]
             raise self.source.error(
                 param.keys,
                 f"unknown parameter '{param.key}' of model {self.model.name}",
                 expected=f"one of {', '.join(map(self.key, known)) or 'none'}",
-                remedy="correct or remove it" + suggestion(param.name, [p.name for p in known]),
+                remedy="correct or remove it" + suggestion(param.key, names),
             )
         unit = self.unit(schema)
         given = units.UNITS[param.unit] if param.unit else None
@@ -89,13 +90,17 @@ class _Resolver:
             )
         return schema
 
-    def key(self, schema: ParamSchema) -> str:
-        """How a parameter is written: with the suffixes that fit."""
+    def keys(self, schema: ParamSchema) -> list[str]:
+        """How a parameter may be written: with each suffix that fits."""
         unit = self.unit(schema)
         if unit is None:
-            return f"`{schema.name}`"
+            return [schema.name]
         fitting = [u.suffix for u in units.UNITS.values() if u.dimension == unit.dimension]
-        return " or ".join(f"`{schema.name}_{suffix}`" for suffix in fitting)
+        return [f"{schema.name}_{suffix}" for suffix in fitting]
+
+    def key(self, schema: ParamSchema) -> str:
+        """`keys` in an error."""
+        return " or ".join(f"`{key}`" for key in self.keys(schema))
 
     def unit(self, schema: ParamSchema) -> units.Unit | None:
         """The unit in which the template takes the parameter."""

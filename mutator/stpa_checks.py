@@ -250,10 +250,11 @@ def injected(spec: FaultSpec) -> set[str]:
 
 def _unreached(analysis: Analysis, specs: tuple[FaultSpec, ...]) -> Iterator[MutatorError]:
     reached = {fault for factor in analysis.factors.values() for fault in factor.faults}
+    path = analysis.factors_source.path
     for spec in specs:
         if spec.name not in reached:
             yield spec.source.error(
                 (),
                 f"fault spec '{spec.name}' stands for no causal factor",
-                remedy=f"name it in {analysis.factors_source.path.name}",
+                remedy=f"name it in {path.parent.name}/{path.name}",
             )

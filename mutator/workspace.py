@@ -77,7 +77,7 @@ class Workspace:
                 raise spec.source.error(
                     ("module",),
                     f"module '{spec.module}', fault_type '{spec.fault_type}'",
-                    expected=f"the file at {expected}",
+                    expected=f"the file at {expected.relative_to(self.library)} in the library",
                     remedy="move the file or correct the names",
                 )
         return specs

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mutator import shape_errors
 from mutator.errors import MutatorError
+from mutator.wording import counted
 
 Keys = tuple[str | int, ...]
 M = TypeVar("M", bound="StrictModel")
@@ -197,7 +198,7 @@ def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
         problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
         got, expected, remedy, keys = shape_errors.explain(problems[0], model)
         if len(problems) > 1:
-            remedy += f" ({len(problems) - 1} more after this one)"
+            remedy += f" ({counted(len(problems) - 1, 'more mistake')} after this one)"
         raise source.error(keys, got, expected=expected, remedy=remedy) from None
 
 

@@ -24,6 +24,7 @@ from mutator.cli.options import (
 )
 from mutator.cli.progress import duration
 from mutator.cli.run_folders import show_counts
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.campaign_run import Summary
@@ -116,9 +117,8 @@ def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:
 def _cost_line(cost: "Cost") -> str:
     source = "measured in this folder" if cost.measured else "from a default rate, nothing measured yet"
     time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
-    return (
-        f"{time} with {cost.workers} workers ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
-    )
+    who = counted(cost.workers, "worker")
+    return f"{time} with {who} ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
 
 
 RUN_EXAMPLES = """\b

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,6 +11,8 @@ from mutator.cli.choose import context_tables, target_name
 from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
+from mutator.wording import counted
+from mutator.yamlio import load
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -71,13 +74,21 @@ def _specs(workspace: "Workspace") -> Table:
 
 
 def _scenarios(workspace: "Workspace") -> Table:
-    rows = [{"name": n, "file": short_path(workspace.scenario(n))} for n in workspace.scenario_names()]
-    return ["name", "file"], rows
+    return _files({name: workspace.scenario(name) for name in workspace.scenario_names()}, "title")
 
 
 def _campaigns(workspace: "Workspace") -> Table:
-    rows = [{"name": n, "file": short_path(workspace.campaign(n))} for n in workspace.campaign_names()]
-    return ["name", "file"], rows
+    return _files({name: workspace.campaign(name) for name in workspace.campaign_names()}, "about")
+
+
+def _files(files: dict[str, Path], told: str) -> Table:
+    """Files of the library by name, with what their key `told` says of them, where they have one."""
+    rows: list[dict[str, Any]] = []
+    for name, path in files.items():
+        data = load(path).data
+        about = data.get(told, "") if isinstance(data, dict) else ""
+        rows.append({"name": name, "file": short_path(path), "about": _line(str(about))})
+    return ["name", "file", "about"], rows
 
 
 def _models(workspace: "Workspace") -> Table:
@@ -149,7 +160,7 @@ def check(
     for problem in problems:
         terminal.say(told(problem), style="red")
     if problems:
-        terminal.say(f"{len(problems)} problem(s)", style="bold red")
+        terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = sum(spec.count for spec in workspace.specs())
     terminal.say(

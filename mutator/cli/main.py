@@ -139,7 +139,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _usage(error: typer.TyperException) -> int:
     ctx = getattr(error, "ctx", None)
     remedy = f"see `{ctx.command_path} --help`" if ctx else "see `mutator --help`"
-    message = error.format_message().rstrip(".")
+    message = error.format_message().rstrip(".").replace("Value error, ", "")
     if message:
         show_error(MutatorError(message, remedy=remedy))
     return EXIT_WRONG_INPUT

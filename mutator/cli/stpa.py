@@ -10,6 +10,7 @@ from mutator.cli.choose import target_name
 from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
+from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.stpa import ContextTable
@@ -68,7 +69,7 @@ def stpa(
     for problem in problems:
         terminal.say(told(problem), style="red")
     if problems:
-        terminal.say(f"{len(problems)} problem(s)", style="bold red")
+        terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = {fault for factor in analysis.factors.values() for fault in factor.faults}
     terminal.say(

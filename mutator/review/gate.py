@@ -52,7 +52,7 @@ def told(run: Path) -> str:
 
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {review.state(group)}, {group.runs} experiment{'s' * (group.runs != 1)}: {group.what}"
+        f"  {group.id}  {review.state(group)}, {_of(group)}: {group.what}"
         for group in review.in_turn(refused)
     ]
     many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
@@ -65,6 +65,11 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
         expected="an approval of each, as it is now",
         remedy=f"look: `mutator review {wanted}`; approve: `mutator review approve {ids} {wanted} --by NAME`",
     )
+
+
+def _of(group: Group) -> str:
+    """What of a campaign a group is: so many experiments, or the canary alone."""
+    return counted(group.runs, "experiment") if group.runs else "the canary"
 
 
 def _name(workspace: Workspace, plan: Plan) -> str:

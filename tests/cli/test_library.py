@@ -27,6 +27,15 @@ def test_list_as_json_is_the_same_for_programs(cli: Cli, root: Path) -> None:
         ("sensor/silence", 1),
     ]
     assert cli("list", "triggers", "--json").json == {"triggers": listed["triggers"]}
+    assert all(one["about"] for one in listed["campaigns"])
+
+
+def test_a_kind_that_is_none_is_answered(cli: Cli, root: Path) -> None:
+    """The kinds there are, in words of ours alone."""
+    answer = cli("list", "nothing")
+    assert answer.code == 2
+    assert "'nothing' is not one of 'specs', 'scenarios'" in answer.err
+    assert "Value error" not in answer.err
 
 
 def test_a_piped_table_has_no_control_characters(cli: Cli, root: Path) -> None:

@@ -111,7 +111,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "params: {by_m: error}",
             "params: {by_m: error, bye_m: 3}",
             "17: unknown parameter 'bye_m' of model offset; expected one of `target`, `by_m`, "
-            "`low_m`, `high_m`; correct or remove it; did you mean 'by'?",
+            "`low_m`, `high_m`; correct or remove it; did you mean 'by_m'?",
         ),
         (
             "params: {by_m: error}",

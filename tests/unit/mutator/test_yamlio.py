@@ -128,5 +128,5 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 def test_several_mistakes_are_counted(tmp_path: Path) -> None:
     """The first is shown, and how many more there are."""
-    with pytest.raises(MutatorError, match="1 more after this one"):
+    with pytest.raises(MutatorError, match="1 more mistake after this one"):
         read(tmp_path, "schema: car/2\nname: 1\ntags: 2\n")

@@ -53,6 +53,15 @@ def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
     assert caught.value.exit_code == 1
 
 
+def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Plan) -> None:
+    """A group that none of the experiments is of is not told with a number of them."""
+    alone = [group for group in of_plan(toycar, plan) if not group.runs]
+    with pytest.raises(CheckFailed) as caught:
+        gate.approvals(toycar, plan)
+    assert alone
+    assert all(f"{group.id}  new, the canary: " in caught.value.got for group in alone)
+
+
 def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:
     """A campaign that the library does not have under that name, or has with another text."""
     mine = tmp_path / "my own.yaml"
