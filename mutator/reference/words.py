@@ -153,7 +153,7 @@ ABOUT = {
     "Triggers.table": "A context table, by its name.",
     "Triggers.rows": "Which of its contexts; without it, all.",
     "Triggers.armed_after_s": "Before that time no trigger fires and no random time is drawn.",
-    "Triggers.random_until_s": "The latest random time.",
+    "Triggers.random_until_s": "The latest random time. One past the end of a scenario never comes.",
     "Triggers.hold_s": "How long a fault stays active once triggered; without it, while its context "
     "holds, or "
     "from its random time to the end.",
