@@ -107,6 +107,6 @@ def _detector(pictures: Pictures, library) -> LaneDetector:
     if pictures.forget or not sees_alike(Path(selfdrive.__path__[0])):
         compiled.use(None)  # what acts at times acts in the Python code
         return Detector(library.model)
-    memory = DetectionMemory(cache_folder(pictures.cache))
-    made_of = (pictures.detector, library.model, compiled.in_use())
-    return RememberingDetector(Detector(library.model), made_of, memory)
+    detector, memory = Detector(library.model), DetectionMemory(cache_folder(pictures.cache))
+    made_of = (pictures.detector, library.model, detector.calculated_by)
+    return RememberingDetector(detector, made_of, memory)

@@ -5,16 +5,11 @@ with its gradient's length for the one orientation it falls into. Detection wind
 their cells and blocks, so these are computed once.
 """
 
-import ctypes
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 
-from selfdrive.common import compiled
-
-C_SOURCE = Path(__file__).with_name("hog.c")
 CELL = 4  # pixels
 BINS = 9
 WINDOW = 32  # pixels
@@ -55,7 +50,10 @@ class Hog:
     """Computes the blocks of pictures of one size, whose sides are multiples of a cell's.
 
     Its memory is used again for each picture: to get it anew each time takes as long as to calculate.
+    `calculated_by` tells apart what calculates the same in another way.
     """
+
+    calculated_by = ""
 
     def __init__(self, rows: int, width: int) -> None:
         self._cells = rows // CELL, width // CELL
@@ -90,40 +88,6 @@ class Hog:
         down, right, one = cells.strides
         pairs = np.lib.stride_tricks.as_strided(cells, (*scale.shape, 2, 2 * BINS), (down, right, down, one))
         np.multiply(pairs, scale[:, :, np.newaxis, np.newaxis], out=self._blocks)
-
-
-class CompiledHog(Hog):
-    """The same with its slow steps in C: `library` is `hog.c`, compiled."""
-
-    def __init__(self, rows: int, width: int, library: Path) -> None:
-        super().__init__(rows, width)
-        code, pointer = ctypes.CDLL(str(library)), ctypes.c_void_p
-        self._c_votes, self._c_blocks = code.votes, code.blocks
-        self._c_votes.argtypes = [pointer, ctypes.c_long, ctypes.c_long, *[pointer] * 4]
-        self._c_blocks.argtypes = [pointer, pointer, ctypes.c_long, ctypes.c_long, pointer]
-        self._c_votes.restype = self._c_blocks.restype = None
-        self._size = rows, width
-        self._sums = np.empty(self._cells[1] * BINS)
-        self._cell_votes = np.empty((*self._cells, BINS), np.float32)
-
-    def _votes(self, picture: np.ndarray) -> np.ndarray:
-        picture = np.ascontiguousarray(picture, np.uint8)
-        if picture.shape != self._size:
-            raise ValueError(f"a picture of {picture.shape}, expected {self._size}")
-        tables, cells = self._tables, self._cell_votes
-        arrays = (tables.orientation, tables.length, self._sums, cells)
-        self._c_votes(picture.ctypes.data, *self._size, *[array.ctypes.data for array in arrays])
-        return cells
-
-    def _scaled(self, cells: np.ndarray, scale: np.ndarray) -> None:
-        scale = np.ascontiguousarray(scale)
-        self._c_blocks(cells.ctypes.data, scale.ctypes.data, *scale.shape, self._blocks.ctypes.data)
-
-
-def build_hog(rows: int, width: int) -> Hog:
-    """A Hog, compiled where it is to be used and has been."""
-    library = compiled.library(C_SOURCE.stem, C_SOURCE.read_bytes()) if compiled.in_use() else None
-    return CompiledHog(rows, width, library) if library else Hog(rows, width)
 
 
 def windows(blocks: np.ndarray) -> np.ndarray:

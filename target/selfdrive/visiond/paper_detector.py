@@ -8,10 +8,11 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
+from selfdrive.visiond.compiled_hog import build_hog
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.edge_lines import EdgeLines
-from selfdrive.visiond.hog import FEATURES, build_hog, windows
+from selfdrive.visiond.hog import FEATURES, windows
 from selfdrive.visiond.lane_net import LaneNet
 from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
 from selfdrive.visiond.road_region import RoadRegion
@@ -22,13 +23,17 @@ NEED = 2  # marked windows of the four that share a tile
 
 
 class PaperDetector:
-    """Looks at pictures of one camera; remembers none of them."""
+    """Looks at pictures of one camera; remembers none of them.
+
+    `calculated_by` tells which compiled code it calculates with, if any.
+    """
 
     state: tuple[float, ...] = ()  # nothing is remembered
 
     def __init__(self, model: CameraModel) -> None:
         self._region = RoadRegion(model)
         self._hog = build_hog(*self._region.shape)
+        self.calculated_by = self._hog.calculated_by
         self._net = LaneNet.load()
         self._tile = tile_numbers(*self._region.shape)
         self._lines = EdgeLines(model, self._region)

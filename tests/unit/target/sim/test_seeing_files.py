@@ -10,13 +10,13 @@ from pathlib import Path
 
 import cv2
 import pytest
-from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim import compile_helpers
 from selfdrive.sim.detection_memory import FILE
 from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond.hog import C_SOURCE
+from selfdrive.visiond.compiled_hog import C_SOURCE, made_of
 
 from mutator import mutant
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
@@ -106,11 +106,10 @@ def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive, tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+@pytest.mark.skipif(shutil.which(compile_helpers.compiler()[0]) is None, reason="there is no C compiler")
 def test_a_fault_in_code_that_was_compiled_acts(drive: Drive, tmp_path: Path) -> None:
     """Compiled helpers do not stand for a mutant of the code that they were made of."""
-    made_of = C_SOURCE.read_bytes()
-    compiled.make(tmp_path / "cache", "hog", made_of, made_of.decode(), lambda path: True)
+    compile_helpers.make(tmp_path / "cache", "hog", made_of(), C_SOURCE.read_text(), lambda library: True)
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
     acted = drive(place, 0.3)
     assert '"count": 14' in acted[1] and acted == drive(place, 0.3, "--forget")
