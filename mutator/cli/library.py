@@ -12,7 +12,6 @@ from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 from mutator.wording import counted
-from mutator.yamlio import load
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -83,6 +82,8 @@ def _campaigns(workspace: "Workspace") -> Table:
 
 def _files(files: dict[str, Path], told: str) -> Table:
     """Files of the library by name, with what their key `told` says of them, where they have one."""
+    from mutator.yamlio import load
+
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
         data = load(path).data
