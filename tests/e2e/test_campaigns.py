@@ -1,16 +1,12 @@
 """Campaigns on a foreign target from the first command to the table: what a user meets."""
 
 import csv
-import json
 import os
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -20,7 +16,6 @@ from mutator.engine import Execution, Job, ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Status
 from mutator.plan import Choices
-from mutator.pytest_campaign import Controller
 from mutator.records import Progress
 from mutator.single import rerun, run_single
 from mutator.worker import Worker
@@ -35,19 +30,6 @@ def rows_of(out: Path) -> list[dict[str, str]]:
 
 def contents(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
-
-
-def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProcess[str]":
-    """Run pytest as a user would, in the toy's folder."""
-    plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
-    return subprocess.run(
-        [sys.executable, *plain, *map(str, words)],
-        env=os.environ | {"MUTATOR_ROOT": str(toy.library.parent)},
-        cwd=toy.library.parent,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
 
 
 @pytest.fixture(scope="module")
@@ -275,86 +257,6 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
         campaign_run.run(toy, "small", finished)
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
         rerun(toy, finished, rows_of(finished)[0]["experiment_id"])
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "told"),
-    [
-        (["--campaign", "small"], 4, "--campaign needs --campaign-out DIR"),
-        (["--campaign-out", "out"], 4, "--campaign-out without --campaign"),
-        (["--require-reviewed"], 4, "--require-reviewed without --campaign"),
-        (["--campaign", "small", "--campaign-out", "out", "--require-reviewed"], 1, "not approved"),
-        (["--campaign", "nosuch", "--campaign-out", "out"], 2, "no campaign 'nosuch'"),
-        (["--campaign", "small", "--campaign-out", "tree"], 2, "no run folder, and not empty (toycar)"),
-        (["--campaign", "small", "--campaign-out", "newer", "-n", "2"], 2, "written by a newer mutator"),
-        (["--campaign", "unarmed", "--campaign-out", "out", "-n", "2"], 1, "canary: did not reach H3"),
-    ],
-)
-def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int, told: str) -> None:
-    """Called as pytest, a mistake is answered in words, with the exit code of its kind and no traceback."""
-    root = toy.library.parent
-    (root / "newer").mkdir()
-    (root / "newer" / "run.json").write_text(json.dumps({"schema": "run/99"}))
-    text = toy.campaign("small").read_text().replace("at_s: 1.0", "at_s: 5.9")
-    (toy.library / "campaigns" / "unarmed.yaml").write_text(text)
-    answer = pytest_campaign(toy, *words)
-    assert answer.returncode == code, answer.stdout + answer.stderr
-    assert (answer.stdout + answer.stderr).count(told) == 1
-    assert "Traceback" not in answer.stdout + answer.stderr
-
-
-def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
-    """The plugin does nothing, and imports nothing of the harness, when no campaign is asked for."""
-    test = "import sys\n\ndef test_it():\n    assert 'mutator.campaign_run' not in sys.modules\n"
-    (toy.library.parent / "test_it.py").write_text(test)
-    answer = pytest_campaign(toy, "test_it.py")
-    assert "1 passed" in answer.stdout
-    assert "experiments" not in answer.stdout
-
-
-def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
-    """Without xdist the same items run in the command's own process; a finished run has nothing to do."""
-    words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
-    answer = pytest_campaign(toy, *words)
-    assert answer.returncode == 0, answer.stdout
-    assert "6 passed" in answer.stdout
-    assert "12 of 12 experiments done, 12 now" in answer.stdout
-    again = pytest_campaign(toy, *words, "-n", "2")
-    assert again.returncode == 0, again.stdout
-    assert "12 of 12 experiments done, 0 now" in again.stdout
-
-
-class Counting:
-    """Pytest plugin: what was collected, and when."""
-
-    def __init__(self) -> None:
-        self.items = 0
-        self.seconds = 0.0
-        self._began = time.monotonic()
-
-    def pytest_collection_finish(self, session: pytest.Session) -> None:
-        self.items = len(session.items)
-        self.seconds = time.monotonic() - self._began
-
-
-def test_collecting_50000_experiments_is_cheap(toy: Workspace, tmp_path: Path) -> None:
-    """2,500 chunks are collected in a moment, and without opening plan, target or library."""
-    begun: Any = SimpleNamespace(
-        folder=SimpleNamespace(path=tmp_path / "nowhere"),
-        workspace=Workspace(library=tmp_path / "nowhere", templates=tmp_path / "nowhere"),
-        pending=tuple(Pending(chunk, tuple(range(20))) for chunk in range(2500)),
-        proof=(),
-        engine="reference",
-        worker_name=lambda name: name,
-        problem="",
-        interrupted=False,
-    )
-    words = ["--campaign", "x", "--campaign-out", str(tmp_path), "--collect-only", "-qq", "--noconftest"]
-    alone = ["-c", os.devnull, "-p", "no:cacheprovider", "--disable-plugin-autoload", "-p", "mutator"]
-    counting = Counting()
-    pytest.main([*words, *alone], plugins=[Controller(begun), counting])
-    assert counting.items == 2500
-    assert counting.seconds < 5.0
 
 
 FULL_DISK = """
