@@ -5,6 +5,7 @@ something else is never taken. `selfdrive.sim.compile_helpers` makes them; runs 
 """
 
 import ctypes
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
@@ -34,19 +35,15 @@ def use(cache: Path | None) -> None:
             return
 
 
-def in_use() -> bool:
-    """Whether there may be a library: only then is it worth while to find out what it would be made of."""
-    return _folder is not None
-
-
-def library(name: str, made_of: bytes) -> Library | None:
+def library(name: str, made_of: Callable[[], bytes]) -> Library | None:
     """The library `name` of what `made_of` stands for; None if there is none, or none is to be used.
 
-    One that is damaged, or cannot be loaded here as it was made with another C library, is none.
+    `made_of` is asked only where there may be one. One that is damaged, or cannot be loaded here as it was
+    made with another C library, is none.
     """
     if _folder is None:
         return None
-    path = _folder / file_name(name, made_of)
+    path = _folder / file_name(name, made_of())
     try:
         data = path.read_bytes()
         digest = sha256(data[:-CHECK]).digest()

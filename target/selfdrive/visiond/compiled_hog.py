@@ -19,7 +19,7 @@ def made_of() -> bytes:
 
 def build_hog(rows: int, width: int) -> Hog:
     """A Hog, compiled where it is to be used and has been."""
-    library = compiled.library(C_SOURCE.stem, made_of()) if compiled.in_use() else None
+    library = compiled.library(C_SOURCE.stem, made_of)
     return CompiledHog(rows, width, library) if library else Hog(rows, width)
 
 

@@ -160,7 +160,7 @@ def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
 
 def _compiled(ocp: Ocp, function: ca.Function) -> ca.Function:
     """The function, compiled where it is to be used and has been: its operations, in their order."""
-    library = compiled.library(ocp.name, made_of(function)) if compiled.in_use() else None
+    library = compiled.library(ocp.name, lambda: made_of(function))
     return ca.external(function.name(), str(library.path)) if library else function
 
 

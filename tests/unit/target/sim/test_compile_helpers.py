@@ -78,9 +78,9 @@ def test_a_picture_of_another_size_is_an_error_as_without(hog_in):
 def test_a_library_is_found_only_for_what_it_was_made_of(hog_in, monkeypatch, tmp_path):
     """Of other Python or C code, of another name, or while none is to be used: none."""
     compiled.use(hog_in)
-    found = compiled.library("hog", made_of())
+    found = compiled.library("hog", made_of)
     assert found is not None and found.path.parent == hog_in / compiled.FOLDER
-    assert compiled.library("long_mpc", made_of()) is None
+    assert compiled.library("long_mpc", made_of) is None
     for module, name in ((compiled_hog, "C_SOURCE"), (hog, "__file__")):
         edited = tmp_path / "hog"
         edited.write_bytes(Path(getattr(module, name)).read_bytes() + b"\n")
@@ -88,7 +88,7 @@ def test_a_library_is_found_only_for_what_it_was_made_of(hog_in, monkeypatch, tm
             patch.setattr(module, name, edited)
             assert type(build_hog(*SIZE)) is Hog
     compiled.use(None)
-    assert compiled.library("hog", made_of()) is None
+    assert compiled.library("hog", made_of) is None
 
 
 @needs_compiler
@@ -98,7 +98,9 @@ def test_a_library_that_is_damaged_is_none(hog_in, keep):
     (path,) = (hog_in / compiled.FOLDER).iterdir()
     path.write_bytes(path.read_bytes()[:keep])
     compiled.use(hog_in)
-    assert compiled.in_use() and type(build_hog(*SIZE)) is Hog
+    asked = []
+    assert compiled.library("hog", lambda: asked.append(1) or made_of()) is None and asked
+    assert type(build_hog(*SIZE)) is Hog
 
 
 @needs_compiler
@@ -117,14 +119,13 @@ def test_a_cache_without_libraries_is_no_error(tmp_path, cache):
     """One that is not there, that cannot be looked into, or that a failed attempt left."""
     (tmp_path / "empty" / compiled.FOLDER).mkdir(parents=True)
     compiled.use(tmp_path / cache)
-    assert not compiled.in_use()
+    assert compiled.library("hog", pytest.fail) is None
 
 
-def test_an_unknown_home_is_no_error(monkeypatch):
+def test_an_unknown_home_is_no_error():
     """Runs without pictures need none."""
-    monkeypatch.delenv("HOME")
     compiled.use(Path("~no-such-user/cache"))
-    assert not compiled.in_use()
+    assert compiled.library("hog", pytest.fail) is None
 
 
 @pytest.mark.parametrize("given", ["no-such-compiler", "/", "cc '"])
