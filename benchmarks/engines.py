@@ -19,14 +19,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator import golden, mutant  # noqa: E402
-from mutator.engine import Engine, Job, ReferenceEngine, prepare_base  # noqa: E402
-from mutator.fork_engine import ForkEngine  # noqa: E402
-from mutator.golden import golden_key  # noqa: E402
+from mutator.campaigns.plans import Plan, make_plan  # noqa: E402
+from mutator.engines.fork import ForkEngine  # noqa: E402
+from mutator.engines.reference import Engine, Job, ReferenceEngine, prepare_base  # noqa: E402
+from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
-from mutator.plan import Plan, make_plan  # noqa: E402
-from mutator.runner import Finished, Goldens, Runner  # noqa: E402
-from mutator.trigger import always  # noqa: E402
+from mutator.mutants import building as mutant  # noqa: E402
+from mutator.outcomes import golden  # noqa: E402
+from mutator.outcomes.golden import golden_key  # noqa: E402
+from mutator.triggers.conditions import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_OF_WARM = 1.15  # fork's CPU over warm's times the share of simulated time that remains after activation

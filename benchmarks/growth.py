@@ -15,13 +15,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from time import process_time
 
-from mutator import planfile, results
+from mutator.campaigns.plans import Plan, freeze, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
-from mutator.mutant import build
-from mutator.plan import Plan, freeze, make_plan
-from mutator.records import SCHEMA, LineWriter
-from mutator.runfolder import RunFolder
+from mutator.mutants.building import build
+from mutator.outcomes import results
 from mutator.statistics.frame import load
+from mutator.store import plan_file as planfile
+from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -14,10 +14,10 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-from mutator.anchors import parse_file
+from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment
-from mutator.mutant import build, build_directly
-from mutator.plan import make_plan
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.building import build, build_directly
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

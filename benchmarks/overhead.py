@@ -21,14 +21,14 @@ from time import process_time
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator import mutant  # noqa: E402
-from mutator.engine import Job, ReferenceEngine, prepare_base  # noqa: E402
-from mutator.fork_engine import ForkEngine  # noqa: E402
+from mutator.campaigns.plans import make_plan  # noqa: E402
+from mutator.engines.fork import ForkEngine  # noqa: E402
+from mutator.engines.reference import Job, ReferenceEngine, prepare_base  # noqa: E402
+from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
-from mutator.plan import make_plan  # noqa: E402
-from mutator.records import SCHEMA, LineWriter  # noqa: E402
-from mutator.runner import Goldens, Runner  # noqa: E402
-from mutator.trigger import always  # noqa: E402
+from mutator.mutants import building as mutant  # noqa: E402
+from mutator.store.records import SCHEMA, LineWriter  # noqa: E402
+from mutator.triggers.conditions import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_MS = 5.0

@@ -15,14 +15,16 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-from mutator import campaign_run, check_cache, checks
-from mutator.engine import Execution, Job, ReferenceEngine
-from mutator.golden import golden_key
-from mutator.jsonio import write_json
+from mutator._common.files import write_json
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.engines.reference import Execution, Job, ReferenceEngine
+from mutator.execution import session as campaign_run
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.plan import freeze, make_plan
-from mutator.records import SCHEMA, LineWriter
-from mutator.runfolder import RunFolder
+from mutator.outcomes.golden import golden_key
+from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.run_folder import RunFolder
+from mutator.verification import preflight as checks
+from mutator.verification import preflight_cache as check_cache
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -16,8 +16,9 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator import bytecode, mutant  # noqa: E402
-from mutator.trigger import always  # noqa: E402
+from mutator.engines import bytecode  # noqa: E402
+from mutator.mutants import building as mutant  # noqa: E402
+from mutator.triggers.conditions import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL = 1.02

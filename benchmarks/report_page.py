@@ -23,14 +23,18 @@ import numpy as np
 from growth import record
 from markupsafe import Markup
 
-from mutator import report_browse, report_page, report_series, results, tables
-from mutator.columns import COLUMNS
-from mutator.diffs import readable
+from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment, Record
-from mutator.mutant import build
-from mutator.plan import make_plan
-from mutator.report import Content
-from mutator.report_browse import Browse
+from mutator.mutants.building import build
+from mutator.mutants.readable_diffs import readable
+from mutator.outcomes import results
+from mutator.outcomes import rows as tables
+from mutator.outcomes.columns import COLUMNS
+from mutator.report import browse as report_browse
+from mutator.report import page as report_page
+from mutator.report import series as report_series
+from mutator.report.browse import Browse
+from mutator.report.building import Content
 from mutator.review.groups import shapes
 from mutator.web import embedded
 from mutator.workspace import Workspace

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mutator.load import Run as Run
-    from mutator.load import load_run as load_run
+    from mutator.api.runs import Run as Run
+    from mutator.api.runs import load_run as load_run
 
 __version__ = "0.1.0"
 _LAZY = ("Run", "load_run")  # pandas is not paid for by who only wants the version
@@ -12,7 +12,7 @@ _LAZY = ("Run", "load_run")  # pandas is not paid for by who only wants the vers
 
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
-        from mutator import load
+        from mutator.api import runs as load
 
         return getattr(load, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

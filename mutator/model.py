@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from mutator.ids import content_id
+from mutator._common.hashing import content_id
 
 Value = int | float | str | bool | None
 

@@ -4,13 +4,13 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator.config.problems import suggestion
 from mutator.errors import MutatorError
-from mutator.fault_models import FaultModels, load_fault_models
-from mutator.manifest import TargetManifest, load_manifest
-from mutator.shape_errors import suggestion
-from mutator.spec import FaultSpec, load_spec
-from mutator.stpa import ContextTable, HazardList, load_context_table, load_hazards
-from mutator.stpa_analysis import Analysis, load_analysis
+from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.faults.specs import FaultSpec, load_spec
+from mutator.stpa.analysis import Analysis, load_analysis
+from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
+from mutator.targets.manifest import TargetManifest, load_manifest
 
 _LIBRARY = "fault_library"
 _TEMPLATES = "templates"

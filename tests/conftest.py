@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from mutator.campaigns.plans import freeze, make_plan
 from mutator.model import (
     Activation,
     Anchor,
@@ -24,8 +25,7 @@ from mutator.model import (
     Status,
     Trigger,
 )
-from mutator.plan import freeze, make_plan
-from mutator.records import SCHEMA, LineWriter
+from mutator.store.records import SCHEMA, LineWriter
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
     Engine,
@@ -24,11 +25,10 @@ from mutator.cli.options import (
 )
 from mutator.cli.progress import duration
 from mutator.cli.run_folders import show_counts
-from mutator.wording import counted
 
 if TYPE_CHECKING:
-    from mutator.campaign_run import Summary
-    from mutator.plan import Cost
+    from mutator.campaigns.plans import Cost
+    from mutator.execution.session import Summary
     from mutator.workspace import Workspace
 
 CampaignName = Annotated[
@@ -67,8 +67,8 @@ def plan(
 
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
-    from mutator import engines
-    from mutator.plan import freeze, load_plan, make_plan
+    from mutator.campaigns.plans import freeze, load_plan, make_plan
+    from mutator.engines import choice as engines
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -155,9 +155,9 @@ def run(
     place: Place,
 ) -> None:
     """Run or resume a campaign; ends with its table and report."""
-    from mutator import campaign_run
+    from mutator.campaigns.plans import Choices
     from mutator.cli.progress import campaign_progress
-    from mutator.plan import Choices
+    from mutator.execution import session as campaign_run
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -183,7 +183,7 @@ def run(
 
 def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspace") -> None:
     """The end of a run: table, report, and what is left to do."""
-    from mutator import report as reports
+    from mutator.report import building as reports
 
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = reports.ensure(out, workspace) if summary.results else None

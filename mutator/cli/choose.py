@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator.fault_models import FaultModels
-    from mutator.manifest import TargetManifest
+    from mutator.faults.fault_models import FaultModels
+    from mutator.faults.specs import FaultSpec, Variant
     from mutator.model import Fault, Trigger
-    from mutator.spec import FaultSpec, Variant
-    from mutator.stpa import ContextTable
+    from mutator.stpa.context_tables import ContextTable
+    from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 
 RUNS = Path("runs")
@@ -32,9 +32,9 @@ class FaultChoice:
         self, workspace: "Workspace", manifest: "TargetManifest", models: "FaultModels"
     ) -> tuple["Fault", ...]:
         """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line."""
-        from mutator.expand import expand
-        from mutator.library_check import check_spec
-        from mutator.spec import AS_DESCRIBED
+        from mutator.faults.expansion import expand
+        from mutator.faults.specs import AS_DESCRIBED
+        from mutator.verification.library import check_spec
 
         spec = self._narrowed(workspace.spec(self.spec))
         for problem in check_spec(spec, models, manifest):
@@ -91,7 +91,7 @@ def context_tables(workspace: "Workspace") -> tuple["ContextTable", ...]:
 def find_trigger(workspace: "Workspace", text: str, armed_after_s: float) -> "Trigger":
     """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
     from mutator.model import Trigger
-    from mutator.trigger import always, at_time, check_condition
+    from mutator.triggers.conditions import always, at_time, check_condition
 
     if text == "always":
         return always(armed_after_s=armed_after_s)

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Only
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
-from mutator.wording import counted
 
 if TYPE_CHECKING:
-    from mutator.compare.comparison import Comparison, Finding, Gate
+    from mutator.comparison.comparison import Comparison, Finding, Gate
 
 SHOWN = 4  # tables that the terminal shows: those that are not by fault type, but for the changes
 NAMED = 20  # experiments that the terminal names; the written comparison has all
@@ -52,8 +52,8 @@ def compare(
     Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
     what got better, worse, newly hazardous, with paired statistics; a page, a table and CSV are written.
     """
-    from mutator.compare import comparison as comparing
-    from mutator.compare import pages
+    from mutator.comparison import comparison as comparing
+    from mutator.comparison import pages
 
     terminal = Terminal(as_json)
     gates = _gates(fail_on or [])
@@ -71,7 +71,7 @@ def compare(
 
 
 def _gates(texts: list[str]) -> "list[Gate]":
-    from mutator.compare.comparison import Gate
+    from mutator.comparison.comparison import Gate
 
     names = [name.strip() for text in texts for name in text.split(",")]
     known = [gate.value for gate in Gate]
@@ -81,7 +81,7 @@ def _gates(texts: list[str]) -> "list[Gate]":
 
 
 def _show(terminal: Terminal, found: "Comparison") -> None:
-    from mutator.compare import pages
+    from mutator.comparison import pages
 
     differing = [(f.name, f.a, f.b) for f in found.facts if f.differs]
     if differing:
@@ -99,8 +99,8 @@ def _show(terminal: Terminal, found: "Comparison") -> None:
 
 
 def _as_json(found: "Comparison", failing: "tuple[Finding, ...]") -> dict[str, object]:
-    from mutator.compare import pages
-    from mutator.compare.pairs import Change
+    from mutator.comparison import pages
+    from mutator.comparison.pairs import Change
 
     return {
         "run_a": str(found.a.folder.path),

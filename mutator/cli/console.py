@@ -13,8 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.hashing import plain
 from mutator.errors import MutatorError
-from mutator.ids import plain
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.cli import choose
 from mutator.cli.console import STYLES, Terminal, short_path
-from mutator.diffs import readable
 from mutator.errors import MutatorError
+from mutator.mutants.readable_diffs import readable
 
 if TYPE_CHECKING:
-    from mutator.manifest import TargetManifest
+    from mutator.campaigns.plans import Plan
+    from mutator.execution.single_run import Single
     from mutator.model import Experiment, Record
-    from mutator.plan import Plan
-    from mutator.runfolder import RunFolder
-    from mutator.single import Single
+    from mutator.store.run_folder import RunFolder
+    from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 
 
@@ -30,9 +30,9 @@ class Found:
 
 def find_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> Found:
     """The one experiment whose id starts with `prefix` in `run`, or in the newest run."""
-    from mutator.plan import load_plan
-    from mutator.records import read_records
-    from mutator.runfolder import RunFolder
+    from mutator.campaigns.plans import load_plan
+    from mutator.store.records import read_records
+    from mutator.store.run_folder import RunFolder
 
     folder = RunFolder.open(choose.find_run(run, workspace.library.parent))
     wanted = folder.find(prefix)
@@ -47,7 +47,7 @@ def experiment_patch(workspace: "Workspace", found: Found) -> str:
     kept = found.folder.patch(found.experiment.id)
     if kept.exists():
         return kept.read_bytes().decode("utf-8", "surrogateescape")
-    from mutator.mutant import build
+    from mutator.mutants.building import build
 
     manifest = workspace.manifest(found.plan.campaign.target)
     e = found.experiment
@@ -74,7 +74,7 @@ def describe(experiment: "Experiment") -> dict[str, Any]:
 
 def verdict(record: "Record") -> dict[str, Any]:
     """What became of it, for people and as JSON. Times in s of simulation; None: did not happen."""
-    from mutator.verdict import reaction_time
+    from mutator.outcomes.verdicts import reaction_time
 
     activation = record.activation
     return {
@@ -143,8 +143,8 @@ def _events(record: "Record") -> list[tuple[float, str]]:
 
 def draw(manifest: "TargetManifest", single: "Single", plot: Path) -> Path | None:
     """Draw golden against faulty into `plot`; None when the faulty run left no trace."""
-    from mutator.golden import load_trace
-    from mutator.plots import marks_of, plot_run
+    from mutator.figures.run_plot import marks_of, plot_run
+    from mutator.outcomes.golden import load_trace
 
     if not (single.faulty / manifest.trace_file).exists():
         return None
@@ -162,8 +162,8 @@ def draw(manifest: "TargetManifest", single: "Single", plot: Path) -> Path | Non
 
 def keep_plot(manifest: "TargetManifest", single: "Single", folder: "RunFolder", plot: Path) -> Path | None:
     """Draw into `plot`, and leave the series where the report's page finds them; None as `draw`."""
-    from mutator import report_series
-    from mutator.golden import load_trace
+    from mutator.outcomes.golden import load_trace
+    from mutator.report import series as report_series
 
     drawn = draw(manifest, single, plot)
     if drawn:

@@ -12,7 +12,7 @@ from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
     from mutator.cli.experiment_view import Found
-    from mutator.film import Shot
+    from mutator.report.film import Shot
     from mutator.workspace import Workspace
 
 
@@ -84,8 +84,8 @@ def show(
 def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | None:
     """The experiment's plot, drawn from its kept trace, or from one made now."""
     from mutator.cli import experiment_view as view
-    from mutator.report_series import series_path
-    from mutator.single import rerun as run_again
+    from mutator.execution.single_run import rerun as run_again
+    from mutator.report.series import series_path
 
     plot = plot_path(found.folder.path, found.experiment.id)
     if plot.exists() and series_path(found.folder, found.experiment.id).exists():
@@ -106,7 +106,7 @@ def _film(
 ) -> list[Path]:
     """Write the video and the stills that are wanted; returns their paths."""
     from mutator.cli import experiment_view as view
-    from mutator.film import Shot, film_experiment
+    from mutator.report.film import Shot, film_experiment
 
     shots = [_still(text, found) for text in stills]
     shots += [Shot(out=video)] if video else []
@@ -125,7 +125,7 @@ def _film(
 
 def _still(text: str, found: "Found") -> "Shot":
     """The still of `T=FILE`, or of `T` alone: it is kept beside the plots, where the report finds it."""
-    from mutator.film import Shot
+    from mutator.report.film import Shot
 
     t, named, name = text.partition("=")
     try:
@@ -168,7 +168,7 @@ def rerun(
     import shutil
 
     from mutator.cli import experiment_view as view
-    from mutator.single import rerun as run_again
+    from mutator.execution.single_run import rerun as run_again
 
     terminal = Terminal(as_json)
     workspace = place.workspace()

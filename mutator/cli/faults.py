@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mutator._common.text import counted
 from mutator.cli import choose
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
-from mutator.diffs import readable
 from mutator.errors import EXIT_HARNESS_ERRORS
-from mutator.wording import counted
+from mutator.mutants.readable_diffs import readable
 
 if TYPE_CHECKING:
     from mutator.model import Experiment
@@ -75,8 +75,8 @@ def try_fault(
     The spec need not be in the library: a file will do.
     """
     from mutator.cli.experiment_view import show_single
+    from mutator.execution.single_run import run_single
     from mutator.model import Status
-    from mutator.single import run_single
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -98,7 +98,7 @@ def try_fault(
 
 
 def _experiment(workspace: "Workspace", fault: Any, scenario: str, trigger: Any, seed: int) -> "Experiment":
-    from mutator.ids import digest
+    from mutator._common.hashing import digest
     from mutator.model import Experiment, Method
 
     file = workspace.scenario(scenario)
@@ -152,7 +152,7 @@ def diff(
         name = (choose.fault_words(found.experiment.fault), found.experiment.id)
         _print_diffs(terminal, [(*name, experiment_patch(workspace, found))], whole=patch)
         return
-    from mutator.mutant import build
+    from mutator.mutants.building import build
 
     target, models = choose.find_target(workspace, manifest), workspace.fault_models()
     choice = choose.FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)

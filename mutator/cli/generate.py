@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mutator._common.files import make_folder
 from mutator.cli import choose
 from mutator.cli.console import Terminal
 from mutator.errors import MutatorError
-from mutator.jsonio import make_folder
 
 if TYPE_CHECKING:
-    from mutator.manifest import TargetManifest
     from mutator.model import Fault, Trigger
-    from mutator.mutant import Mutant
+    from mutator.mutants.building import Mutant
+    from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 
 COLUMNS = (
@@ -56,7 +56,7 @@ def write_mutants(
 
     `out` must be new or empty, since old patches beside new ones would be taken for theirs.
     """
-    from mutator.mutant import build
+    from mutator.mutants.building import build
 
     make_folder(out)
     if any(out.iterdir()):
@@ -109,7 +109,7 @@ def _of_specs(
 def _of_campaign(
     workspace: "Workspace", request: Request
 ) -> tuple["TargetManifest", list[tuple["Fault", "Trigger"]]]:
-    from mutator.plan import make_plan
+    from mutator.campaigns.plans import make_plan
 
     if request.specs or request.triggers:
         raise MutatorError(
@@ -142,7 +142,7 @@ class _Writer:
 
     def write(self, mutant: "Mutant", fault: "Fault", trigger: "Trigger") -> dict[str, str]:
         """Write one mutant; returns its line of the index."""
-        from mutator.mutant import write_tree
+        from mutator.mutants.building import write_tree
 
         patch = Path("patches") / f"{mutant.id}.patch"
         (self.out / patch).write_bytes(mutant.patch_bytes)

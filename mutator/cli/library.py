@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mutator._common.text import counted
 from mutator.cli.choose import context_tables, target_name
 from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
-from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -82,7 +82,7 @@ def _campaigns(workspace: "Workspace") -> Table:
 
 def _files(files: dict[str, Path], told: str) -> Table:
     """Files of the library by name, with what their key `told` says of them, where they have one."""
-    from mutator.yamlio import load
+    from mutator.config.yaml_files import load
 
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
@@ -150,7 +150,7 @@ def check(
 
     Exit code 1 if anything is wrong; each problem is told with its file and line.
     """
-    from mutator.library_check import check_library
+    from mutator.verification.library import check_library
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -180,7 +180,7 @@ def doctor(as_json: Json = False, *, place: Place) -> None:
 
     Looks at interpreter, packages, machine, library and target; exit code 1 if a campaign could not run.
     """
-    from mutator.doctor import Level, examine
+    from mutator.verification.doctor import Level, examine
 
     terminal = Terminal(as_json)
     with terminal.wait("looking around"):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator.cli.console import Terminal
 
 if TYPE_CHECKING:
-    from mutator.records import Progress
+    from mutator.store.records import Progress
 
 LINE_EVERY_S = 15.0  # in a log file a line now and then shows that it lives
 

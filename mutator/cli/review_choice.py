@@ -36,14 +36,14 @@ class Wanted:
         workspace = self.place.workspace()
         with terminal.wait("making the mutants"):
             if self.campaign:
-                from mutator.plan import make_plan
+                from mutator.campaigns.plans import make_plan
 
                 plan = make_plan(workspace, self.campaign, seed=self.seed, reading=self.reading)
                 target = plan.campaign.target
                 groups = catalogue.of_plan(workspace, plan)
             else:
                 from mutator.cli.choose import target_name
-                from mutator.spec import READINGS
+                from mutator.faults.specs import READINGS
 
                 target = target_name(workspace, self.manifest)
                 groups = catalogue.of_library(
@@ -76,7 +76,7 @@ class Loaded:
 
     def matching(self, only: str | None, exclude: str | None) -> "Loaded":
         """Those for which the filters hold."""
-        from mutator.filters import compile_filter
+        from mutator.campaigns.filters import compile_filter
 
         groups = self.groups
         for text, wanted in ((only, True), (exclude, False)):

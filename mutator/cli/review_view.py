@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.text import counted
 from mutator.cli.console import Terminal
 from mutator.cli.review_choice import columns
-from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.review.catalogue import Group

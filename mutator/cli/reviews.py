@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from mutator._common.text import counted
 from mutator.cli import review_view as view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
 from mutator.cli.review_choice import COLUMNS, Wanted
-from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.review.decisions import Verdict

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
-from mutator.wording import counted
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 
 def show_counts(terminal: Terminal, run: Path) -> None:
     """The table of results by fault type, and how the experiments ended."""
-    from mutator import tables
+    from mutator.outcomes import rows as tables
 
     rows = tables.read_results(run / "results.csv")
     hazards = tables.hazard_names(rows)
@@ -50,8 +50,8 @@ def merge(
 
     It is the one that a single machine would have made: the same results, byte for byte.
     """
-    from mutator import merge as merging
-    from mutator.runfolder import RunFolder
+    from mutator.execution import merging
+    from mutator.store.run_folder import RunFolder
 
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
@@ -84,10 +84,11 @@ def report(
     An unfinished run gets a report of what it has so far. What was published stands beside the results if
     a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
     """
-    from mutator import proof, results
-    from mutator import report as reports
-    from mutator.records import read_records
-    from mutator.runfolder import RunFolder
+    from mutator.outcomes import results
+    from mutator.report import building as reports
+    from mutator.store.records import read_records
+    from mutator.store.run_folder import RunFolder
+    from mutator.verification import equivalence as proof
 
     terminal = Terminal(as_json)
     folder = RunFolder.open(run)
@@ -126,7 +127,7 @@ def clean(
 
     Anything that is no run folder, and a run under way, is left alone.
     """
-    from mutator import runfolder
+    from mutator.store import run_folder as runfolder
 
     terminal = Terminal()
     folders = [runfolder.RunFolder.open(path).path for path in runs]

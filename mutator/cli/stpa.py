@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mutator._common.text import counted
 from mutator.cli.choose import target_name
 from mutator.cli.console import Terminal, short_path, told
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
-from mutator.wording import counted
 
 if TYPE_CHECKING:
-    from mutator.stpa import ContextTable
-    from mutator.stpa_analysis import Analysis
+    from mutator.stpa.analysis import Analysis
+    from mutator.stpa.context_tables import ContextTable
 
 EXAMPLES = """\b
 Examples:
@@ -43,8 +43,8 @@ def stpa(
 
     Exit code 1 if it has a gap or a contradiction; each is told with its file and line.
     """
-    from mutator.stpa_checks import check_analysis
-    from mutator.stpa_drawing import draw
+    from mutator.stpa.checks import check_analysis
+    from mutator.stpa.drawing import draw
 
     terminal = Terminal(as_json)
     workspace = place.workspace()

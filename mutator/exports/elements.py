@@ -9,17 +9,19 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mutator import __version__, planfile, single
-from mutator.anchors import ParsedFile, Site
-from mutator.compare.sides import drive
-from mutator.fault_models import FaultModels
-from mutator.manifest import TargetManifest
+from mutator import __version__
+from mutator._common.text import counted
+from mutator.comparison.sides import drive
+from mutator.execution import single_run as single
+from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
-from mutator.mutant import injection_edit, injection_id
-from mutator.records import read_records
-from mutator.runfolder import RunFolder
-from mutator.splice import Edit
-from mutator.wording import counted
+from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.building import injection_edit, injection_id
+from mutator.mutants.splicing import Edit
+from mutator.store import plan_file as planfile
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 SCHEMA_VERSION = "2.0"

@@ -9,14 +9,15 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Sequence
 
-from mutator import results, tables
-from mutator.columns import plan_row
-from mutator.compare.sides import words
+from mutator.comparison.sides import words
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
-from mutator.planfile import read_all
-from mutator.runfolder import RunFolder
-from mutator.tables import Row
+from mutator.outcomes import results
+from mutator.outcomes import rows as tables
+from mutator.outcomes.columns import plan_row
+from mutator.outcomes.rows import Row
+from mutator.store.plan_file import read_all
+from mutator.store.run_folder import RunFolder
 
 ENDINGS = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator import results
+from mutator._common.files import make_folder, write_atomic
 from mutator.exports import Format
-from mutator.jsonio import make_folder, write_atomic
-from mutator.runfolder import RunFolder
+from mutator.outcomes import results
+from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace

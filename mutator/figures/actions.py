@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mutator.golden import Trace
 from mutator.model import Record
+from mutator.outcomes.golden import Trace
 
 Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 

@@ -46,7 +46,7 @@ def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
 
 def write(made: Sequence[Drawing], out: Path) -> None:
     """Write each figure into `out`/figures as <name>.svg and <name>.png."""
-    from mutator.plots import save
+    from mutator.figures.run_plot import save
 
     for drawing in made:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]

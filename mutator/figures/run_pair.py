@@ -7,8 +7,16 @@ import numpy as np
 
 from mutator.figures import style
 from mutator.figures.actions import Pair, Steps, Wanted
-from mutator.manifest import TargetManifest
-from mutator.plots import FAULTY_COLOUR, GOLDEN_COLOUR, MARK_COLOURS, MARK_LINES, Mark, MarkKind, finite
+from mutator.figures.run_plot import (
+    FAULTY_COLOUR,
+    GOLDEN_COLOUR,
+    MARK_COLOURS,
+    MARK_LINES,
+    Mark,
+    MarkKind,
+    finite,
+)
+from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from mutator import pytest_plugin
 from mutator.cli.main import EXIT_CODES, GROUPS, app
 from mutator.cli.options import PLACE_OPTIONS
+from mutator.execution import pytest_plugin
 from mutator.reference.tables import generated
 from mutator.workspace import Workspace
 

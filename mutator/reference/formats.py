@@ -2,8 +2,13 @@
 
 from collections.abc import Iterator
 
-from mutator import campaign, manifest, spec, stpa, stpa_analysis, units
+from mutator.campaigns import campaign_files as campaign
+from mutator.config import units
+from mutator.faults import specs as spec
 from mutator.reference.tables import generated, sections
+from mutator.stpa import analysis as stpa_analysis
+from mutator.stpa import context_tables as stpa
+from mutator.targets import manifest
 from mutator.workspace import Workspace
 
 STRICT = """\

@@ -3,8 +3,8 @@
 import difflib
 from collections.abc import Iterator
 
-from mutator import fault_models
-from mutator.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema
+from mutator.faults import fault_models
+from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema
 from mutator.reference.tables import generated, sections
 from mutator.workspace import Workspace
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Iterator
 
-from mutator.columns import EXTRA, PLAN_COLUMNS, RESULTS, TIMINGS, Column
-from mutator.manifest import Channel, TargetManifest
+from mutator.outcomes.columns import EXTRA, PLAN_COLUMNS, RESULTS, TIMINGS, Column
 from mutator.reference.tables import generated
-from mutator.trigger import VARIABLES
+from mutator.targets.manifest import Channel, TargetManifest
+from mutator.triggers.conditions import VARIABLES
 from mutator.workspace import Workspace
 
 _ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}

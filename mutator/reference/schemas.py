@@ -8,11 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from mutator import campaign, fault_models, manifest, spec, stpa, stpa_analysis, units
-from mutator.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
-from mutator.injections import DIMENSIONLESS
+from mutator.campaigns import campaign_files as campaign
+from mutator.config import units
+from mutator.config.yaml_files import StrictModel
+from mutator.faults import fault_models
+from mutator.faults import specs as spec
+from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
+from mutator.faults.injections import DIMENSIONLESS
 from mutator.reference.words import ABOUT
-from mutator.yamlio import StrictModel
+from mutator.stpa import analysis as stpa_analysis
+from mutator.stpa import context_tables as stpa
+from mutator.targets import manifest
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors know best
 _MODEL = re.compile(r"^_?(\w+?)Model$")

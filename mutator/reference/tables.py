@@ -4,9 +4,9 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from mutator.config.yaml_files import StrictModel
 from mutator.reference.schemas import definitions
 from mutator.reference.words import SECTIONS, TOLD_IN
-from mutator.yamlio import StrictModel
 
 _SIGNS = {
     "minimum": "at least",

@@ -13,20 +13,20 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from mutator.expand import expand
-from mutator.fault_models import PROBE_TEMPLATE, FaultModels
-from mutator.ids import content_id
-from mutator.manifest import TargetManifest
+from mutator._common.hashing import content_id
+from mutator.faults.expansion import expand
+from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
+from mutator.faults.specs import READINGS, FaultSpec
 from mutator.model import Fault, FaultLocation, Injection, Trigger
-from mutator.mutant import OBSERVE_TAG, build
+from mutator.mutants.building import OBSERVE_TAG, build
+from mutator.mutants.splicing import PROBE_TAG
 from mutator.review import groups
 from mutator.review.groups import Shape
-from mutator.spec import READINGS, FaultSpec
-from mutator.splice import PROBE_TAG
-from mutator.trigger import always, at_time
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import always, at_time
 
 if TYPE_CHECKING:
-    from mutator.plan import Plan
+    from mutator.campaigns.plans import Plan
     from mutator.workspace import Workspace
 
 _FAULT_TAG = re.compile(rf"^\+.*# fi:(?!{PROBE_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)

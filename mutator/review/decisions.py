@@ -13,11 +13,11 @@ from typing import Literal
 
 from pydantic import Field
 
+from mutator._common.files import make_folder, write_atomic
+from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
-from mutator.jsonio import make_folder, write_atomic
 from mutator.review.catalogue import Bound, Group
 from mutator.workspace import Workspace
-from mutator.yamlio import StrictModel, read
 
 SCHEMA = "review/1"
 _HEAD = """\

@@ -5,13 +5,13 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from mutator._common.files import read_json, write_json
+from mutator._common.hashing import plain
+from mutator._common.text import counted
+from mutator.campaigns.plans import Plan
 from mutator.errors import CheckFailed
-from mutator.ids import plain
-from mutator.jsonio import read_json, write_json
-from mutator.plan import Plan
 from mutator.review.catalogue import Group, of_plan
 from mutator.review.decisions import Review, State, load_review
-from mutator.wording import counted
 from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 
-from mutator.ids import content_id
+from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
-from mutator.trigger import VARIABLES
+from mutator.triggers.conditions import VARIABLES
 
 Span = tuple[int, int, str]  # of a value in a patch: begin, end, what it is called (empty: not known yet)
 

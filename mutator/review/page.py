@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
-from mutator.jsonio import write_atomic
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Review, State
 from mutator.review.words import conditions, values

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
+from mutator.paper.published import Paper
 from mutator.statistics import compare
 from mutator.statistics.compare import WHOLES, Whole
 from mutator.statistics.paired import Matched
-from mutator.statistics.paper import Paper
 from mutator.statistics.share import share
 from mutator.statistics.sheet import Cell, P, Sheet
 from mutator.statistics.tally import by_kind

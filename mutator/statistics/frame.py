@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from mutator.errors import MutatorError
-from mutator.tables import UNUSABLE
+from mutator.outcomes.rows import UNUSABLE
 
 _NEEDED = (
     "experiment_id",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mutator.report_page import markdown_table
+from mutator.report.page import markdown_table
 from mutator.statistics.share import Share
 
 _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")

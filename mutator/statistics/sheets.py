@@ -5,18 +5,19 @@ from pathlib import Path
 
 import pandas as pd
 
+from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
-from mutator.golden import golden_key, load_trace
-from mutator.jsonio import write_atomic
-from mutator.records import read_records
-from mutator.runfolder import RunFolder
-from mutator.statistics import compare_tables, paper_tables, time_tables
+from mutator.outcomes.golden import golden_key, load_trace
+from mutator.paper import published_tables as paper_tables
+from mutator.paper.published import Paper, has_paper, load_paper
+from mutator.statistics import compare_tables, time_tables
 from mutator.statistics.compare import GUIDED, RANDOM
 from mutator.statistics.frame import load
-from mutator.statistics.paper import Paper, has_paper, load_paper
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.tally import by_kind, by_scenario
 from mutator.statistics.times import Alerts
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 FOLDER = "tables"

@@ -5,8 +5,8 @@ from dataclasses import astuple
 
 import pandas as pd
 
+from mutator.paper.published import Paper
 from mutator.statistics import times
-from mutator.statistics.paper import Paper
 from mutator.statistics.sheet import Cell, Sheet
 
 

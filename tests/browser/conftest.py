@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator import report, report_series, results
+from mutator.campaigns.plans import freeze, make_plan
 from mutator.figures import figures
 from mutator.model import Activation, Experiment, Outcome, Record, Status
-from mutator.mutant import build
-from mutator.plan import freeze, make_plan
-from mutator.records import SCHEMA, LineWriter
-from mutator.runfolder import RunFolder
+from mutator.mutants.building import build
+from mutator.outcomes import results
+from mutator.report import building as report
+from mutator.report import series as report_series
+from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mutator.compare import pages
-from mutator.compare.comparison import Comparison, compare
+from mutator.comparison import pages
+from mutator.comparison.comparison import Comparison, compare
 from mutator.model import Experiment, Outcome
 from mutator.workspace import Workspace
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.mutant import unsplice
+from mutator.mutants.building import unsplice
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 

@@ -11,8 +11,8 @@ import pytest
 
 from mutator.cli.console import Terminal
 from mutator.cli.progress import campaign_progress, duration
-from mutator.diffs import readable
-from mutator.records import Progress
+from mutator.mutants.readable_diffs import readable
+from mutator.store.records import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 

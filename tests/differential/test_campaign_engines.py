@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
-from mutator.locks import living_workers
-from mutator.proof import Proof
-from mutator.records import read_records
+from mutator._common.locks import living_workers
+from mutator.execution import session as campaign_run
+from mutator.store.records import read_records
+from mutator.verification.equivalence import Proof
 from mutator.workspace import Workspace
 
 TABLES = ("results.csv", "results.parquet")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
-from mutator.campaign_run import Session
+from mutator.execution import session as campaign_run
+from mutator.execution.session import Session
 from mutator.workspace import Workspace
 
 from .command import DERIVED, Bytes, Command, pytest_words, results

@@ -8,11 +8,12 @@ from typing import Any
 
 import pytest
 
-from mutator import engines, mutant
-from mutator.campaign import Limits
-from mutator.engine import Engine, Execution, How, Job, prepare_base
+from mutator.campaigns.campaign_files import Limits
+from mutator.engines import choice as engines
+from mutator.engines.reference import Engine, Execution, How, Job, prepare_base
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Status, Trigger, Value
-from mutator.trigger import always, at_time
+from mutator.mutants import building as mutant
+from mutator.triggers.conditions import always, at_time
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500)

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from mutator import engines
-from mutator.engine import Job, ReferenceEngine, prepare_base
-from mutator.golden import golden_key
+from mutator.campaigns.plans import make_plan
+from mutator.engines import choice as engines
+from mutator.engines.reference import Job, ReferenceEngine, prepare_base
+from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
-from mutator.plan import make_plan
-from mutator.runner import Goldens, Runner
+from mutator.outcomes.golden import golden_key
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]

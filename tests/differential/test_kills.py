@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.ids import digest
-from mutator.jsonio import is_half_written
+from mutator._common.files import is_half_written
+from mutator._common.hashing import digest
 from mutator.workspace import Workspace
 
 from .command import Command, results

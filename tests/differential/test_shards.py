@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import CheckFailed, MutatorError
-from mutator.merge import merge
-from mutator.plan import Choices, make_plan
-from mutator.records import read_records
+from mutator.execution import session as campaign_run
+from mutator.execution.merging import merge
 from mutator.review import gate
-from mutator.runfolder import RunFolder
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 Runs = dict[str, Path]
@@ -175,7 +175,7 @@ def test_a_merge_that_fails_leaves_nothing(
 ) -> None:
     """When results cannot be built the folder is empty again, and the same command can be given again."""
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
-        patch.setattr("mutator.results.build", fail)
+        patch.setattr("mutator.outcomes.results.build", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
     assert merge([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
-from mutator.checks import run_checks
-from mutator.engine import ReferenceEngine
+from mutator.campaigns.plans import freeze, load_plan, make_plan
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.plan import freeze, load_plan, make_plan
-from mutator.runfolder import RunFolder
+from mutator.execution import session as campaign_run
+from mutator.store.run_folder import RunFolder
+from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]

@@ -10,15 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run, planfile
-from mutator.chunks import Pending
-from mutator.engine import Execution, Job, ReferenceEngine
+from mutator.campaigns.chunks import Pending
+from mutator.campaigns.plans import Choices
+from mutator.engines.reference import Execution, Job, ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
+from mutator.execution import session as campaign_run
+from mutator.execution.single_run import rerun, run_single
+from mutator.execution.worker import Worker
 from mutator.model import Status
-from mutator.plan import Choices
-from mutator.records import Progress
-from mutator.single import rerun, run_single
-from mutator.worker import Worker
+from mutator.store import plan_file as planfile
+from mutator.store.records import Progress
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]
@@ -262,7 +263,7 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
 FULL_DISK = """
 import os, sys, threading, time
 from pathlib import Path
-from mutator import campaign_run
+from mutator.execution import session as campaign_run
 from mutator.workspace import Workspace
 out, workers = Path(sys.argv[2]) / "run", int(sys.argv[3])
 toy = Workspace.find(root=Path(sys.argv[1]))

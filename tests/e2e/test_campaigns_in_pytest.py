@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from mutator.chunks import Pending
-from mutator.pytest_campaign import Controller
+from mutator.campaigns.chunks import Pending
+from mutator.execution.pytest_session import Controller
 from mutator.workspace import Workspace
 
 
@@ -57,7 +57,7 @@ def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int,
 
 def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
     """The plugin does nothing, and imports nothing of the harness, when no campaign is asked for."""
-    test = "import sys\n\ndef test_it():\n    assert 'mutator.campaign_run' not in sys.modules\n"
+    test = "import sys\n\ndef test_it():\n    assert 'mutator.execution.session' not in sys.modules\n"
     (toy.library.parent / "test_it.py").write_text(test)
     answer = pytest_campaign(toy, "test_it.py")
     assert "1 passed" in answer.stdout

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
+from mutator.execution import session as campaign_run
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

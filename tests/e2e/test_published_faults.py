@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
-from mutator.plan import Choices
+from mutator.campaigns.plans import Choices
+from mutator.execution import session as campaign_run
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
-from mutator.golden import load_trace
-from mutator.trigger import VARIABLES, evaluate
+from mutator.execution import session as campaign_run
+from mutator.outcomes.golden import load_trace
+from mutator.triggers.conditions import VARIABLES, evaluate
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

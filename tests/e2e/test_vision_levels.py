@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
-from mutator.plan import Choices
-from mutator.records import read_records
+from mutator.campaigns.plans import Choices
+from mutator.execution import session as campaign_run
+from mutator.store.records import read_records
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

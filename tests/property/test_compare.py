@@ -5,9 +5,9 @@ import dataclasses
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.compare.pairs import Change, Pair
+from mutator.comparison.pairs import Change, Pair
 from mutator.model import Outcome, Status
-from mutator.tables import Row
+from mutator.outcomes.rows import Row
 
 MIRROR = {
     Change.NEW_HAZARD: Change.HAZARD_GONE,

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.errors import MutatorError
-from mutator.trigger import VARIABLES, check_condition, evaluate, to_code
+from mutator.triggers.conditions import VARIABLES, check_condition, evaluate, to_code
 
 NUMBERS = st.integers(-100, 100).map(str) | st.floats(0, 1e300).map(repr) | st.sampled_from(VARIABLES)
 TERMS = st.recursive(

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.stpa_coverage import coverage
-from mutator.trigger import check_condition, evaluate
+from mutator.stpa.coverage import coverage
+from mutator.triggers.conditions import check_condition, evaluate
 
 NUMBERS = st.sampled_from([-1.0, 0.0, 0.5, 2.0])
 COMPARISON = st.builds(

@@ -5,9 +5,9 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.expand import draw_values, expand
+from mutator.faults.expansion import draw_values, expand
+from mutator.faults.specs import AS_CODED, AS_DESCRIBED, READINGS, Draw
 from mutator.model import Fault
-from mutator.spec import AS_CODED, AS_DESCRIBED, READINGS, Draw
 from mutator.workspace import Workspace
 
 CLONE = Workspace.find(root=Path(__file__).parents[2])

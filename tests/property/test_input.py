@@ -7,11 +7,11 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mutator import yamlio
-from mutator.anchors import parse_file
+from mutator.config import yaml_files as yamlio
 from mutator.errors import MutatorError
-from mutator.render import literal, signed
-from mutator.spec import load_spec
+from mutator.faults.specs import load_spec
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.rendering import literal, signed
 
 QUIET = [HealthCheck.function_scoped_fixture]
 SPEC = Path(__file__).parents[2] / "fault_library" / "faults" / "car_sensors" / "speed.yaml"

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
-from mutator.expand import expand
-from mutator.fault_models import FaultModels, ParamSchema, SnippetKind
-from mutator.manifest import TargetManifest
+from mutator.faults.expansion import expand
+from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
+from mutator.faults.specs import READINGS
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
-from mutator.mutant import Mutant, build, build_directly
-from mutator.plan import make_plan
-from mutator.spec import READINGS
-from mutator.trigger import VARIABLES
+from mutator.mutants.building import Mutant, build, build_directly
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import VARIABLES
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]

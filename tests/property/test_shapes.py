@@ -8,11 +8,11 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.expand import expand
+from mutator.faults.expansion import expand
+from mutator.faults.specs import READINGS
 from mutator.model import Fault, Hold, Trigger
-from mutator.mutant import build
+from mutator.mutants.building import build
 from mutator.review.groups import label, parameters, shapes
-from mutator.spec import READINGS
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])

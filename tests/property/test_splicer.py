@@ -8,9 +8,9 @@ import libcst as cst
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator import splice
-from mutator.anchors import parse_file
 from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants import splicing as splice
+from mutator.mutants.anchors import parse_file
 
 INSERTED = ('if _fi.active("ab12"):', "    hit = hit - 35.0", "    hit = max(hit, 0.0)")
 GUARD = ('if not _fi.active("cd34"):',)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
-from mutator.plan import make_plan
 from mutator.review.catalogue import Group, fault_hunks, of_library, of_plan
 from mutator.workspace import Workspace
 

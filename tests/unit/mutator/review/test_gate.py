@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator import campaign_run
+from mutator.campaigns.plans import Plan, make_plan
 from mutator.errors import CheckFailed
-from mutator.plan import Plan, make_plan
+from mutator.execution import session as campaign_run
 from mutator.review import gate
 from mutator.review.catalogue import of_plan
 from mutator.review.decisions import Verdict, load_review

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.expand import expand
+from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold, Trigger
-from mutator.mutant import build
+from mutator.mutants.building import build
 from mutator.review.groups import Shape, cut, label, parameters, shapes
-from mutator.trigger import always, at_time
+from mutator.triggers.conditions import always, at_time
 from mutator.workspace import Workspace
 
 NEAR = Trigger(name="near", condition="hwt <= 2.0")

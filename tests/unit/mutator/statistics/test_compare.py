@@ -6,11 +6,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from mutator.paper.published import Paper, load_paper
 from mutator.statistics import compare
 from mutator.statistics.compare import Stratum
 from mutator.statistics.compare_tables import kinds_sheet, overall_sheet, pairs_sheet
 from mutator.statistics.paired import Matched
-from mutator.statistics.paper import Paper, load_paper
 
 from .results_frame import results
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.runfolder import RunFolder
 from mutator.statistics.sheet import P, Sheet
 from mutator.statistics.sheets import run_sheets, sheets, write
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 from .results_frame import results

@@ -18,10 +18,10 @@ from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.compiled_hog import C_SOURCE, made_of
 
-from mutator import mutant
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
-from mutator.sources import matches
-from mutator.trigger import at_time
+from mutator.mutants import building as mutant
+from mutator.targets.source_tree import matches
+from mutator.triggers.conditions import at_time
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[4]

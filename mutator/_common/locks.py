@@ -1,0 +1,86 @@
+"""Who may write to a run folder: one command at a time, and no worker of an earlier one beside it.
+
+Locks are flocks: the kernel drops them when their process dies, however it dies.
+"""
+
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mutator._common.files import full_disk_told
+from mutator.errors import MutatorError
+
+OWNER = "owner.lock"
+WORKERS = "workers"
+_PATIENCE_S = 15.0  # workers of a dead command end by themselves well within this
+
+
+@contextmanager
+def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
+    """Own the existing folder `run`; MutatorError when another command, or a worker left by one, holds it."""
+    with full_disk_told(run):
+        fd = os.open(run / OWNER, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        if not _try_lock(fd):
+            raise MutatorError(
+                f"in use by process {os.read(fd, 32).decode().strip() or '(unknown)'}",
+                where=run,
+                expected="one command at a time in a run folder",
+                remedy="wait until it ends, or use another folder",
+            )
+        with full_disk_told(run):
+            os.ftruncate(fd, 0)
+            os.write(fd, f"{os.getpid()}\n".encode())
+        _wait_for_workers(run, patience_s)
+        yield
+    finally:
+        os.close(fd)
+
+
+def register_worker(run: Path) -> int:
+    """Say that this process works in `run`, for as long as the returned descriptor is open."""
+    with full_disk_told(run):
+        folder = run / WORKERS
+        folder.mkdir(exist_ok=True)
+        fd = os.open(folder / str(os.getpid()), os.O_RDWR | os.O_CREAT, 0o644)
+    fcntl.flock(fd, fcntl.LOCK_EX)
+    return fd
+
+
+def living_workers(run: Path) -> list[int]:
+    """Process ids of the workers in `run`; what dead ones left is removed."""
+    living = []
+    for path in sorted((run / WORKERS).glob("[0-9]*")):
+        fd = os.open(path, os.O_RDWR)
+        try:
+            if _try_lock(fd):
+                path.unlink(missing_ok=True)
+            else:
+                living.append(int(path.name))
+        finally:
+            os.close(fd)
+    return living
+
+
+def _wait_for_workers(run: Path, patience_s: float) -> None:
+    deadline = time.monotonic() + patience_s
+    while living := living_workers(run):
+        if time.monotonic() > deadline:
+            raise MutatorError(
+                f"workers of an earlier run are still at work (processes {', '.join(map(str, living))})",
+                where=run,
+                expected="a folder without workers",
+                remedy="wait for them or end them, then give the same command again",
+            )
+        time.sleep(0.1)
+
+
+def _try_lock(fd: int) -> bool:
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

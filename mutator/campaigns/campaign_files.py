@@ -1,0 +1,195 @@
+"""Campaign files: which faults, in which scenarios, under which triggers, within which limits."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from mutator.config.yaml_files import Keys, Source, StrictModel, read
+from mutator.errors import MutatorError
+from mutator.faults.specs import AS_CODED, AS_DESCRIBED
+from mutator.model import Method
+
+SCHEMA = "campaign/1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What one run may use before it is stopped: seconds of CPU and of wall time, MiB of address space,
+    observed simulation steps."""
+
+    cpu_s: int = 60
+    wall_s: int = 300
+    memory_mb: int = 4096
+    steps: int = 20_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """Faults taken from the library: specs by glob over `<module>/<fault_type>/<variant>`.
+
+    `values` is how many of a variant's values are taken, spread evenly over them in the order of the spec
+    (None: all).
+    """
+
+    spec: str
+    values: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Canary:
+    """A fault known to be harmful: its largest value, active from `at_s` on, must reach `hazard`.
+
+    `spec` is a whole `<module>/<fault_type>/<variant>`.
+    """
+
+    spec: str
+    scenario: str
+    hazard: str
+    at_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Campaign:
+    """A campaign file, checked. Times are seconds of simulation; `source` is the file as it was read.
+
+    `sample` is how many experiments are taken: each variant as often, or, with `proportional`, each fault
+    type in each scenario in proportion to its number, guided and random ones in pairs.
+    `setting` names changes of the manifest that every run of the campaign is made with.
+    `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
+    `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
+    random time to the end).
+    """
+
+    name: str
+    about: str
+    path: Path
+    source: bytes
+    target: str
+    scenarios: tuple[str, ...]
+    setting: tuple[str, ...]
+    faults: tuple[Selection, ...]
+    reading: str
+    methods: tuple[Method, ...]
+    table: str
+    rows: tuple[str, ...] | None
+    armed_after_s: Mapping[str, float]
+    random_until_s: float
+    hold_s: float | None
+    sample: int | None
+    proportional: bool
+    seed: int
+    canary: Canary
+    limits: Limits
+    chunk: int
+    yaml: Source
+
+    def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
+        """An error (not raised) that points into the campaign file."""
+        return self.yaml.error(keys, got, expected=expected, remedy=remedy)
+
+
+class _SelectionModel(StrictModel):
+    spec: str
+    values: int | None = Field(None, ge=1)
+
+
+class _ArmingModel(StrictModel):
+    as_described: float = Field(ge=0.0, allow_inf_nan=False)
+    as_coded: float = Field(ge=0.0, allow_inf_nan=False)
+
+
+class _TriggersModel(StrictModel):
+    table: str
+    rows: list[str] | None = Field(None, min_length=1)
+    armed_after_s: _ArmingModel
+    random_until_s: float = Field(gt=0.0, allow_inf_nan=False)
+    hold_s: float | None = Field(None, gt=0.0, allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _check(self) -> "_TriggersModel":
+        if self.random_until_s <= max(self.armed_after_s.as_described, self.armed_after_s.as_coded):
+            raise ValueError("random_until_s must be later than armed_after_s")
+        return self
+
+
+class _CanaryModel(StrictModel):
+    spec: str
+    scenario: str
+    hazard: str
+    at_s: float = Field(ge=0.0, allow_inf_nan=False)
+
+
+class _LimitsModel(StrictModel):
+    cpu_s: int = Field(default=60, ge=1)
+    wall_s: int = Field(default=300, ge=1)
+    memory_mb: int = Field(default=4096, ge=256)
+    steps: int = Field(default=20_000, ge=1)
+
+
+class CampaignModel(StrictModel):
+    """A campaign file, but for its key `schema`."""
+
+    name: str = Field(pattern=r"^[a-z0-9_]+$")
+    about: str
+    target: str
+    scenarios: list[str] = Field(min_length=1)
+    setting: list[str] = Field(default_factory=list)
+    faults: list[_SelectionModel] = Field(min_length=1)
+    reading: Literal["as_described", "as_coded"] = "as_described"
+    methods: list[Literal["guided", "random"]] = Field(min_length=1)
+    triggers: _TriggersModel
+    sample: int | None = Field(None, ge=1)
+    proportional: bool = False
+    seed: int = Field(ge=0, lt=2**63)
+    canary: _CanaryModel
+    limits: _LimitsModel = _LimitsModel()
+    chunk: int = Field(20, ge=1, le=1000)
+
+    @model_validator(mode="after")
+    def _check(self) -> "CampaignModel":
+        if self.proportional and self.sample is None:
+            raise ValueError("proportional without sample: say how many")
+        return self
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Read a campaign file strictly; MutatorError with file and line for anything wrong with it."""
+    model, source = read(path, CampaignModel, SCHEMA)
+    for key in ("scenarios", "setting", "methods"):
+        values = getattr(model, key)
+        for i, value in enumerate(values):
+            if value in values[:i]:
+                raise source.error(
+                    (key, i), f"'{value}' stands here a second time", remedy="remove one of the two"
+                )
+    triggers = model.triggers
+    return Campaign(
+        name=model.name,
+        about=model.about.strip(),
+        path=path,
+        source=path.read_bytes(),
+        target=model.target,
+        scenarios=tuple(model.scenarios),
+        setting=tuple(model.setting),
+        faults=tuple(Selection(spec=item.spec, values=item.values) for item in model.faults),
+        reading=model.reading,
+        methods=tuple(Method(name) for name in model.methods),
+        table=triggers.table,
+        rows=tuple(triggers.rows) if triggers.rows else None,
+        armed_after_s={
+            AS_DESCRIBED: triggers.armed_after_s.as_described,
+            AS_CODED: triggers.armed_after_s.as_coded,
+        },
+        random_until_s=triggers.random_until_s,
+        hold_s=triggers.hold_s,
+        sample=model.sample,
+        proportional=model.proportional,
+        seed=model.seed,
+        canary=Canary(**model.canary.model_dump()),
+        limits=Limits(**{field.name: getattr(model.limits, field.name) for field in fields(Limits)}),
+        chunk=model.chunk,
+        yaml=source,
+    )

@@ -1,0 +1,54 @@
+"""Chunks: what one pytest item runs. Cut when a plan is frozen; what is left of them is found on a start."""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from mutator.model import Experiment, Record, Status
+from mutator.store import plan_file as planfile
+from mutator.store.run_folder import RunFolder
+
+
+def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
+    """Lengths of the chunks of a plan: at most `size` experiments each, none across two neighbouring groups
+    (a group shares a golden run, so an engine can share work within a chunk)."""
+    lengths: list[int] = []
+    for i, group in enumerate(groups):
+        if i and group == groups[i - 1] and lengths[-1] < size:
+            lengths[-1] += 1
+        else:
+            lengths.append(1)
+    return tuple(lengths)
+
+
+def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
+    """Experiments of each chunk, when the plan is cut into chunks of at most `size` runs: a run that several
+    experiments share stays whole."""
+    lengths = iter([len(same) for same in runs])
+    counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
+    return tuple(sum(islice(lengths, count)) for count in counts)
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """What is left of one chunk: its index, and the places within it that lack a record."""
+
+    chunk: int
+    places: tuple[int, ...]
+
+
+def pending(folder: RunFolder, records: dict[str, Record]) -> tuple[Pending, ...]:
+    """Every chunk of the folder's share that has experiments without a record, or with a harness error,
+    which is tried again."""
+    done = {name for name, record in records.items() if record.status is not Status.HARNESS_ERROR}
+    names = planfile.ids(folder.path) if done else None
+    shard = folder.shard
+    left: list[Pending] = []
+    for index, (_, _, count) in enumerate(folder.head["chunks"]):
+        if names is None:
+            places = tuple(range(count))
+        else:
+            places = tuple(i for i in range(count) if next(names) not in done)
+        if places and (shard is None or shard.has(index)):
+            left.append(Pending(index, places))
+    return tuple(left)

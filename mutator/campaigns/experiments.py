@@ -1,0 +1,183 @@
+"""From a campaign to its experiments: faults selected and expanded, triggers made, random times drawn."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
+
+from mutator._common.hashing import digest
+from mutator.campaigns.campaign_files import Campaign
+from mutator.campaigns.sampling import spread
+from mutator.config.yaml_files import Keys
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.model import Experiment, Fault, Method, Trigger
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import at_time, draw_time
+from mutator.workspace import Workspace
+
+_Numbered = tuple[int, Fault]  # a fault and its place among the values of its variant
+
+
+class Expansion:
+    """Everything a campaign's experiments are made of, for one seed and one reading."""
+
+    def __init__(
+        self, workspace: Workspace, campaign: Campaign, manifest: TargetManifest, seed: int, reading: str
+    ) -> None:
+        self.workspace = workspace
+        self.campaign = campaign
+        self.manifest = manifest
+        self.seed = seed
+        self.reading = reading
+        self.armed_after_s = campaign.armed_after_s[reading]
+        self._digests: dict[str, str] = {}
+
+    def experiments(self) -> tuple[Experiment, ...]:
+        """All of them, runs of the same scenario and changes side by side (they share a golden run)."""
+        self._check_setting()
+        faults = self._selected()
+        triggers = self._triggers()
+        made = [
+            (order, experiment)
+            for order, scenario in enumerate(self.campaign.scenarios)
+            for experiment in self._of_scenario(scenario, faults, triggers)
+        ]
+        made.sort(key=lambda item: (item[0], item[1].changes))
+        return tuple(experiment for _, experiment in made)
+
+    def canary(self) -> Experiment:
+        """The campaign's canary: the variant's largest value from a given time on."""
+        canary = self.campaign.canary
+        if canary.hazard not in self.manifest.hazards:
+            raise self.campaign.error(
+                ("canary", "hazard"),
+                f"hazard '{canary.hazard}'",
+                expected=f"one of {', '.join(self.manifest.hazards)}",
+                remedy="name a hazard of the target's manifest",
+            )
+        faults = [fault for _, fault in self._library() if fault.spec == canary.spec]
+        if not faults:
+            raise self._unmatched(("canary", "spec"), canary.spec)
+        worst = max(
+            faults, key=lambda fault: abs(fault.value) if isinstance(fault.value, int | float) else 0.0
+        )
+        trigger = at_time(canary.at_s, name="canary")
+        return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
+
+    def _check_setting(self) -> None:
+        for i, change in enumerate(self.campaign.setting):
+            if change not in self.manifest.changes:
+                raise self.campaign.error(
+                    ("setting", i),
+                    f"change '{change}'",
+                    expected=f"one of {', '.join(self.manifest.changes) or 'none'}",
+                    remedy="name a change of the target's manifest",
+                )
+
+    def _library(self) -> list[_Numbered]:
+        """Every fault of the library with its number within its variant."""
+        numbered: list[_Numbered] = []
+        models = self.workspace.fault_models()
+        for spec in self.workspace.specs():
+            seen: dict[str, int] = {}
+            for fault in expand(spec, self.seed, self.reading, models=models, manifest=self.manifest):
+                number = seen.get(fault.spec, 0)
+                seen[fault.spec] = number + 1
+                numbered.append((number, fault))
+        return numbered
+
+    def _selected(self) -> list[_Numbered]:
+        library = self._library()
+        selected: dict[str, _Numbered] = {}
+        for i, selection in enumerate(self.campaign.faults):
+            variants: dict[str, list[_Numbered]] = {}
+            for numbered in library:
+                if fnmatchcase(numbered[1].spec, selection.spec):
+                    variants.setdefault(numbered[1].spec, []).append(numbered)
+            if not variants:
+                raise self._unmatched(("faults", i, "spec"), selection.spec, library)
+            for faults in variants.values():
+                wanted = spread(len(faults), selection.values or len(faults))
+                selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
+        return list(selected.values())
+
+    def _unmatched(self, keys: Keys, pattern: str, library: Sequence[_Numbered] = ()) -> MutatorError:
+        whole = f"{pattern}/*"
+        fits = any(fnmatchcase(fault.spec, whole) for _, fault in library)
+        return self.campaign.error(
+            keys,
+            f"no fault in the library is named like '{pattern}'",
+            expected="<module>/<fault_type>/<variant>, with * for any text",
+            remedy=f"write '{whole}' for all its variants" if fits else "see `mutator list`",
+        )
+
+    def _triggers(self) -> tuple[Trigger, ...]:
+        """One for each row of the context table; random times are drawn for the same rows, as their pairs."""
+        with self._placed(("triggers", "table")):
+            table = self.workspace.context_table(self.campaign.table)
+        with self._placed(("triggers", "rows")):
+            return table.triggers(
+                hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.rows
+            )
+
+    def _of_scenario(
+        self, scenario: str, faults: list[_Numbered], triggers: tuple[Trigger, ...]
+    ) -> Iterator[Experiment]:
+        for number, fault in faults:
+            for method in self.campaign.methods:
+                for trigger in triggers:
+                    if method is Method.RANDOM:
+                        trigger = self._random(scenario, fault, number, trigger)
+                    yield self._experiment(fault, scenario, method, trigger)
+
+    def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
+        """The random partner of a row's trigger, the same in both readings but for when times begin."""
+        time = draw_time(
+            self.seed,
+            f"{scenario}/{fault.spec}/{number}/{row.name}",
+            first_s=self.armed_after_s,
+            last_s=self.campaign.random_until_s,
+            step_s=self.manifest.step_s,
+        )
+        return at_time(time, name=f"random/{row.name}", hold_s=self.campaign.hold_s)
+
+    def _experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
+        return Experiment(
+            fault=fault,
+            scenario=scenario,
+            scenario_digest=self._scenario_digest(scenario),
+            method=method,
+            trigger=trigger,
+            seed=self.seed,
+            setting=self.campaign.setting,
+        )
+
+    def _scenario_digest(self, scenario: str) -> str:
+        if scenario not in self._digests:
+            known = self.workspace.scenario_names()
+            if scenario not in known:  # a file from anywhere could change, or be another one elsewhere
+                raise self.campaign.error(
+                    self._scenario_keys(scenario),
+                    f"no scenario '{scenario}' in the library",
+                    expected=f"one of {', '.join(known) or 'none'}",
+                    remedy="correct the name, or put the file into the library's scenarios/",
+                )
+            self._digests[scenario] = digest(self.workspace.scenario(scenario).read_bytes())
+        return self._digests[scenario]
+
+    @contextmanager
+    def _placed(self, keys: Keys) -> Iterator[None]:
+        """A name that is not known is told at the campaign's `keys`; mistakes in other files stay theirs."""
+        try:
+            yield
+        except MutatorError as err:
+            if err.line is not None:
+                raise
+            raise self.campaign.error(
+                keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
+            ) from None
+
+    def _scenario_keys(self, scenario: str) -> Keys:
+        if scenario in self.campaign.scenarios:
+            return ("scenarios", self.campaign.scenarios.index(scenario))
+        return ("canary", "scenario")

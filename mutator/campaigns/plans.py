@@ -1,0 +1,300 @@
+"""Plans: the frozen, ordered list of a campaign's experiments, and what running them will take."""
+
+import csv
+import io
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import is_half_written, make_folder, write_atomic, write_json
+from mutator._common.hashing import digest, plain
+from mutator._common.locks import owned
+from mutator.campaigns.campaign_files import Campaign, load_campaign
+from mutator.campaigns.chunks import cut_runs
+from mutator.campaigns.experiments import Expansion
+from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.provenance import check_sources, sources, versions
+from mutator.campaigns.sampling import pick, pick_in_proportion
+from mutator.campaigns.shared_runs import in_turn, runs
+from mutator.errors import MutatorError
+from mutator.model import Experiment
+from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
+from mutator.store import plan_file as planfile
+from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
+from mutator.store.shards import Shard
+from mutator.workspace import Workspace
+
+RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
+_DEFAULT_CPU_S = 1.4  # one run on the reference engine, interpreter start included
+_START_S = 3.0  # of a campaign, before and after its runs
+_BYTES_PER_EXPERIMENT = 14_000  # a patch in whole blocks, its record, its rows
+_BYTES_PER_GOLDEN = 1_200_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choices:
+    """What the command line chose on top of the campaign file; None: as the file says."""
+
+    seed: int | None = None
+    reading: str | None = None
+    only: str | None = None
+    exclude: str | None = None
+    limit: int | None = None
+    shard: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """Expected cost of running a plan: one core's seconds, wall seconds on `workers`, bytes on disk.
+
+    `measured` says whether the rate was measured (goldens of this run folder) or is a default.
+    """
+
+    cpu_s: float
+    wall_s: float
+    disk_bytes: int
+    workers: int
+    measured: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Experiments in the order they are run, and how they are cut into chunks (lengths, in order).
+
+    `runs` is how many runs they take: one that several scenarios have in common is run once.
+    `run_cpu_s` is the measured CPU time of one run, if there is one.
+    """
+
+    campaign: Campaign
+    choices: Choices
+    seed: int
+    reading: str
+    experiments: tuple[Experiment, ...]
+    chunks: tuple[int, ...]
+    canary: Experiment
+    runs: int
+    digest: str  # same campaign, choices, library and scenarios: same digest on every machine
+    run_cpu_s: float | None = None
+
+    def rows(self) -> list[dict[str, object]]:
+        """One dict per experiment: the columns of the results table that are known before running."""
+        return [plan_row(experiment) for experiment in self.experiments]
+
+    def goldens(self) -> list[tuple[str, tuple[str, ...]]]:
+        """(scenario, changes) of every fault-free run that is needed, the canary's included."""
+        needed = dict.fromkeys((e.scenario, e.changes) for e in (*self.experiments, self.canary))
+        return list(needed)
+
+    def cost(self, workers: int = 2) -> Cost:
+        """Expected time and disk of all of it."""
+        goldens = len(self.goldens())
+        runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
+        cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
+        return Cost(
+            cpu_s=cpu_s,
+            wall_s=cpu_s / max(workers, 1) + _START_S,
+            disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + goldens * _BYTES_PER_GOLDEN,
+            workers=workers,
+            measured=self.run_cpu_s is not None,
+        )
+
+
+def make_plan(
+    workspace: Workspace,
+    campaign: str | Path,
+    *,
+    seed: int | None = None,
+    reading: str | None = None,
+    only: str | None = None,
+    exclude: str | None = None,
+    limit: int | None = None,
+    shard: str | None = None,
+) -> Plan:
+    """Expand a campaign (a name of the library or a file) into its plan; nothing is written or run.
+
+    `only`/`exclude` are filter expressions (`mutator.campaigns.filters`) over the columns known
+    before running; `limit` keeps that many experiments, picked like a campaign's `sample`; `shard` (`k/n`)
+    is the share of the plan that its run folder will run.
+    """
+    loaded = load_campaign(workspace.campaign(campaign))
+    choices = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
+    seed = loaded.seed if seed is None else seed
+    reading = reading or loaded.reading
+    _check(choices, loaded)
+    expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
+    once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
+    experiments = tuple(experiment for same in once for experiment in same)
+    canary = expansion.canary()
+    chunks = cut_runs(once, loaded.chunk)
+    if shard is not None and Shard.parse(shard).of > len(chunks):
+        raise MutatorError(
+            f"shard {shard}",
+            expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
+            remedy="use fewer shards, or a smaller chunk in the campaign",
+        )
+    content = [[e.id for e in experiments], chunks, canary.id, plain(loaded.canary), plain(loaded.limits)]
+    return Plan(
+        campaign=loaded,
+        choices=choices,
+        seed=seed,
+        reading=reading,
+        experiments=experiments,
+        chunks=chunks,
+        canary=canary,
+        digest=digest([SCHEMA, *content]),
+        runs=len(once),
+    )
+
+
+def _check(choices: Choices, campaign: Campaign) -> None:
+    if choices.reading is not None and choices.reading not in campaign.armed_after_s:
+        known = " or ".join(campaign.armed_after_s)
+        raise MutatorError(f"reading '{choices.reading}'", expected=known, remedy="correct --reading")
+    for name in ("seed", "limit"):
+        value = getattr(choices, name)
+        if value is not None and value < (name == "limit"):
+            raise MutatorError(f"{name} {value}", expected="a positive number", remedy=f"correct --{name}")
+
+
+def _choose(
+    experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int
+) -> tuple[Experiment, ...]:
+    if campaign.sample is not None:
+        experiments = _sample(experiments, campaign, campaign.sample, seed)
+    for text, wanted in ((choices.only, True), (choices.exclude, False)):
+        if text is not None:
+            accepts = compile_filter(text, PLAN_COLUMNS)
+            experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
+    if choices.limit is not None:
+        experiments = pick(experiments, choices.limit, seed)
+    if not experiments:
+        raise MutatorError(
+            "no experiment is left",
+            where=campaign.path,
+            expected="at least one",
+            remedy="widen --only, --exclude or the campaign's faults",
+        )
+    return experiments
+
+
+def _sample(
+    experiments: tuple[Experiment, ...], campaign: Campaign, count: int, seed: int
+) -> tuple[Experiment, ...]:
+    if not campaign.proportional:
+        return pick(experiments, count, seed)
+    try:
+        return pick_in_proportion(experiments, count, seed)
+    except ValueError as err:
+        raise campaign.error(
+            ("sample",), f"sample {count}", expected=str(err), remedy="correct the number"
+        ) from None
+
+
+def freeze(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
+    """Write the plan (and plan.csv) into the run folder `out`, made if missing.
+
+    A folder that holds the same plan is left as it is; another plan, or other sources than it was frozen
+    with, is a MutatorError, as is a folder in use or one that holds other things.
+    """
+    make_run_folder(out)
+    with owned(out):
+        return freeze_owned(plan, out, workspace)
+
+
+def make_run_folder(out: Path) -> None:
+    """Make `out` unless it is a run folder; MutatorError when it holds anything else."""
+    if out.exists() and not RunFolder.exists(out):
+        names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
+        strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
+        if strangers:
+            raise MutatorError(
+                f"no run folder, and not empty ({', '.join(sorted(strangers)[:3])})",
+                where=out,
+                expected="a run folder, or a new or empty folder",
+                remedy="choose another --out",
+            )
+    make_folder(out)
+
+
+_OURS = ("owner.lock", "workers", "plan", "plan.csv", "campaign.yaml")  # what a killed freeze leaves
+
+
+def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
+    """As `freeze`, by who owns the folder already."""
+    if RunFolder.exists(out):
+        folder = RunFolder.open(out)
+        if folder.head["plan"] != plan.digest:
+            raise MutatorError(
+                "holds another plan",
+                where=out,
+                expected=f"plan {plan.digest[:16]}",
+                remedy="use another folder, or the campaign and options it was planned with",
+            )
+        check_sources(out, folder.head["sources"], _sources(plan, workspace))
+        return folder
+    write_atomic(out / "campaign.yaml", plan.campaign.source)
+    write_atomic(out / "plan.csv", _csv(plan))
+    chunks = planfile.write(out, plan.experiments, plan.chunks)
+    write_json(out / HEAD, _head(plan, workspace, chunks))
+    return RunFolder.open(out)
+
+
+def _sources(plan: Plan, workspace: Workspace) -> dict[str, str]:
+    scenarios = {scenario for scenario, _ in plan.goldens()}
+    return sources(workspace, workspace.manifest(plan.campaign.target), scenarios)
+
+
+def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dict[str, Any]:
+    manifest = workspace.manifest(plan.campaign.target)
+    canary = planfile.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
+    return {
+        "schema": SCHEMA,
+        "plan": plan.digest,
+        "campaign": plan.campaign.name,
+        "campaign_digest": digest(plan.campaign.source),
+        "target": plan.campaign.target,
+        "seed": plan.seed,
+        "reading": plan.reading,
+        "choices": asdict(plan.choices),
+        "experiments": len(plan.experiments),
+        "runs": plan.runs,
+        "limits": asdict(plan.campaign.limits),
+        "hazards": list(manifest.hazards),
+        "compared": [channel.name for channel in manifest.compared],
+        "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "canary": canary,
+        "canary_hazard": plan.campaign.canary.hazard,
+        "sources": _sources(plan, workspace),
+        "target_files": manifest.tree.digests,
+        "provenance": versions(),
+        "chunks": chunks,
+    }
+
+
+def _csv(plan: Plan) -> bytes:
+    writer = csv.DictWriter(text := io.StringIO(), PLAN_COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(plan.rows())
+    return text.getvalue().encode()
+
+
+def load_plan(out: Path) -> Plan:
+    """The frozen plan of a run folder, complete (for reports; workers read single chunks instead)."""
+    from mutator.verification.preflight import measured_cpu_s
+
+    folder = RunFolder.open(out)
+    head = folder.head
+    canary = dict(head["canary"])
+    fault = planfile.fault_from(canary["fault"])
+    return Plan(
+        campaign=load_campaign(folder.path / "campaign.yaml"),
+        choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
+        seed=head["seed"],
+        reading=head["reading"],
+        experiments=planfile.read_all(folder.path),
+        chunks=tuple(count for _, _, count in head["chunks"]),
+        canary=planfile.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
+        runs=head.get("runs", head["experiments"]),
+        digest=head["plan"],
+        run_cpu_s=measured_cpu_s(folder),
+    )

@@ -1,0 +1,107 @@
+"""A small part of many experiments that still shows everything: picked evenly, the same each time."""
+
+import random
+from collections import Counter, defaultdict, deque
+from collections.abc import Hashable, Iterable, Sequence
+
+from mutator._common.hashing import digest
+from mutator.model import Experiment
+
+_Cell = tuple[str, str, str, str]  # variant, method, scenario, trigger
+
+
+def spread(count: int, wanted: int) -> list[int]:
+    """`wanted` of the indices 0 ... count-1, evenly over them."""
+    if wanted >= count:
+        return list(range(count))
+    return [(2 * i + 1) * count // (2 * wanted) for i in range(wanted)]
+
+
+def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+    """`count` of the experiments, in their order: each spec's variant as often as any other, and within a
+    variant each method, scenario and trigger; which values, and ties, by a hash of seed and id."""
+    if count >= len(experiments):
+        return tuple(experiments)
+    cells: dict[str, dict[_Cell, deque[Experiment]]] = defaultdict(dict)
+    for experiment in sorted(experiments, key=lambda e: digest([seed, e.id])):
+        cell = _cell(experiment)
+        cells[cell[0]].setdefault(cell, deque()).append(experiment)
+    taken: Counter[Hashable] = Counter()
+    chosen: set[str] = set()
+    while len(chosen) < count:
+        variant = min(cells, key=lambda name: (taken[name], digest([seed, name])))
+        cell = min(cells[variant], key=lambda c: (*_load(taken, c), digest([seed, c])))
+        chosen.add(cells[variant][cell].popleft().id)
+        taken.update(_marks(cell))
+        if not cells[variant][cell]:
+            del cells[variant][cell]
+        if not cells[variant]:
+            del cells[variant]
+    return tuple(e for e in experiments if e.id in chosen)
+
+
+def _cell(experiment: Experiment) -> _Cell:
+    return (experiment.fault.spec, experiment.method.value, experiment.scenario, experiment.trigger.name)
+
+
+def _marks(cell: _Cell) -> Iterable[Hashable]:
+    """What is counted for a cell, from what matters most to what matters least."""
+    variant, method, scenario, trigger = cell
+    yield variant
+    yield variant, method
+    yield variant, "scenario", scenario
+    yield variant, "trigger", trigger
+    yield method, scenario
+    yield "method", method
+    yield "scenario", scenario
+    yield "trigger", trigger
+
+
+def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
+    return [taken[mark] for mark in _marks(cell)]
+
+
+def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+    """`count` of the experiments, in their order, guided and random ones in pairs: of each fault type in
+    each scenario in proportion to its number, but at least one pair; a systematic sample within each.
+
+    A ValueError tells a count that is too small for that, or that does not come out in whole pairs.
+    """
+    if count >= len(experiments):
+        return tuple(experiments)
+    strata: dict[_Stratum, dict[_Pair, list[Experiment]]] = defaultdict(dict)
+    for experiment in experiments:
+        fault = experiment.fault
+        stratum = (fault.module, fault.fault_type, experiment.scenario)
+        strata[stratum].setdefault(_pair(experiment), []).append(experiment)
+    size = len({experiment.method for experiment in experiments})
+    if count % size or count // size < len(strata):
+        raise ValueError(f"a multiple of {size}, {size * len(strata)} or more")
+    chosen: set[str] = set()
+    for stratum, number in _allot({key: len(pairs) for key, pairs in strata.items()}, count // size).items():
+        pairs = sorted(strata[stratum], key=lambda pair: (*pair[:2], digest([seed, pair])))
+        start = random.Random(digest([seed, stratum])).random()
+        for i in range(number):
+            members = strata[stratum][pairs[int((i + start) * len(pairs) / number)]]
+            chosen.update(member.id for member in members)
+    return tuple(e for e in experiments if e.id in chosen)
+
+
+_Stratum = tuple[str, str, str]  # module, fault type, scenario
+_Pair = tuple[str, str, str]  # variant, row of the context table, fault
+
+
+def _pair(experiment: Experiment) -> _Pair:
+    """What a guided experiment and its random partner have in common within a scenario."""
+    row = experiment.trigger.name.removeprefix("random/")
+    return (experiment.fault.spec, row, experiment.fault.id)
+
+
+def _allot(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
+    """`total` seats for strata of these sizes, one each and then by Sainte-Lague's rule (1910), as for the
+    seats of a parliament: the next goes to whom it brings nearest to its share."""
+    seats = dict.fromkeys(sizes, 1)
+    while sum(seats.values()) < total:
+        next_one = max(sizes, key=lambda key: (sizes[key] / (2 * seats[key] + 1), key))
+        seats[next_one] += 1
+    return seats

@@ -1,0 +1,170 @@
+"""A comparison of two runs: everything that is said of it, and what a gate finds in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+
+from mutator.comparison.differences import Fact, Files, facts, files, remarks
+from mutator.comparison.pairs import Change, Matching, Pair, match, time_to_hazard
+from mutator.comparison.sheets import (
+    Names,
+    changes_sheet,
+    endings_sheet,
+    frame_of,
+    rates_sheets,
+    times_sheets,
+)
+from mutator.comparison.sides import Side, read_side, words
+from mutator.errors import MutatorError
+from mutator.model import Experiment
+from mutator.outcomes.rows import Row
+from mutator.statistics.sheet import Sheet
+
+
+class Gate(StrEnum):
+    """What a gate can fail on: changes for the worse, and experiments that have no partner."""
+
+    NEW_HAZARD = Change.NEW_HAZARD.value
+    OTHER_HAZARD = Change.OTHER_HAZARD.value
+    EARLIER_HAZARD = Change.EARLIER_HAZARD.value
+    LOST_ALERT = Change.LOST_ALERT.value
+    WORSE = Change.WORSE.value
+    NEW_CRASH = Change.NEW_CRASH.value
+    HARNESS_ERROR = Change.HARNESS_ERROR.value
+    UNMATCHED = "unmatched"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One experiment that a gate fails on: its id (in the second run, if it is there), and what is wrong."""
+
+    gate: Gate
+    experiment_id: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Two runs, matched."""
+
+    a: Side
+    b: Side
+    matching: Matching
+
+    @cached_property
+    def names(self) -> Names:
+        """What the runs are called: their folders' names, told apart where these are the same."""
+        a, b = self.a.name, self.b.name
+        return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        return self.matching.pairs
+
+    @cached_property
+    def changed(self) -> tuple[Pair, ...]:
+        """The pairs with any change: new hazards first, then as in `Change`, and as in the plan."""
+        order = list(Change)
+        changed = (pair for pair in self.pairs if pair.changes)
+        return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.changes))))
+
+    def having(self, change: Change) -> tuple[Pair, ...]:
+        return tuple(p for p in self.pairs if change in p.changes)
+
+    @cached_property
+    def facts(self) -> tuple[Fact, ...]:
+        return facts(self.a, self.b)
+
+    @cached_property
+    def files(self) -> Files | None:
+        return files(self.a.folder, self.b.folder)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        return remarks(self.matching)
+
+    @cached_property
+    def sheets(self) -> tuple[Sheet, ...]:
+        """The tables, those first that are read first."""
+        frame = frame_of(self.pairs)
+        rates, rates_by_type = rates_sheets(frame, self.names)
+        spans, spans_by_type = times_sheets(frame, self.names)
+        counts = (endings_sheet(self.pairs, self.names), changes_sheet(self.pairs))
+        return (*counts, rates, spans, rates_by_type, spans_by_type)
+
+    @cached_property
+    def unmatched(self) -> tuple[tuple[str, Experiment], ...]:
+        """What could not be compared, with the reason."""
+        m, names = self.matching, self.names
+        told: tuple[tuple[str, Sequence[Experiment]], ...] = (
+            (f"only in {names.a}", m.only_a),
+            (f"only in {names.b}", m.only_b),
+            (f"no result in {names.a}", m.no_result_a),
+            (f"no result in {names.b}", m.no_result_b),
+            ("several of this name in one run", m.ambiguous),
+        )
+        return tuple((why, experiment) for why, group in told for experiment in group)
+
+    @property
+    def incomplete(self) -> int:
+        """Results that are missing in one run or the other, of experiments that both have planned."""
+        m = self.matching
+        return (
+            len(m.no_result_a)
+            + len(m.no_result_b)
+            + sum(not row.usable for pair in self.pairs for row in (pair.row_a, pair.row_b))
+        )
+
+
+def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:
+    """Compare two run folders; `only` chooses experiments by what is known of them before running.
+
+    MutatorError when none of them has a partner; CheckFailed when the proof of a run failed.
+    """
+    a, b = read_side(run_a, only), read_side(run_b, only)
+    matching = match(a, b)
+    if not matching.pairs:
+        raise MutatorError(
+            f"no experiment of {a.name} ({len(a.rows)} with a result) has a partner in {b.name} "
+            f"({len(b.rows)})",
+            where=run_b,
+            expected="runs of the same faults, scenarios and triggers",
+            remedy="compare runs of one campaign, or widen --only",
+        )
+    return Comparison(a=a, b=b, matching=matching)
+
+
+def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ...]:
+    """What the gates fail on, in their order."""
+    found: list[Finding] = []
+    for gate in gates:
+        if gate is Gate.UNMATCHED:
+            m = comparison.matching
+            strangers = (*m.only_a, *m.only_b, *m.ambiguous)
+            found += [Finding(gate=gate, experiment_id=e.id, words=words(e)) for e in strangers]
+        else:
+            found += [
+                Finding(gate=gate, experiment_id=p.b.id, words=f"{words(p.b)}: {told(p)}")
+                for p in comparison.having(Change(gate.value))
+            ]
+    return tuple(found)
+
+
+def told(pair: Pair) -> str:
+    """What became of a pair: `sdc -> hazard (H1 7.10 s after activation)`."""
+    return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
+
+
+def _ending(row: Row) -> str:
+    time = time_to_hazard(row)
+    details = []
+    if row.hazards:
+        names = ", ".join(name for name, _ in row.hazards)
+        details.append(names if time is None else f"{names} {time:.2f} s after activation")
+    if row.alerts:
+        details.append(f"alert {', '.join(row.alerts)}")
+    if not row.usable or (row.detail and not details):
+        details.append(row.detail.splitlines()[0] if row.detail else "no result")
+    return f"{row.ending} ({'; '.join(details)})" if details else row.ending

@@ -1,0 +1,94 @@
+"""What differs between two runs before any result: their sources, choices and versions.
+
+A difference of results means what it seems to mean only where this list is what one wanted to compare.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mutator.comparison.pairs import Matching, Pair
+from mutator.comparison.sides import Side
+from mutator.store.run_folder import RunFolder
+
+_SHORT = 12  # digits of a digest that are shown
+_HEAD = ("campaign", "target", "seed", "reading")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fact:
+    """One thing of both runs."""
+
+    name: str
+    a: str
+    b: str
+
+    @property
+    def differs(self) -> bool:
+        return self.a != self.b
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Files:
+    """Files of the target that differ between the runs, by path."""
+
+    changed: tuple[str, ...]
+    only_a: tuple[str, ...]
+    only_b: tuple[str, ...]
+
+
+def facts(a: Side, b: Side) -> tuple[Fact, ...]:
+    """What the runs were made of: first all that a result depends on, then packages that differ."""
+    heads = [_facts(side) for side in (a, b)]
+    names = dict.fromkeys(name for head in heads for name in head)
+    return tuple(Fact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
+
+
+def _facts(side: Side) -> dict[str, str]:
+    head, versions = side.folder.head, side.folder.provenance
+    told = {name: str(head[name]) for name in _HEAD}
+    told["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
+    told["chosen"] = ", ".join(f"{k} {v}" for k, v in head["choices"].items() if v is not None) or "-"
+    told |= {f"digest of {name}": value[:_SHORT] for name, value in head["sources"].items()}
+    told["digest of plan"] = head["plan"][:_SHORT]
+    told |= {name: str(versions[name]) for name in ("mutator", "python", "machine")}
+    return told | {f"package {name}": version for name, version in versions["packages"].items()}
+
+
+def files(a: RunFolder, b: RunFolder) -> Files | None:
+    """The target's files that differ; None where a run, made before they were written down, does not say."""
+    of_a, of_b = (_files(folder.head) for folder in (a, b))
+    if of_a is None or of_b is None:
+        return None
+    return Files(
+        changed=tuple(sorted(path for path in of_a if path in of_b and of_a[path] != of_b[path])),
+        only_a=tuple(sorted(set(of_a) - set(of_b))),
+        only_b=tuple(sorted(set(of_b) - set(of_a))),
+    )
+
+
+def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
+    found: dict[str, str] | None = head.get("target_files")
+    return found
+
+
+def remarks(matching: Matching) -> tuple[str, ...]:
+    """What is not the same within pairs although they have one name, with the number of such pairs."""
+    told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
+        ("inject something else, or elsewhere", lambda p: p.a.fault.injections != p.b.fault.injections),
+        ("wait for another condition", lambda p: p.a.trigger.condition != p.b.trigger.condition),
+        ("hold otherwise, or wait for another time", lambda p: _hold(p.a) != _hold(p.b)),
+        ("drive a scenario with another text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
+        ("have another seed", lambda p: p.a.seed != p.b.seed),
+    )
+    counts = ((_count(matching.pairs, differs), what) for what, differs in told)
+    return tuple(f"{n} of {len(matching.pairs)} pairs {what}." for n, what in counts if n)
+
+
+def _hold(experiment: Any) -> tuple[object, ...]:
+    trigger, fault = experiment.trigger, experiment.fault
+    return (fault.hold or trigger.hold, trigger.hold_s, trigger.armed_after_s)
+
+
+def _count(pairs: Iterable[Pair], differs: Callable[[Pair], bool]) -> int:
+    return sum(map(differs, pairs))

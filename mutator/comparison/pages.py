@@ -1,0 +1,199 @@
+"""A comparison written down: Markdown, one HTML page that needs nothing else, CSV of pairs and tables."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.resources import files as package_files
+from pathlib import Path
+
+from mutator._common.files import make_folder, write_atomic
+from mutator._common.text import counted
+from mutator.comparison.comparison import Comparison, Gate, told
+from mutator.comparison.pairs import Change, Pair, time_to_hazard
+from mutator.comparison.sides import words
+from mutator.outcomes.rows import Row
+from mutator.report.page import markdown_line, markdown_table
+from mutator.web import asset
+
+LISTED = 50  # experiments of one kind of change that the Markdown names; page and CSV have all
+SHOWN = 500  # rows of the page's table that are seen at once: a browser needs seconds to lay out thousands
+_BAD = frozenset(gate.value for gate in Gate)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """Where a comparison was written."""
+
+    markdown: Path
+    page: Path
+    pairs: Path
+
+
+def write(comparison: Comparison, out: Path) -> Written:
+    """Write all forms of the comparison into `out`, made if missing; the same bytes each time."""
+    make_folder(out / "tables")
+    text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
+    for sheet in comparison.sheets:
+        write_atomic(out / "tables" / f"{sheet.name}.csv", sheet.csv().encode())
+    write_atomic(pairs, _table(_pair_line(p) for p in comparison.pairs))
+    unmatched = ({"why": why, "experiment": e.id, "words": words(e)} for why, e in comparison.unmatched)
+    write_atomic(out / "unmatched.csv", _table(unmatched, heads=("why", "experiment", "words")))
+    write_atomic(text, markdown(comparison).encode())
+    write_atomic(hypertext, page(comparison).encode())
+    return Written(markdown=text, page=hypertext, pairs=pairs)
+
+
+def summary(comparison: Comparison) -> str:
+    """The comparison in a few sentences."""
+    c = comparison
+    counts = Counter(change for pair in c.pairs for change in pair.changes)
+    text = f"In both runs: {counted(len(c.pairs), 'experiment')}. "
+    if counts:
+        listed = ", ".join(f"{change.value} {counts[change]}" for change in Change if counts[change])
+        text += f"{len(c.changed)} of them changed: {listed}."
+    else:
+        text += "None of them changed."
+    if unusable := sum(not p.usable for p in c.pairs):
+        text += f" {unusable} of them say nothing of their fault in a run (a harness error, or a mutant that "
+        text += "could not be made) and are in no rate."
+    if c.unmatched:
+        text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in reasons(c)) + "."
+    return text
+
+
+def reasons(comparison: Comparison) -> list[tuple[str, int]]:
+    """Why experiments could not be compared, and how many."""
+    return list(Counter(why for why, _ in comparison.unmatched).items())
+
+
+def files_text(comparison: Comparison) -> str:
+    """Which of the target's files differ, in words."""
+    found = comparison.files
+    if found is None:
+        return (
+            "Which files of the target differ is not known: a run was planned before that was written down."
+        )
+    parts = {
+        "changed": found.changed,
+        f"only in {comparison.names.a}": found.only_a,
+        f"only in {comparison.names.b}": found.only_b,
+    }
+    named = [f"{what}: {', '.join(paths)}" for what, paths in parts.items() if paths]
+    return f"Files of the target {'; '.join(named)}." if named else "The target's files are the same."
+
+
+def markdown(comparison: Comparison) -> str:
+    """The comparison as Markdown."""
+    c = comparison
+    parts = [f"# {c.names.a} against {c.names.b}", summary(c), *c.remarks, "## What differs between the runs"]
+    differing = [[f.name, f.a, f.b] for f in c.facts if f.differs]
+    if differing:
+        parts.append(markdown_table(["what", c.names.a, c.names.b], differing))
+    else:
+        parts.append("Nothing: the same sources, choices and versions.")
+    parts.append(files_text(c))
+    parts += [sheet.markdown().rstrip() for sheet in c.sheets]
+    for change in Change:
+        if pairs := c.having(change):
+            parts += [f"## {change.value}: {len(pairs)}", _listed(pairs)]
+    if c.unmatched:
+        parts += ["## Not compared", markdown_table(["why", "experiments"], _texts(reasons(c)))]
+        parts.append("Each of them is in `unmatched.csv`.")
+    parts.append("The table of all pairs is `pairs.csv`; `index.html` lists those that changed.")
+    return "\n\n".join(parts) + "\n"
+
+
+def _listed(pairs: tuple[Pair, ...]) -> str:
+    lines = [f"- {words(p.b)}: {markdown_line(told(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]]
+    more = len(pairs) - LISTED
+    return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
+
+
+def _texts(lines: Iterable[tuple[object, ...]]) -> list[list[str]]:
+    return [[str(cell) for cell in line] for line in lines]
+
+
+def page(comparison: Comparison) -> str:
+    """The comparison as one HTML page; every text of a run in it is escaped."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    counts = Counter(change for pair in comparison.pairs for change in pair.changes)
+    return environment.from_string(_own("page.html")).render(
+        c=comparison,
+        summary=summary(comparison),
+        differing=[fact for fact in comparison.facts if fact.differs],
+        files=files_text(comparison),
+        counts=[(change.value, counts[change]) for change in Change if counts[change]],
+        reasons=reasons(comparison),
+        lines=list(map(_shown, comparison.changed)),
+        limit=SHOWN,
+        bad=_BAD,
+        base_css=Markup(asset("base.css")),
+        script=Markup(_own("page.js")),
+    )
+
+
+def _own(name: str) -> str:
+    return package_files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def _shown(pair: Pair) -> dict[str, object]:
+    """What the page's table shows of a pair."""
+    same = pair.a.id == pair.b.id
+    return {
+        "words": words(pair.b),
+        "changes": [change.value for change in Change if change in pair.changes],
+        "sides": [_shown_side(pair.row_a), _shown_side(pair.row_b)],
+        "ids": [pair.a.id] if same else [pair.a.id, pair.b.id],
+    }
+
+
+def _shown_side(row: Row) -> dict[str, str]:
+    time = time_to_hazard(row)
+    details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
+    if row.detail:
+        details.append(row.detail)
+    return {
+        "ending": row.ending,
+        "details": ", ".join(details),
+        "time": "" if time is None else f"{time:.2f}",
+    }
+
+
+def _pair_line(pair: Pair) -> dict[str, object]:
+    """A pair's line of pairs.csv; times are s of simulation since its start."""
+    row = pair.row_b
+    line: dict[str, object] = {
+        "experiment_a": pair.a.id,
+        "experiment_b": pair.b.id,
+        **{name: getattr(row, name) for name in ("module", "fault_type", "variant", "value", "unit")},
+        **{name: getattr(row, name) for name in ("scenario", "method", "trigger")},
+        "changes": ";".join(change.value for change in Change if change in pair.changes),
+    }
+    sides = [dict(_side_cells(row)) for row in (pair.row_a, pair.row_b)]
+    return line | {f"{k}_{s}": side[k] for k in sides[0] for s, side in zip("ab", sides, strict=True)}
+
+
+def _side_cells(row: Row) -> Iterator[tuple[str, object]]:
+    yield "ending", row.ending
+    yield "t_activation", row.t_activation
+    yield "t_manifest", row.t_manifest
+    yield "hazards", ";".join(name for name, _ in row.hazards)
+    yield "t_hazard", row.hazards[0][1] if row.hazards else None
+    yield "alerts", ";".join(row.alerts)
+    yield "t_alert", row.t_alert
+
+
+def _table(lines: Iterable[Mapping[str, object]], heads: tuple[str, ...] = ()) -> bytes:
+    made = list(lines)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, heads or tuple(made[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(made)
+    return text.getvalue().encode()

@@ -1,0 +1,176 @@
+"""The tables of a comparison: what changed, rates and times in pairs."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from mutator.comparison.pairs import Change, Pair, time_to_hazard
+from mutator.model import Outcome, Status
+from mutator.outcomes.rows import Row, by_fault_type
+from mutator.statistics.compare import holm
+from mutator.statistics.paired import mcnemar, rate_difference, times
+from mutator.statistics.share import share
+from mutator.statistics.sheet import Cell, P, Sheet
+
+FLAGS = {"activated": "t_activation", "manifested": "t_manifest", "alert": "t_alert", "hazard": "t_hazard"}
+# of an experiment, each counted from its activation; the last from its first alert
+TIMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
+
+
+def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
+    """A row for each pair in which both runs say something about the fault.
+
+    `kind` (`radar/chaff`), `fault` (what is resampled: variant and value), flags `activated_a`, `activated_b`
+    and so on, times `activation to hazard_a` and so on, s, NaN: not both of them came.
+    """
+    rows = [
+        {
+            "kind": by_fault_type(p.row_a),
+            "fault": p.row_a.fault,
+            **_cells(p.row_a, "a"),
+            **_cells(p.row_b, "b"),
+        }
+        for p in pairs
+        if p.usable
+    ]
+    names = [f"{name}_{side}" for side in "ab" for name in (*FLAGS, *TIMES)]
+    frame = pd.DataFrame(rows, columns=["kind", "fault", *names])
+    flags = [f"{name}_{side}" for side in "ab" for name in FLAGS]
+    return frame.astype(dict.fromkeys(flags, bool) | {n: float for n in names if n not in flags})
+
+
+def _cells(row: Row, side: str) -> dict[str, object]:
+    start, alert = row.t_activation, row.t_alert
+    hazard = row.hazards[0][1] if row.hazards else None
+    spans = (_span(start, row.t_manifest), _span(start, alert), time_to_hazard(row), row.reaction_time)
+    flags = (start, row.t_manifest, alert, hazard)
+    told = dict(zip(FLAGS, (time is not None for time in flags), strict=True))
+    return {f"{k}_{side}": v for k, v in (told | dict(zip(TIMES, spans, strict=True))).items()}
+
+
+def _span(start: float | None, end: float | None) -> float:
+    return math.nan if start is None or end is None else end - start
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Names:
+    """What the two runs are called in tables."""
+
+    a: str
+    b: str
+
+
+def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
+    """Rates, their difference and McNemar's exact test of each flag: of all pairs, and of each fault type."""
+    whole = tuple((flag, *_rates(frame, flag)) for flag in FLAGS)
+    parts: list[tuple[Cell, ...]] = []
+    for flag in FLAGS:
+        found = {str(kind): _rates(group, flag) for kind, group in frame.groupby("kind")}
+        parts += _adjusted(flag, found)
+    note = (
+        f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
+        "(of 1), its interval resampled by fault (variant and value). p: McNemar's exact test of the pairs "
+        "that differ"
+    )
+    heads = (
+        *("pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
+        *("difference", "difference, low", "difference, high", "p"),
+    )
+    return _both("rates", "What came in how many runs", note, ("what", heads), whole, parts)
+
+
+def _rates(frame: pd.DataFrame, flag: str) -> tuple[Cell, ...]:
+    first, second = frame[f"{flag}_a"], frame[f"{flag}_b"]
+    m, change = mcnemar(first, second), rate_difference(first, second, frame["fault"])
+    rates = (share(m.both + m.first_only, m.pairs), share(m.both + m.second_only, m.pairs))
+    return (
+        *(m.pairs, *rates, m.first_only, m.second_only),
+        *(change.difference, change.low, change.high, P(m.p)),
+    )
+
+
+def times_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
+    """Medians, their difference and Wilcoxon's test of each time: of all pairs, and by fault type."""
+    known = {name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIMES}
+    whole = tuple((name, *_times(some, name)) for name, some in known.items() if len(some))
+    parts: list[tuple[Cell, ...]] = []
+    for name, some in known.items():
+        parts += _adjusted(name, {str(kind): _times(group, name) for kind, group in some.groupby("kind")})
+    note = (
+        f"Medians in s. Difference: the median of the pairs' differences, {names.b} less {names.a}, with its "
+        "exact interval (none for fewer than six pairs). p: Wilcoxon's signed-rank test (none where no pair "
+        "differs)"
+    )
+    heads = ("pairs", names.a, names.b, "difference", "difference, low", "difference, high", "p")
+    return _both("times", "How long it took, where it came in both runs", note, ("time", heads), whole, parts)
+
+
+def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
+    t = times(frame[f"{name}_a"], frame[f"{name}_b"])
+    return (t.n, t.first, t.second, t.median.difference, t.median.low, t.median.high, P(t.p))
+
+
+def _adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
+    """The lines of one thing by fault type; behind p, which is the last cell, what it is after Holm."""
+    p_values = {kind: cells[-1] for kind, cells in found.items()}
+    known = {kind: p for kind, p in p_values.items() if isinstance(p, P) and not math.isnan(p)}
+    holm_values = dict(zip(known, map(P, holm(list(known.values()))), strict=True))
+    return [(name, kind, *cells, holm_values.get(kind)) for kind, cells in found.items()]
+
+
+def _both(
+    name: str,
+    title: str,
+    note: str,
+    heads: tuple[str, tuple[str, ...]],
+    whole: tuple[tuple[Cell, ...], ...],
+    parts: Sequence[tuple[Cell, ...]],
+) -> tuple[Sheet, Sheet]:
+    what, numbers = heads
+    return (
+        Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),
+        Sheet(
+            name=f"{name}_by_fault_type",
+            title=f"{title}, by fault type",
+            note=f"{note}; p, Holm: adjusted over the fault types.",
+            heads=(what, "fault type", *numbers, "p, Holm"),
+            lines=tuple(parts),
+        ),
+    )
+
+
+def changes_sheet(pairs: Sequence[Pair]) -> Sheet:
+    """How many pairs of each fault type changed how; only changes that there are."""
+    seen = [change for change in Change if any(change in p.changes for p in pairs)]
+    kinds = sorted({by_fault_type(p.row_a) for p in pairs})
+    parts = {kind: [p for p in pairs if by_fault_type(p.row_a) == kind] for kind in kinds}
+    lines = tuple(_count_line(kind, part, seen) for kind, part in parts.items())
+    return Sheet(
+        name="changes",
+        title="What changed",
+        note="A pair may have changed in several ways. Same: none of what is listed here changed.",
+        heads=("fault type", "pairs", "same", *(change.value for change in seen)),
+        lines=(*lines, _count_line("total", pairs, seen)),
+    )
+
+
+def _count_line(name: str, pairs: Sequence[Pair], seen: Sequence[Change]) -> tuple[Cell, ...]:
+    same = sum(not p.changes for p in pairs)
+    return (name, len(pairs), same, *(sum(change in p.changes for p in pairs) for change in seen))
+
+
+def endings_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
+    """How many pairs ended how in the first run (lines) and in the second (columns)."""
+    counts = Counter((p.row_a.ending, p.row_b.ending) for p in pairs)
+    order = [*(o.value for o in Outcome), *(s.value for s in Status if s is not Status.OK)]
+    before, after = ([e for e in order if any(pair[i] == e for pair in counts)] for i in (0, 1))
+    return Sheet(
+        name="endings",
+        title="How they ended",
+        note=f"Each line is how the experiments ended in {names.a}, each column how in {names.b}.",
+        heads=(f"{names.a} / {names.b}", *after),
+        lines=tuple((a, *(counts[a, b] for b in after)) for a in before),
+    )

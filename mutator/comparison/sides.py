@@ -1,0 +1,85 @@
+"""The two sides of a comparison: the experiments of a run, and what became of them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from mutator.campaigns.filters import compile_filter
+from mutator.model import Experiment, Value
+from mutator.outcomes import results
+from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
+from mutator.outcomes.rows import Row, row_from
+from mutator.store import plan_file as planfile
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence as proof
+
+
+class Key(NamedTuple):
+    """What an experiment is called in any run, whatever its target, reading, setting or seed.
+
+    Ids will not do: drawn times, the reading, the setting and the scenario's text are in them, too.
+    """
+
+    spec: str  # with its variant: radar/chaff/distance
+    value: Value
+    scenario: str
+    method: str
+    trigger: str  # its name: C1, random/C1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """One run: its folder, the experiments that were planned for it, and the rows of those that have one."""
+
+    folder: RunFolder
+    experiments: tuple[Experiment, ...]
+    rows: dict[str, Row]  # by experiment id
+
+    @property
+    def name(self) -> str:
+        return self.folder.path.name
+
+
+def read_side(run: Path, only: str | None = None) -> Side:
+    """The run folder `run`, of its experiments those for which `only` holds (a filter over plan columns).
+
+    Made from plan and records, so nothing is written into the folder. MutatorError when it is none,
+    CheckFailed when the proof of its engine failed: its results are not to be compared.
+    """
+    folder = RunFolder.open(run)
+    records = read_records(folder.path)
+    proof.judge(folder, records)
+    accepts = compile_filter(only, PLAN_COLUMNS) if only else None
+    experiments = tuple(e for e in planfile.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
+    hazards = folder.head["hazards"]
+    rows = {
+        e.id: row_from({k: _text(v) for k, v in results.row(e, records[e.id], hazards).items()})
+        for e in experiments
+        if e.id in records
+    }
+    return Side(folder=folder, experiments=experiments, rows=rows)
+
+
+def key_of(experiment: Experiment) -> Key:
+    """What the experiment is matched by."""
+    fault = experiment.fault
+    return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)
+
+
+def words(experiment: Experiment) -> str:
+    """The experiment in words: `radar/chaff/distance 35 m, S1, guided C1`."""
+    fault = experiment.fault
+    value = f" {fault.value} {fault.unit}".removesuffix(" -") if fault.value is not None else ""
+    return f"{fault.spec}{value}, {drive(experiment)}"
+
+
+def drive(experiment: Experiment) -> str:
+    """What the fault was put to, in words: `S1, guided C1`."""
+    method = experiment.method.value
+    return f"{experiment.scenario}, {method} {experiment.trigger.name.removeprefix(f'{method}/')}"
+
+
+def _text(value: object) -> str:
+    """A cell as it stands in results.csv."""
+    return "" if value is None else str(value)

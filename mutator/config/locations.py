@@ -1,0 +1,51 @@
+"""A place in the target as YAML writes it: `{file: ..., function: ..., after_assign: d_rel}`."""
+
+import keyword
+
+from pydantic import Field
+
+from mutator.config.yaml_files import Keys, Source, StrictModel
+from mutator.model import Anchor, AnchorKind, FaultLocation
+
+
+class AtModel(StrictModel):
+    """File, qualified function name, exactly one anchor, and `nth` where there are several hits."""
+
+    file: str
+    function: str
+    after_assign: str | None = None
+    before_assign: str | None = None
+    after_call: str | None = None
+    before_call: str | None = None
+    before_return: str | None = None
+    entry: bool | None = None
+    nth: int | None = Field(None, ge=1)
+
+    def location(self, source: Source, keys: Keys) -> FaultLocation:
+        """The location; errors point into `source` at `keys`."""
+        given = [kind for kind in AnchorKind if getattr(self, kind.value) not in (None, False)]
+        if len(given) != 1:
+            raise source.error(
+                keys,
+                f"{len(given)} anchors" + (f" ({', '.join(given)})" if given else ""),
+                expected=f"exactly one of {', '.join(AnchorKind)}",
+                remedy="name one statement, e.g. `after_assign: d_rel`",
+            )
+        kind = given[0]
+        name = "" if kind is AnchorKind.ENTRY else getattr(self, kind.value)
+        if not (dotted_name(name) or (not name and kind in (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN))):
+            raise source.error((*keys, kind.value), f"'{name}'", expected="a dotted name as in the source")
+        if not dotted_name(self.function.replace(".<locals>", "")):
+            raise source.error(
+                (*keys, "function"),
+                f"'{self.function}'",
+                expected="a qualified name such as RadarSensor.measure",
+            )
+        anchor = Anchor(kind=kind, name=name, nth=self.nth)
+        return FaultLocation(path=self.file, function=self.function, anchor=anchor)
+
+
+def dotted_name(text: str) -> bool:
+    """Whether `text` is a chain of identifiers that are no keywords and not the probe's name."""
+    parts = text.split(".")
+    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != "_fi"

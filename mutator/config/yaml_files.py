@@ -1,0 +1,216 @@
+"""YAML at the edge: strict, with a line for every value, so that an error can point at its place.
+
+The dialect is the core of YAML 1.2: `true`/`false`, `null`, decimal numbers, strings; no tags, no anchors
+and aliases (a small file could unfold into gigabytes), one document a file, no key twice.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from mutator._common.text import counted
+from mutator.config import problems as shape_errors
+from mutator.errors import MutatorError
+
+Keys = tuple[str | int, ...]
+M = TypeVar("M", bound="StrictModel")
+
+MAX_BYTES = 1_000_000
+_SCHEMA = re.compile(r"([a-z_]+)/(\d{1,6})\Z")
+_CORE = {
+    "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
+    "null": ("~nN\0", r"~|null|Null|NULL|"),
+    "int": ("-+0123456789", r"[-+]?[0-9]{1,400}"),
+    "float": (
+        "-+.0123456789",
+        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+    ),
+}
+
+
+class StrictModel(BaseModel):
+    """Base of every file's shape: no unknown key, no silent change of a value's type."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A parsed file and where its values stand: `lines` maps a path of keys to a line (from 1)."""
+
+    path: Path
+    data: Any
+    lines: dict[Keys, int]
+
+    def line(self, keys: Keys) -> int | None:
+        """Line of the value at `keys`, or of the nearest thing around it."""
+        for end in range(len(keys), -1, -1):
+            if keys[:end] in self.lines:
+                return self.lines[keys[:end]]
+        return None
+
+    def error(
+        self, keys: Keys, got: str, *, expected: str | None = None, remedy: str | None = None
+    ) -> MutatorError:
+        """An error (not raised) that points at the value at `keys`."""
+        return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
+
+
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """The safe loader with the scalars of YAML 1.2: `on` and `no` are words, `1:30` is no number."""
+
+    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
+
+
+for _kind, (_first, _pattern) in _CORE.items():
+    for _character in _first:
+        _Loader.yaml_implicit_resolvers.setdefault("" if _character == "\0" else _character, []).append(
+            (f"tag:yaml.org,2002:{_kind}", re.compile(rf"(?:{_pattern})\Z"))
+        )
+
+
+def load(path: Path) -> Source:
+    """Parse one YAML file strictly; MutatorError with file and line for anything wrong with it."""
+    text = _read_text(path)
+    try:
+        _refuse_aliases(text, path)
+        node = yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise MutatorError(
+            f"not valid YAML: {error.problem or error.context}",
+            where=path,
+            line=mark.line + 1 if mark is not None else None,
+            remedy="check indentation, colons and quotes around this line",
+        ) from None
+    except yaml.YAMLError as error:
+        raise MutatorError(f"not valid YAML: {error}", where=path, remedy="save it as plain text") from None
+    except RecursionError:
+        raise MutatorError("nested too deeply", where=path, remedy="flatten the file") from None
+    lines: dict[Keys, int] = {}
+    data = _construct(node, (), lines, path) if node is not None else None
+    return Source(path=path, data=data, lines=lines)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise MutatorError(
+                f"{path.stat().st_size} bytes long", where=path, expected=f"at most {MAX_BYTES} bytes"
+            )
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise MutatorError(
+            f"not UTF-8 (byte {error.object[error.start]:#04x} at offset {error.start})",
+            where=path,
+            remedy="save the file as UTF-8",
+        ) from None
+    except OSError as error:
+        raise MutatorError(
+            f"cannot be read ({error.strerror})", where=path, remedy="check the path and its permissions"
+        ) from None
+
+
+def _refuse_aliases(text: str, path: Path) -> None:
+    for event in yaml.parse(text, Loader=_Loader):
+        anchor = getattr(event, "anchor", None)
+        tag = getattr(event, "tag", None)
+        if anchor or tag:
+            raise MutatorError(
+                f"'{tag}' (a tag)" if tag else f"'{anchor}' (an anchor or alias)",
+                where=path,
+                line=event.start_mark.line + 1 if event.start_mark else None,
+                expected="plain values",
+                remedy="write the value out",
+            )
+
+
+def _construct(node: yaml.Node, keys: Keys, lines: dict[Keys, int], path: Path) -> Any:
+    lines.setdefault(keys, node.start_mark.line + 1)
+    if isinstance(node, yaml.MappingNode):
+        return _construct_mapping(node, keys, lines, path)
+    if isinstance(node, yaml.SequenceNode):
+        return [_construct(item, (*keys, i), lines, path) for i, item in enumerate(node.value)]
+    return _scalar(node.tag.rpartition(":")[2], node.value)
+
+
+def _construct_mapping(
+    node: yaml.MappingNode, keys: Keys, lines: dict[Keys, int], path: Path
+) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        line = key_node.start_mark.line + 1
+        if not key_node.tag.endswith(":str"):
+            raise MutatorError(
+                f"key {key_node.value!r}", where=path, line=line, expected="text", remedy="put it in quotes"
+            )
+        key = key_node.value
+        if key in result:
+            raise MutatorError(
+                f"key '{key}' stands here a second time",
+                where=path,
+                line=line,
+                expected=f"it once (the first is in line {lines[(*keys, key)]})",
+                remedy="remove one of the two",
+            )
+        lines[(*keys, key)] = line
+        result[key] = _construct(value_node, (*keys, key), lines, path)
+    return result
+
+
+def _scalar(kind: str, text: str) -> Any:
+    if kind == "null":
+        return None
+    if kind == "bool":
+        return text.lower() == "true"
+    if kind == "int":
+        return int(text)
+    if kind == "float":
+        return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    return text
+
+
+def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
+    """Parse `path`, check its `schema: name/version` key against `schema`, validate the rest as `model`.
+
+    The schema key is not part of the model. A newer version, an unknown or doubled key, a wrong type
+    or a value out of range is a MutatorError with file, line, value, what was expected, and a remedy.
+    """
+    source = load(path)
+    if not isinstance(source.data, dict):
+        raise source.error(
+            (),
+            f"{shape_errors.shown(source.data)}",
+            expected="a mapping of keys to values",
+            remedy="see docs",
+        )
+    _check_schema(source, schema)
+    body = {key: value for key, value in source.data.items() if key != "schema"}
+    try:
+        return model.model_validate(body), source
+    except ValidationError as error:
+        problems = error.errors(include_url=False)
+        # a misspelt key also misses: the misspelling says more
+        problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
+        got, expected, remedy, keys = shape_errors.explain(problems[0], model)
+        if len(problems) > 1:
+            remedy += f" ({counted(len(problems) - 1, 'more mistake')} after this one)"
+        raise source.error(keys, got, expected=expected, remedy=remedy) from None
+
+
+def _check_schema(source: Source, schema: str) -> None:
+    given = source.data.get("schema")
+    if given == schema:
+        return
+    name, _, version = schema.partition("/")
+    match = _SCHEMA.match(given) if isinstance(given, str) else None
+    remedy = f"start the file with `schema: {schema}`"
+    if match and match[1] == name:
+        newer = int(match[2]) > int(version)
+        remedy = "use a newer version of this program" if newer else f"bring the file up to {schema}"
+    got = f"schema {given!r}" if "schema" in source.data else "no schema key"
+    raise source.error(("schema",), got, expected=schema, remedy=remedy)

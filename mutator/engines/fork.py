@@ -1,0 +1,275 @@
+"""The fork engine: a mutant is a fork of its golden run, taken right before its fault is first active.
+
+Same results as the reference engine's, byte for byte, or the reference engine is what runs: for mutants that
+cannot be put into a loaded program, and again for runs that did not end well, so the words about these are
+its own. `warm` forks before the first step of every run.
+"""
+
+import marshal
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import disk_full, full_disk_told, write_atomic
+from mutator._common.hashing import content_id
+from mutator.campaigns.campaign_files import Limits
+from mutator.engines.activation import Observed, Start, first_active
+from mutator.engines.code_swap import Exchange, NotExchangeable, exchange
+from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting
+from mutator.engines.processes import Ended, is_full, judge_report, judge_silent, read_report, tail
+from mutator.engines.reference import Execution, How, Job, ReferenceEngine
+from mutator.model import Status
+from mutator.targets.manifest import TargetManifest
+
+_MORE_S = 60.0  # beyond the wall limit of a run, until its process in the server must have answered
+_Key = tuple[str, int, tuple[str, ...]]
+
+
+class ForkEngine:
+    """Arguments as for ReferenceEngine; `null` are the files of the mutant without a fault."""
+
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        base: Path,
+        work: Path,
+        limits: Limits,
+        parent: int | None = None,
+        *,
+        null: Mapping[str, bytes],
+        warm: bool = False,
+    ) -> None:
+        self.reference = ReferenceEngine(manifest, base, work, limits, parent)
+        self._manifest = manifest
+        self._limits = limits
+        self._work = self.reference.work
+        self._parent = parent
+        self._null = null
+        self._warm = warm
+        self._patience_s = limits.wall_s + _MORE_S
+        self._pool: Pool | None = None
+        self._pools = 0
+        self._unfit = "" if manifest.stepwise else f"target {manifest.name} is not stepwise"
+        self._seen: dict[_Key, Observed | str] = {}  # or why there is none
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+        for job in jobs:
+            folder = self._work / f"{os.getpid()}-{job.name}"
+            try:
+                yield job, self.execute(job, folder)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def execute(self, job: Job, folder: Path) -> Execution:
+        """Run one job; its scratch folder `folder` is new, and left to the caller."""
+        try:
+            with full_disk_told(self._work):
+                return self._execute(job, folder)
+        except (NotExchangeable, Refused) as why:
+            shutil.rmtree(folder, ignore_errors=True)
+            return replace(self.reference.execute(job, folder), why=str(why))
+        except Lost as why:
+            self.close()
+            return _lost(str(why), folder)
+
+    def close(self) -> None:
+        if self._pool is not None:
+            self._pool.close()
+            self._pool = None
+
+    def _execute(self, job: Job, folder: Path) -> Execution:
+        if self._unfit:
+            raise Refused(self._unfit)
+        if job.mutant is None or job.golden is None or job.hash_seed:
+            raise Refused("no experiment")
+        changes = exchange(self._manifest, job.files, str(self._running().tree))
+        if self._warm:
+            first = self._running().first
+            first.load(_needed(changes), self._patience_s)
+            return self._become(first, job, folder, changes, _FROM_THE_START)
+        start = first_active(changes.probe, self._observed(job, job.golden))
+        if start is None:
+            return _golden(job, job.golden)
+        return self._become(self._at(job, start.step, changes), job, folder, changes, start)
+
+    def _running(self) -> Pool:
+        if self._pool is None:
+            self._pools += 1
+            home = self._work / f"{os.getpid()}-server-{self._pools}"
+            try:
+                self._pool = Pool(self._manifest, self.reference.base, home, self._parent)
+            except Refused as why:
+                self._unfit = str(why)
+                raise
+        return self._pool
+
+    def _at(self, job: Job, step: int, changes: Exchange) -> Waiting:
+        pool = self._running()
+        golden = Golden(key=_key(job), arguments=self._arguments(job, pool.home))
+        seen = self._seen.get(_key(job))
+        libraries = seen.libraries if isinstance(seen, Observed) else ()
+        return pool.before(step, golden, [*libraries, *_needed(changes)], self._patience_s)
+
+    def _arguments(self, job: Job, out: Path) -> list[str]:
+        return list(
+            self._manifest.arguments(
+                scenario=job.scenario.resolve(), seed=job.seed, out=out, changes=job.changes
+            )
+        )
+
+    def _become(
+        self, waiting: Waiting, job: Job, folder: Path, changes: Exchange, start: Start, watch: bool = False
+    ) -> Execution:
+        """Have a waiting process fork a child that finishes the run as the mutant."""
+        out = folder / "out"
+        out.mkdir(parents=True)
+        request = {
+            "home": str(folder),
+            "out": str(out),
+            "log": str(folder / "log"),
+            "report": str(folder / "report.json"),
+            "args": self._arguments(job, self._running().home if watch else out),  # begun as waiting ones are
+            "cpu_s": self._limits.cpu_s,
+            "memory_mb": self._limits.memory_mb,
+            "steps": self._limits.steps,
+            "probe_name": f"{self._manifest.package}._fi",
+            "probe": changes.probe,
+            "functions": [(f.module, f.path, f.old, f.new) for f in changes.functions],
+            "observed": start.observed,
+            "t": start.t,
+            "watch": watch,
+        }
+        asked = {"do": "mutant", "job": marshal.dumps(request), "wall_s": self._limits.wall_s}
+        said, _ = waiting.ask(asked, self._patience_s)
+        if said["threads"] != 1:
+            raise Refused(f"it has {said['threads']} threads, and only one can be forked")
+        ended = Ended(
+            code=said["code"], cpu_s=said["cpu_s"], wall_s=said["wall_s"], out_of_wall=said["out_of_wall"]
+        )
+        return replace(self._judged(job, folder, ended), start=start.step)
+
+    def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
+        """What came of a child; Refused where the reference engine is to say it."""
+        report = read_report(folder / "report.json")
+        if report is None or ended.out_of_wall:
+            status, detail = judge_silent(self._limits, ended)
+        else:
+            self._check(job, report)
+            status, detail = judge_report(self._limits, report)
+        if status is not Status.OK and is_full(self._work, report):
+            raise disk_full(self._work)
+        if status is Status.CRASHED:
+            raise Refused(f"ended as crashed: {detail}")
+        return Execution(
+            status=status,
+            detail=detail,
+            out=folder / "out",
+            probe=report["probe"] if report else None,
+            cpu_s=ended.cpu_s,
+            wall_s=ended.wall_s,
+            log=tail(folder / "log"),
+            how=How.WARM if self._warm else How.FORK,
+        )
+
+    def _check(self, job: Job, report: dict[str, Any]) -> None:
+        """Refused unless the child was the job's mutant and left the server as it was."""
+        if report["ended"] == "unfit":
+            raise Refused(report["error"])
+        if report["touched"]:
+            self.close()
+            raise Refused("it writes into its own tree")
+        if report["outside"]:
+            raise Refused(f"the package was also imported from {', '.join(report['outside'])}")
+        if report["threads"] != 1:
+            raise Refused("it leaves threads behind")
+        if job.mutant not in (None, (report["probe"] or {}).get("mutant")):
+            raise Refused("the probe that ran is not the one of this mutant")
+
+    def _observed(self, job: Job, golden: Path) -> Observed:
+        """What a probe observes in the golden run of a job, which is driven once to know it."""
+        key = _key(job)
+        if key not in self._seen:
+            try:
+                self._seen[key] = self._watch(job, golden)
+            except Refused as why:
+                self._seen[key] = str(why)
+        seen = self._seen[key]
+        if isinstance(seen, str):
+            raise Refused(seen)
+        return seen
+
+    def _watch(self, job: Job, golden: Path) -> Observed:
+        known = self._work / f"observed-{content_id(_key(job))}"  # shared by the workers of a session
+        if known.is_file():
+            values, before, libraries = marshal.loads(known.read_bytes())
+            return Observed(values=values, before=before, libraries=libraries)
+        folder = self._work / f"{os.getpid()}-watch-{content_id(_key(job))}"
+        try:
+            changes = exchange(self._manifest, self._null, str(self._running().tree))
+            null = replace(job, mutant=None)
+            self._at(job, 0, changes)  # whether it can be begun, told in its own words
+            # From before its beginning: what it observed then, no fork of it would have.
+            first = self._running().first
+            execution = self._become(first, null, folder, changes, _FROM_THE_START, watch=True)
+            if execution.status is Status.HARNESS_ERROR:
+                raise Lost(execution.detail)
+            if execution.status is not Status.OK:
+                raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
+            for name in (self._manifest.trace_file, self._manifest.record_file):
+                if (execution.out / name).read_bytes() != (golden / name).read_bytes():
+                    raise Refused(f"its {name} is another one when it is driven step by step")
+            report = read_report(folder / "report.json")
+            assert report is not None
+            found = (
+                tuple(map(tuple, report["seen"])),
+                tuple(report["before"]),
+                tuple(report["libraries"]),
+            )
+            if found[0] and found[1][:1] != (0,):
+                raise Refused("it observes before its first step")
+            write_atomic(known, marshal.dumps(found))
+            return Observed(values=found[0], before=found[1], libraries=found[2])
+        except NotExchangeable as why:
+            raise Refused(f"its observation cannot be put into it: {why}") from None
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+_FROM_THE_START = Start(step=0, observed=0, t=None)
+
+
+def _needed(changes: Exchange) -> list[str]:
+    """Modules to load before the mutant is made: those that it changes, and those that it imports."""
+    return [*dict.fromkeys(function.module for function in changes.functions), *changes.imports]
+
+
+def _key(job: Job) -> _Key:
+    return (str(job.scenario.resolve()), job.seed, job.changes)
+
+
+def _golden(job: Job, golden: Path) -> Execution:
+    """What comes of a mutant whose trigger never holds: what came of the golden run."""
+    return Execution(
+        status=Status.OK,
+        detail="",
+        out=golden,
+        probe={"mutant": job.mutant, "triggered": None, "injections": {}},
+        cpu_s=0.0,
+        wall_s=0.0,
+        how=How.GOLDEN,
+    )
+
+
+def _lost(why: str, folder: Path) -> Execution:
+    return Execution(
+        status=Status.HARNESS_ERROR,
+        detail=why,
+        out=folder / "out",
+        probe=None,
+        cpu_s=0.0,
+        wall_s=0.0,
+        how=How.FORK,
+    )

@@ -1,0 +1,205 @@
+"""The harness's side of a fork server: golden runs that wait at their steps, and are asked to fork.
+
+See fork_server.py for the other side.
+"""
+
+import marshal
+import os
+import shutil
+import socket
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common.hashing import digest
+from mutator.engines.processes import environment
+from mutator.targets.manifest import TargetManifest
+
+_SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
+_MOST = 8  # waiting processes; each keeps some 20 MB of its own
+_NEAR = 100  # steps; a process so little behind is moved on rather than kept: it is soon made again
+_LOOK_UP_S = 0.5  # how often one who waits looks whether its own parent is still there
+_START_S = 120.0
+_END_S = 10.0
+
+
+class Lost(Exception):
+    """A process of the server is gone, or does not answer."""
+
+
+class Refused(Exception):
+    """This target, or this run of it, cannot be forked; the text says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Golden:
+    """A golden run: the same key for the same run, and the entry module's arguments that begin it."""
+
+    key: Hashable
+    arguments: list[str]
+
+
+class Waiting:
+    """A process of the server: the first, before any run (`key` None), or one before `step` of the golden run
+    `key`."""
+
+    def __init__(self, connection: socket.socket, parent: int | None, key: Hashable = None) -> None:
+        self.key = key
+        self.step = 0
+        self.loaded: set[str] = set()  # modules, on behalf of mutants
+        self.used = 0.0
+        self._connection = connection
+        self._parent = parent
+        connection.settimeout(_LOOK_UP_S)
+
+    def ask(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
+        """The reply and the descriptors that came with it."""
+        data = marshal.dumps(request)
+        self._connection.settimeout(patience_s)
+        try:
+            self._connection.sendall(struct.pack("<I", len(data)) + data)
+        except OSError as err:
+            raise Lost(f"a process of the fork server is gone ({err})") from None
+        return self.reply(patience_s)
+
+    def reply(self, patience_s: float) -> tuple[dict[str, Any], list[int]]:
+        self._connection.settimeout(_LOOK_UP_S)
+        deadline = time.monotonic() + patience_s
+        handles: list[int] = []
+        head = self._read(4, deadline, handles)
+        reply: dict[str, Any] = marshal.loads(self._read(struct.unpack("<I", head)[0], deadline, handles))
+        return reply, handles
+
+    def load(self, modules: Sequence[str], patience_s: float) -> None:
+        """Load what mutants will import, once for all of them."""
+        if new := [name for name in modules if name not in self.loaded]:
+            self.ask({"do": "load", "modules": new}, patience_s)
+            self.loaded.update(new)
+
+    def close(self) -> None:
+        self._connection.close()
+
+    def _read(self, count: int, deadline: float, handles: list[int]) -> bytes:
+        data = b""
+        while len(data) < count:
+            try:
+                part, found, _, _ = socket.recv_fds(self._connection, count - len(data), 1)
+            except TimeoutError:
+                if self._parent is not None and os.getppid() != self._parent:
+                    raise SystemExit("the process that started this one is gone") from None
+                if time.monotonic() > deadline:
+                    raise Lost("the fork server does not answer") from None
+                continue
+            except OSError as err:
+                raise Lost(f"a process of the fork server is gone ({err})") from None
+            handles += found
+            if not part:
+                raise Lost("a process of the fork server is gone")
+            data += part
+        return data
+
+
+class Pool:
+    """A fork server with its waiting processes, in the new scratch folder `home`.
+
+    `base` is the pristine tree; the server has a copy of its own. Refused when the target cannot be loaded or
+    has more than one thread, Lost when the server ends instead of answering.
+    """
+
+    def __init__(self, manifest: TargetManifest, base: Path, home: Path, parent: int | None) -> None:
+        assert manifest.stepwise is not None
+        self.home = home
+        self.tree = home / "tree"
+        self._parent = parent
+        self._waiting: list[Waiting] = []
+        shutil.copytree(base, self.tree)
+        start = {
+            "parent": os.getpid(),
+            "tree": str(self.tree),
+            "home": str(home),
+            "package": manifest.package,
+            "module": manifest.entry_module,
+            "stepwise": manifest.stepwise,
+        }
+        (home / "start.marshal").write_bytes(marshal.dumps(start))
+        ours, theirs = socket.socketpair()
+        with theirs, (home / "log").open("wb") as log:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-s", _SERVER, str(theirs.fileno()), str(home / "start.marshal")],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=environment(0, home),
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+        self.first = Waiting(ours, parent)
+        try:
+            self._welcome(manifest)
+        except BaseException:
+            self.close()
+            raise
+
+    def _welcome(self, manifest: TargetManifest) -> None:
+        said, _ = self.first.reply(_START_S)
+        if "failed" in said:
+            raise Refused(f"it cannot be loaded: {said['failed']}")
+        if said["threads"] != 1:
+            raise Refused(f"it has {said['threads']} threads once it is loaded, and only one can be forked")
+        pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
+        loaded = {path: found for path, found in said["files"].items() if path in pristine}
+        if loaded != pristine:
+            raise Lost("the tree of the fork server is not the pristine one")
+
+    def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
+        """A process that waits before `step` of a golden run, with these modules loaded."""
+        mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
+        if not mine:
+            self.first.load(modules, patience_s)
+            mine = [self._branch(self.first, golden.key, 0, patience_s, golden.arguments)]
+        best = max(mine, key=lambda waiting: waiting.step)
+        best.load(modules, patience_s)
+        if 0 < best.step < step <= best.step + _NEAR:
+            reply, _ = best.ask({"do": "advance", "step": step}, patience_s)
+            best.step = reply["step"]
+        elif best.step < step:
+            best = self._branch(best, golden.key, step, patience_s)
+        best.used = time.monotonic()
+        return best
+
+    def _branch(
+        self, source: Waiting, key: Hashable, step: int, patience_s: float, arguments: list[str] | None = None
+    ) -> Waiting:
+        source.used = time.monotonic()
+        while len(self._waiting) >= _MOST:
+            oldest = min((w for w in self._waiting if w is not source), key=lambda waiting: waiting.used)
+            self._waiting.remove(oldest)
+            oldest.close()
+        said, handles = source.ask({"do": "branch", "step": step, "args": arguments}, patience_s)
+        if said["threads"] != 1 or len(handles) != 1:
+            raise Refused(f"it has {said['threads']} threads, and only one can be forked")
+        made = Waiting(socket.socket(fileno=handles[0]), self._parent, key)
+        made.loaded |= source.loaded
+        reply, _ = made.reply(patience_s)
+        if "failed" in reply:
+            made.close()
+            raise Refused(f"its golden run cannot be driven step by step: {reply['failed']}")
+        made.step = reply["step"]
+        self._waiting.append(made)
+        return made
+
+    def close(self) -> None:
+        """End all of its processes."""
+        for waiting in (self.first, *self._waiting):
+            waiting.close()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        shutil.rmtree(self.home, ignore_errors=True)

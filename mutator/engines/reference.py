@@ -1,0 +1,261 @@
+"""Engines run jobs: a tree, a scenario, a seed. The reference engine: a fresh interpreter for each."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Protocol
+
+from mutator._common.files import disk_full, full_disk_told, is_disk_full
+from mutator._common.hashing import digest
+from mutator.campaigns.campaign_files import Limits
+from mutator.engines import bytecode
+from mutator.engines.processes import (
+    Ended,
+    ended_within,
+    environment,
+    is_full,
+    judge_report,
+    judge_silent,
+    kill_group,
+    read_report,
+    steady,
+    tail,
+)
+from mutator.model import Status
+from mutator.targets.manifest import TargetManifest
+
+_CHILD = Path(__file__).parent / "in_target" / "run_once.py"
+_LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
+
+
+class How(StrEnum):
+    """What a run was: a fresh interpreter, a fork of a loaded program, or the golden run itself."""
+
+    REFERENCE = "reference"
+    WARM = "warm"
+    FORK = "fork"
+    GOLDEN = "golden"  # the trigger never held, so there was nothing to run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One run of the target. `files` are the changed and new files of its tree (none: pristine)."""
+
+    name: str
+    scenario: Path
+    seed: int
+    changes: tuple[str, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    mutant: str | None = None  # id that the probe must report; None: a tree without probe
+    hash_seed: int = 0
+    golden: Path | None = None  # output folder of the run without the fault, where it is known
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """What came of a job. `out` holds the target's trace and record when status is ok.
+
+    `probe` is the probe's report if the tree has one; `log` the tail of what the run printed; `how` what ran
+    it, and where it was not the engine that was asked, `why`; `start` is the step before which the golden run
+    did its work.
+    """
+
+    status: Status
+    detail: str
+    out: Path
+    probe: dict[str, Any] | None
+    cpu_s: float
+    wall_s: float
+    log: str = ""
+    how: How = How.REFERENCE
+    why: str = ""
+    start: int = 0
+
+
+class Engine(Protocol):
+    """Runs jobs and yields each with what came of it, in any order; `out` is valid until the next one.
+
+    The output folder of a job whose trigger never holds may be the golden run's: it is not to be touched.
+    """
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...
+
+    def close(self) -> None:
+        """End what the engine keeps running between jobs."""
+
+
+class ReferenceEngine:
+    """A fresh interpreter per job, on a tree of its own, with nothing else of the package to import.
+
+    `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
+    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). The runs
+    of an `independent` one take nothing from what other runs left behind, where the manifest says how.
+    """
+
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        base: Path,
+        work: Path,
+        limits: Limits,
+        parent: int | None = None,
+        *,
+        independent: bool = False,
+    ) -> None:
+        self.manifest = manifest
+        self.base = base.resolve()
+        self.work = work.resolve()
+        self.limits = limits
+        self._pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
+        self._parent = parent
+        self._independent = independent
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+        for job in jobs:
+            folder = self.work / f"{os.getpid()}-{job.name}"
+            try:
+                yield job, self.execute(job, folder)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def close(self) -> None:
+        """Nothing is kept."""
+
+    def execute(self, job: Job, folder: Path) -> Execution:
+        """Run one job in the new scratch folder `folder`, which is left to the caller."""
+        with full_disk_told(self.work):
+            request = self._prepare(job, folder)
+        ended = self._spawn(request, folder, job.hash_seed)
+        log = tail(folder / "log")
+        report = read_report(folder / "report.json")
+        status, detail = self._judge(job, ended, report)
+        if status is not Status.OK and is_full(self.work, report):
+            raise disk_full(self.work)
+        return Execution(
+            status=status,
+            detail=steady(detail, folder),
+            out=folder / "out",
+            probe=report.get("probe") if report else None,
+            cpu_s=ended.cpu_s,
+            wall_s=ended.wall_s,
+            log=log,
+        )
+
+    def _prepare(self, job: Job, folder: Path) -> Path:
+        """Write tree and request of a job; returns the request's file."""
+        tree, out = folder / "tree", folder / "out"
+        shutil.copytree(self.base, tree, copy_function=_link_or_copy)
+        bytecode.put(job.files, tree)
+        out.mkdir()
+        arguments = self.manifest.arguments(
+            scenario=job.scenario.resolve(),
+            seed=job.seed,
+            out=out,
+            changes=job.changes,
+            independent=self._independent,
+        )
+        request = {
+            "parent": os.getpid(),
+            "tree": str(tree),
+            "package": self.manifest.package,
+            "module": self.manifest.entry_module,
+            "args": list(arguments),
+            "probe": f"{self.manifest.package}._fi" if job.mutant is not None else None,
+            "out": str(out),
+            "report": str(folder / "report.json"),
+            "cpu_s": self.limits.cpu_s,
+            "memory_mb": self.limits.memory_mb,
+            "steps": self.limits.steps,
+        }
+        path = folder / "job.json"
+        path.write_text(json.dumps(request), encoding="utf-8")
+        return path
+
+    def _spawn(self, request: Path, folder: Path, hash_seed: int) -> Ended:
+        began = time.monotonic()
+        with (folder / "log").open("wb") as log:
+            child = subprocess.Popen(
+                [sys.executable, "-P", "-s", str(_CHILD), str(request)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=environment(hash_seed, folder),
+                start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
+            )
+        try:
+            out_of_wall = not self._wait(child.pid, began + self.limits.wall_s)
+        finally:
+            kill_group(child.pid)
+            _, code, usage = os.wait4(child.pid, 0)
+            child.returncode = os.waitstatus_to_exitcode(code)
+        return Ended(
+            code=child.returncode,
+            cpu_s=usage.ru_utime + usage.ru_stime,
+            wall_s=time.monotonic() - began,
+            out_of_wall=out_of_wall,
+        )
+
+    def _wait(self, pid: int, deadline: float) -> bool:
+        """Wait until the process ended (true) or the deadline passed; leave if our own parent is gone."""
+        while (left := deadline - time.monotonic()) > 0:
+            if ended_within(pid, min(left, _LOOK_UP_S)):
+                return True
+            if self._parent is not None and os.getppid() != self._parent:
+                raise SystemExit("the process that started this one is gone")
+        return False
+
+    def _judge(self, job: Job, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
+        if report is None or ended.out_of_wall:
+            return judge_silent(self.limits, ended)
+        if problem := self._wrong_tree(job, report):
+            self._restore_base()
+            return Status.HARNESS_ERROR, problem
+        return judge_report(self.limits, report)
+
+    def _restore_base(self) -> None:
+        """Make the pristine tree pristine again, should a run have written through its links."""
+        for path, data in self.manifest.tree.files.items():
+            if digest((self.base / path).read_bytes()) != self._pristine[path]:
+                bytecode.put({path: data}, self.base)
+
+    def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
+        """What is wrong with the tree that ran; empty if it was the job's."""
+        if report["outside"]:
+            return f"the package was also imported from {', '.join(report['outside'])}"
+        expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
+        more = {path for path in report["files"] if path.endswith(".py")}  # a cache of data may be left there
+        for path in sorted(expected.keys() | more):
+            if report["files"].get(path) != expected.get(path):
+                return f"{path} in the tree that ran is not the one of this job"
+        if job.mutant is not None and (report["probe"] or {}).get("mutant") != job.mutant:
+            return "the probe that ran is not the one of this mutant"
+        return ""
+
+
+def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
+    """The pristine tree with its bytecode in the folder `dest`, made there unless it is already whole."""
+    if not dest.is_dir():
+        half = dest.with_name(f"{dest.name}.{os.getpid()}")
+        with full_disk_told(dest):
+            shutil.rmtree(half, ignore_errors=True)
+            bytecode.write_compiled(manifest.tree.files, half)
+            half.rename(dest)
+    return dest
+
+
+def _link_or_copy(source: str, dest: str) -> None:
+    """One file of the pristine tree in a run's own. A link, since copies cost as much as a tenth of a run;
+    a run that writes through it is found out, as is every other that it could have touched."""
+    try:
+        os.link(source, dest)
+    except OSError as err:
+        if is_disk_full(err):
+            raise
+        shutil.copyfile(source, dest)

@@ -1,0 +1,4 @@
+"""Running experiments: sessions, workers, pytest, merged shards, single runs.
+
+How results are shown never lives here.
+"""

@@ -1,0 +1,178 @@
+"""Merge the run folders of all shards of a plan into the run folder that one machine would have made."""
+
+import shutil
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from mutator._common.files import full_disk_told, read_json, write_json
+from mutator._common.locks import owned
+from mutator._common.text import counted
+from mutator.campaigns.plans import make_run_folder
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Record, Status
+from mutator.outcomes import results
+from mutator.review.gate import FILE as REVIEWED
+from mutator.store import plan_file as planfile
+from mutator.store.records import read_records
+from mutator.store.run_folder import HEAD, RunFolder
+from mutator.verification import equivalence as proof
+from mutator.verification.preflight import FILE as CHECKS
+from mutator.verification.preflight import SCHEMA as CHECKS_SCHEMA
+
+_SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
+_REMEDY = "give the folder of each shard of one plan, once"
+
+
+def merge(shards: Sequence[Path], out: Path) -> Path:
+    """Merge the run folders `shards` into the new or empty folder `out`; returns its results.csv.
+
+    MutatorError for a shard that is missing, given twice, unfinished, of another plan, or at work;
+    CheckFailed when the proof of one failed, and when the shards' fault-free runs differ, for then their
+    machines are not alike.
+    """
+    if RunFolder.exists(out):
+        raise MutatorError("holds a run", where=out, expected="a new folder", remedy="choose another --out")
+    folders = [RunFolder.open(path) for path in shards]
+    _check_plans(folders)
+    _check_numbers(folders)
+    with ExitStack() as stack:
+        for folder in folders:
+            stack.enter_context(owned(folder.path, patience_s=0.0))
+            _check_complete(folder)
+        _check_goldens(folders)
+        make_run_folder(out)
+        stack.enter_context(owned(out))
+        try:
+            with full_disk_told(out):
+                _copy(folders, out)
+            return results.build(out)
+        except BaseException:
+            for path in out.iterdir():
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+            raise
+
+
+def _check_plans(folders: Sequence[RunFolder]) -> None:
+    first = folders[0]
+    for folder in folders[1:]:
+        for key in ("plan", "sources"):
+            if folder.head[key] != first.head[key]:
+                raise MutatorError(
+                    f"made from another {key.rstrip('s')} than {first.path}",
+                    where=folder.path,
+                    expected="shards of one plan, with the same target, templates and scenarios",
+                    remedy=_REMEDY,
+                )
+
+
+def _check_numbers(folders: Sequence[RunFolder]) -> None:
+    """Each share of the plan is there exactly once."""
+    held: dict[int, RunFolder] = {}
+    of: int | None = None
+    for folder in folders:
+        shard = folder.shard
+        if shard is None:
+            raise MutatorError(
+                "a whole run, no shard", where=folder.path, expected="a run with --shard", remedy=_REMEDY
+            )
+        of = of or shard.of
+        if shard.of != of:
+            raise MutatorError(
+                f"shard {shard.number}/{shard.of}",
+                where=folder.path,
+                expected=f"one of {of} shards, as {folders[0].path}",
+                remedy=_REMEDY,
+            )
+        if shard.number in held:
+            raise MutatorError(
+                f"shard {shard.number}/{of} a second time",
+                where=folder.path,
+                expected=f"another shard than {held[shard.number].path}",
+                remedy=_REMEDY,
+            )
+        held[shard.number] = folder
+    missing = [f"{k}/{of}" for k in range(1, (of or 0) + 1) if k not in held]
+    if missing:
+        raise MutatorError(f"no folder of shard {', '.join(missing)}", expected="all shards", remedy=_REMEDY)
+
+
+def _check_complete(folder: RunFolder) -> None:
+    """Every experiment of the share has a record that counts, no other one any, and the proof is whole."""
+    records = read_records(folder.path)
+    done = {name for name, record in records.items() if _counts(record)}
+    share = _share(folder)
+    if strangers := sorted(set(records) - share):
+        raise MutatorError(
+            f"a record of {strangers[0]}, which is not of this shard",
+            where=folder.path,
+            remedy="run the shard again into a new folder",
+        )
+    if len(done) < len(share):
+        raise MutatorError(
+            f"unfinished: {len(done)} of {len(share)} experiments done",
+            where=folder.path,
+            expected="a finished shard",
+            remedy="run it to its end with the command it was begun with",
+        )
+    proof.judge(folder, records)
+    if left := sum(len(piece.ids) for piece in proof.left(folder)):
+        raise MutatorError(
+            f"unfinished: of its proof {counted(left, 'experiment')} left to run",
+            where=folder.path,
+            expected="a finished shard",
+            remedy="run it to its end with the command it was begun with",
+        )
+
+
+def _counts(record: Record) -> bool:
+    return record.status is not Status.HARNESS_ERROR
+
+
+def _share(folder: RunFolder) -> set[str]:
+    shard = folder.shard
+    assert shard is not None
+    names = planfile.ids(folder.path)
+    share: set[str] = set()
+    for index, (_, _, count) in enumerate(folder.head["chunks"]):
+        chunk = [next(names) for _ in range(count)]
+        if shard.has(index):
+            share.update(chunk)
+    return share
+
+
+def _check_goldens(folders: Sequence[RunFolder]) -> None:
+    """The fault-free runs are the same bytes everywhere, or the machines' results are no one campaign's."""
+    first = read_json(folders[0].path / CHECKS, CHECKS_SCHEMA)["goldens"]
+    for folder in folders[1:]:
+        goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
+        if differ := [name for name in first if goldens.get(name) != first[name]]:
+            raise CheckFailed(
+                f"the golden run {differ[0]} is another one than in {folders[0].path}",
+                where=folder.path,
+                expected="machines on which the target drives to the same bytes",
+                remedy="run this shard again with the same Python and packages (run.json has the versions)",
+            )
+
+
+def _copy(folders: Sequence[RunFolder], out: Path) -> None:
+    """Everything of the shards; the head comes last, so a folder half made is no run folder."""
+    first = folders[0]
+    for name in _SHARED:
+        source = first.path / name
+        if source.is_dir():
+            shutil.copytree(source, out / name)
+        else:
+            shutil.copy(source, out / name)
+    if all((folder.path / REVIEWED).exists() for folder in folders):
+        shutil.copy(first.path / REVIEWED, out / REVIEWED)
+    for folder in folders:
+        assert folder.shard is not None
+        shutil.copytree(folder.path / "patches", out / "patches", dirs_exist_ok=True)
+        for name in ("records", "timings", proof.FOLDER):
+            if (folder.path / name).is_dir():
+                (out / name).mkdir(exist_ok=True)
+            for path in (folder.path / name).glob("*.jsonl"):
+                shutil.copy(path, out / name / f"{path.stem}-shard{folder.shard.number}.jsonl")
+    head = first.head
+    write_json(out / HEAD, head | {"choices": head["choices"] | {"shard": None}})

@@ -1,0 +1,44 @@
+"""The pytest plugin that runs campaigns: `pytest --campaign FILE --campaign-out DIR -n 2`.
+
+Loaded with every pytest of the environment, so it imports nothing of the harness unless a campaign is asked
+for.
+"""
+
+from pathlib import Path
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("mutator", "fault injection campaigns")
+    group.addoption(
+        "--campaign",
+        metavar="FILE",
+        help="run this campaign (a file, or a name of the fault library) instead of tests",
+    )
+    group.addoption(
+        "--campaign-out",
+        metavar="DIR",
+        type=Path,
+        help="its run folder; an interrupted run goes on there",
+    )
+    group.addoption(
+        "--require-reviewed",
+        action="store_true",
+        help="refuse to run what `mutator review` has no approval of",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    campaign, out = config.getoption("campaign"), config.getoption("campaign_out")
+    if campaign is None:
+        if out is not None:
+            raise pytest.UsageError("--campaign-out without --campaign")
+        if config.getoption("require_reviewed"):
+            raise pytest.UsageError("--require-reviewed without --campaign")
+        return
+    if out is None:
+        raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
+    from mutator.execution.pytest_session import configure
+
+    configure(config, campaign, out, reviewed=config.getoption("require_reviewed"))

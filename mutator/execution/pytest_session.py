@@ -1,0 +1,258 @@
+"""Campaigns as pytest sessions: the command's side, the xdist worker's side, and the items (chunks)."""
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common.files import DiskFull
+from mutator._common.locks import living_workers, register_worker
+from mutator.campaigns.chunks import Pending
+from mutator.campaigns.plans import Choices
+from mutator.errors import MutatorError
+from mutator.execution import session as campaign_run
+from mutator.execution.worker import Assignment, Worker, bind_to_parent
+from mutator.verification.equivalence import Sample
+from mutator.workspace import Workspace
+
+_INPUT = "mutator_campaign"
+_PROBLEM = "mutator_problem"
+
+
+class HarnessErrors(Exception):
+    """A chunk has experiments that the harness could not judge."""
+
+
+class WorkItem(pytest.Item):
+    """One chunk of the plan, or a piece of the proof. It fails for harness errors only: a hazard is a result,
+    not a failure."""
+
+    def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self.work = work
+        self.worker = worker
+
+    def runtest(self) -> None:
+        try:
+            worker, work = self.worker.get(), self.work
+            errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
+        except Exception as err:
+            problem = str(err) if isinstance(err, MutatorError) else _defect(err, self.name)
+            self.user_properties.append((_PROBLEM, problem))
+            if isinstance(err, DiskFull):
+                self.session.shouldstop = problem
+            raise
+        if errors:
+            raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, HarnessErrors | MutatorError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        return self.config.rootpath, None, self.name
+
+
+def _defect(err: Exception, chunk: str) -> str:
+    lines = "".join(traceback.format_exception(err))
+    return (
+        f"{chunk} was given up by a defect of mutator; please report it with these lines:\n{lines}".rstrip()
+    )
+
+
+class LazyWorker:
+    """This process's Worker, made when the first chunk is run: collecting needs none."""
+
+    def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
+        self._workspace = workspace
+        self._assignment = assignment
+        self._worker: Worker | None = None
+
+    def get(self) -> Worker:
+        if self._worker is None:
+            self._worker = Worker(self._workspace, self._assignment)
+        return self._worker
+
+    def close(self) -> None:
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
+
+
+def configure(config: pytest.Config, campaign: str, out: Path, *, reviewed: bool) -> None:
+    """Put the plugin of this process's role in place."""
+    given = getattr(config, "workerinput", {}).get(_INPUT)
+    if given is not None:
+        config.pluginmanager.register(WorkerSide(config, given, config.workerinput["workerid"]))  # type: ignore[attr-defined]
+    elif not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
+        config.pluginmanager.register(PlainController(campaign, out, reviewed=reviewed))
+
+
+def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
+    """Make chunks, then pieces of the proof, the session's items; nothing is read but what is here."""
+    session.items = []
+    for work in works:
+        name = f"chunk-{work.chunk:05d}" if isinstance(work, Pending) else f"proof-{work.number:05d}"
+        session.items.append(
+            WorkItem.from_parent(session, name=name, nodeid=f"campaign::{name}", work=work, worker=worker)
+        )
+    session.testscollected = len(session.items)
+    session.config.hook.pytest_collection_finish(session=session)
+    return True
+
+
+class WorkerSide:
+    """Plugin of an xdist worker: collects what the command found pending, and runs what it is sent."""
+
+    def __init__(self, config: pytest.Config, given: dict[str, Any], worker_id: str) -> None:
+        bind_to_parent(given["parent"])
+        run, places = Path(given["run"]), given["workspace"]
+        workspace = Workspace(
+            library=Path(places["library"]),
+            templates=Path(places["templates"]),
+            target=Path(places["target"]) if places["target"] else None,
+        )
+        assignment = Assignment(
+            run=run, name=given["session"] + worker_id, engine=given["engine"], parent=given["parent"]
+        )
+        self._config = config
+        self._registration = register_worker(run)
+        self._work: list[Pending | Sample] = [
+            *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
+            *(Sample(number, tuple(ids)) for number, ids in given["proof"]),
+        ]
+        self._worker = LazyWorker(workspace, assignment)
+
+    def pytest_collection(self, session: pytest.Session) -> bool:
+        return _collect(session, self._work, self._worker)
+
+    def pytest_sessionfinish(self) -> None:
+        try:
+            self._worker.close()
+        except MutatorError as err:
+            self._config.workeroutput[_PROBLEM] = str(err)  # type: ignore[attr-defined]
+        os.close(self._registration)
+
+
+class Controller:
+    """Plugin of the command: hands out chunks, or runs them itself without xdist; notes what goes wrong."""
+
+    def __init__(self, begun: campaign_run.Session | None = None) -> None:
+        self.begun = begun
+        self._worker: LazyWorker | None = None
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: Any) -> None:
+        assert self.begun is not None
+        node.workerinput[_INPUT] = self.begun.worker_input()
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any, error: object | None) -> None:
+        if error:
+            self._note(f"worker {node.gateway.id} died: {error}")
+        self._note(getattr(node, "workeroutput", {}).get(_PROBLEM, ""))
+
+    def pytest_collection(self, session: pytest.Session) -> bool | None:
+        if session.config.pluginmanager.hasplugin("dsession"):
+            return None  # xdist's: nothing is collected here
+        assert self.begun is not None
+        begun = self.begun
+        name = begun.worker_name("main")
+        assignment = Assignment(run=begun.folder.path, name=name, engine=begun.engine)
+        self._worker = LazyWorker(begun.workspace, assignment)
+        return _collect(session, (*begun.pending, *begun.proof), self._worker)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self._note(str(dict(report.user_properties).get(_PROBLEM, "")))
+
+    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+        if self.begun is None:
+            return
+        if type(excinfo.value) is KeyboardInterrupt:  # pytest's own kinds mean that it stopped by itself
+            self.begun.interrupted = True
+        for pid in living_workers(self.begun.folder.path):
+            os.kill(pid, signal.SIGTERM)
+
+    @pytest.hookimpl(trylast=True)  # after xdist has seen its workers end
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        if self._worker is not None:
+            self._worker.close()
+
+    def _note(self, problem: str) -> None:
+        """Keep the first problem of the session."""
+        if self.begun and problem and not self.begun.problem and not self.begun.interrupted:
+            self.begun.problem = problem
+
+
+class PlainController(Controller):
+    """As Controller, for pytest called directly: also plans, checks, and tells the end."""
+
+    def __init__(self, campaign: str, out: Path, *, reviewed: bool) -> None:
+        super().__init__()
+        self._campaign = campaign
+        self._reviewed = reviewed
+        self._out = out
+        self._open = ExitStack()
+        self._told: list[str] = []
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionstart(self, session: pytest.Session) -> None:
+        workers = getattr(session.config.option, "numprocesses", None) or 0
+        try:
+            opened = campaign_run.session(
+                Workspace.find(),
+                self._campaign,
+                self._out,
+                workers=workers,
+                choices=Choices(),
+                reviewed=self._reviewed,
+            )
+            self.begun = self._open.enter_context(opened)
+            self.begun.prepare()
+        except MutatorError as err:
+            self._open.close()
+            self.begun = None
+            print(err, file=sys.stderr)  # pytest tells the reason of an exit twice
+            pytest.exit("no campaign was run", returncode=err.exit_code)
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        if self.begun is None:
+            return
+        try:
+            super().pytest_sessionfinish(session)
+            summary = self.begun.finish()
+            self._told = _lines(summary)
+            if not summary.interrupted:
+                session.exitstatus = summary.exit_code
+        except MutatorError as err:
+            self._told = [str(err)]
+            session.exitstatus = err.exit_code
+        finally:
+            self._open.close()
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if self._told:
+            terminalreporter.section("campaign")
+        for line in self._told:
+            terminalreporter.write_line(line)
+
+
+def _lines(summary: campaign_run.Summary) -> list[str]:
+    """The end of a campaign for a terminal."""
+    lines = [
+        f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",
+        ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
+        summary.problem,
+        *(f"{name}: {what}" for name, what in summary.harness_errors),
+        f"proof: {summary.proof}" if summary.proof else "",
+        f"results: {summary.results}" if summary.results else "",
+    ]
+    return [line for line in lines if line]

@@ -1,0 +1,61 @@
+"""The frozen plan that a command works on: made now, or found and the one that was asked for."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from mutator._common.hashing import digest
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.campaigns.plans import Choices, freeze_owned, load_plan, make_plan
+from mutator.campaigns.provenance import check_sources, sources
+from mutator.errors import MutatorError
+from mutator.review import gate
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+def frozen(
+    workspace: Workspace, campaign: str | Path, out: Path, choices: Choices, *, reviewed: bool
+) -> RunFolder:
+    """The run folder `out`, which is the caller's, with a frozen plan of the campaign in it.
+
+    With `reviewed` the folder also keeps who approved what; CheckFailed, and no new plan, when that is not
+    all of it. MutatorError when it holds another plan, or one of other sources.
+    """
+    if RunFolder.exists(out):
+        folder = _found(workspace, campaign, out, choices)
+        approvals = gate.approvals(workspace, load_plan(folder.path)) if reviewed else None
+    else:
+        plan = make_plan(workspace, campaign, **asdict(choices))
+        approvals = gate.approvals(workspace, plan) if reviewed else None
+        folder = freeze_owned(plan, out, workspace)
+    if approvals is not None:
+        gate.write(folder.path, approvals)
+    return folder
+
+
+def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
+    """The run folder, if it was planned from this campaign with these choices and sources."""
+    folder = RunFolder.open(out)
+    head = folder.head
+    loaded = load_campaign(workspace.campaign(campaign))
+    if digest(loaded.source) != head["campaign_digest"]:
+        raise MutatorError(
+            f"holds a run of campaign '{head['campaign']}' with another text than {loaded.path}",
+            where=out,
+            remedy="use another folder, or give the run's own file: " + str(out / "campaign.yaml"),
+        )
+    for name, value in asdict(choices).items():
+        frozen = head["choices"].get(name)
+        if name in ("seed", "reading"):
+            frozen = head[name]
+        if value is not None and value != frozen:
+            raise MutatorError(
+                f"--{name} {value}",
+                where=out,
+                expected="what this run was planned with: "
+                + (f"no --{name}" if frozen is None else f"--{name} {frozen}"),
+                remedy=f"leave --{name} away, or use another folder",
+            )
+    scenarios = {scenario for scenario, _ in head["goldens"]}
+    check_sources(out, head["sources"], sources(workspace, workspace.manifest(head["target"]), scenarios))
+    return folder

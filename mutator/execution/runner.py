@@ -1,0 +1,223 @@
+"""From experiments to records: build each mutant, have an engine run it, compare with golden, judge."""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from mutator.campaigns.shared_runs import runs
+from mutator.engines.reference import Engine, Execution, How, Job
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Activation, Experiment, Record, Status
+from mutator.mutants import building as mutant
+from mutator.mutants.building import InvalidMutant, Mutant
+from mutator.outcomes import golden
+from mutator.outcomes.golden import BadOutput, Trace
+from mutator.outcomes.verdicts import first_events, judge
+from mutator.targets.manifest import TargetManifest
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
+    None without a mutant or a run. `how`, `why` and `start` are the execution's."""
+
+    experiment: Experiment
+    record: Record
+    mutant: Mutant | None = None
+    out: Path | None = None
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+    log: str = ""
+    how: How | None = None  # None: it was not run
+    why: str = ""
+    start: int = 0
+
+
+class Goldens:
+    """The compared channels of golden runs, loaded when first asked for. `folder_of` finds a run's output."""
+
+    def __init__(self, manifest: TargetManifest, folder_of: Callable[[str, tuple[str, ...]], Path]) -> None:
+        self._manifest = manifest
+        self._folder_of = folder_of
+        self._traces: dict[tuple[str, tuple[str, ...]], Trace] = {}
+
+    def folder(self, experiment: Experiment) -> Path:
+        """Where the run without the fault left its files."""
+        return self._folder_of(experiment.scenario, experiment.changes)
+
+    def trace(self, experiment: Experiment) -> Trace:
+        key = (experiment.scenario, experiment.changes)
+        if key not in self._traces:
+            channels = [channel.name for channel in self._manifest.compared]
+            self._traces[key] = golden.load_trace(self._manifest, self.folder(experiment), channels)
+        return self._traces[key]
+
+
+class Runner:
+    """Runs experiments on an engine, in the engine's order."""
+
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        models: FaultModels,
+        engine: Engine,
+        goldens: Goldens,
+        scenario_file: Callable[[str], Path],
+    ) -> None:
+        self.manifest = manifest
+        self.models = models
+        self.engine = engine
+        self.goldens = goldens
+        self.scenario_file = cache(scenario_file)
+
+    def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
+        """Each experiment with its record; what cannot be built has its record without being run, and what
+        is the same run as another has that one's."""
+        shared = {same[0].id: same for same in runs(self.manifest, experiments)}
+        for finished in self._run([same[0] for same in shared.values()]):
+            yield finished
+            for other in shared[finished.experiment.id][1:]:
+                record = replace(finished.record, experiment_id=other.id)
+                yield replace(finished, experiment=other, record=record, cpu_s=0.0, wall_s=0.0)
+
+    def _run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
+        refused: deque[Finished] = deque()
+        started: dict[str, tuple[Experiment, Mutant]] = {}
+
+        def jobs() -> Iterator[Job]:
+            for experiment in experiments:
+                try:
+                    built = mutant.build(self.manifest, self.models, experiment.fault, experiment.trigger)
+                except MutatorError as err:
+                    refused.append(self._refused(experiment, err))
+                    continue
+                started[experiment.id] = (experiment, built)
+                yield self._job(experiment, built)
+
+        for job, execution in self.engine.run(jobs()):
+            while refused:
+                yield refused.popleft()
+            yield self._finish(*started.pop(job.name), execution)
+        yield from refused
+
+    def _job(self, experiment: Experiment, built: Mutant) -> Job:
+        return Job(
+            name=experiment.id,
+            scenario=self.scenario_file(experiment.scenario),
+            seed=experiment.seed,
+            changes=experiment.changes,
+            files=built.files,
+            mutant=built.id,
+            golden=self.goldens.folder(experiment),
+        )
+
+    def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
+        status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
+        place = f"{err.where.removeprefix(str(self.manifest.root) + os.sep)}: " if err.where else ""
+        return Finished(experiment=experiment, record=_bare(experiment, status, place + err.got, None))
+
+    def _finish(self, experiment: Experiment, built: Mutant, execution: Execution) -> Finished:
+        try:
+            record = self._record(experiment, built, execution)
+        except BadOutput as err:
+            record = _bare(experiment, Status.HARNESS_ERROR, _told(err), built)
+        return Finished(
+            experiment=experiment,
+            record=record,
+            mutant=built,
+            out=execution.out,
+            cpu_s=execution.cpu_s,
+            wall_s=execution.wall_s,
+            log=execution.log,
+            how=execution.how,
+            why=execution.why,
+            start=execution.start,
+        )
+
+    def _record(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
+        if execution.status is not Status.OK or execution.probe is None:
+            # a time-out's count depends on the machine's speed, a crash's does not
+            crashed = execution.status is Status.CRASHED
+            activation = activation_of(execution.probe or {}) if crashed else None
+            return _bare(experiment, execution.status, execution.detail, built, activation)
+        activation = activation_of(execution.probe)
+        channels = self.manifest.compared
+        reference = self.goldens.trace(experiment)
+        try:
+            faulty = golden.load_trace(self.manifest, execution.out, [channel.name for channel in channels])
+            said = golden.load_record(self.manifest, execution.out)
+        except BadOutput as err:
+            if activation is None:
+                raise
+            return _bare(experiment, Status.CRASHED, _told(err), built, activation)
+        difference = golden.compare(reference, faulty, channels, self.manifest.time_channel)
+        if problem := _not_by_the_fault(difference.t_first, activation):
+            return _bare(experiment, Status.HARNESS_ERROR, problem, built)
+        hazards = first_events(golden.hazards_of(said, self.manifest.hazards), activation)
+        return Record(
+            experiment_id=experiment.id,
+            status=Status.OK,
+            outcome=judge(activation=activation, t_manifest=difference.t_first, hazards=hazards),
+            detail="",
+            tree=built.tree_digest,
+            activation=activation,
+            t_manifest=difference.t_first,
+            max_dev=difference.max_dev,
+            hazards=tuple(hazards),
+            alerts=tuple(first_events(golden.alerts_of(said, self.manifest.alerts), activation)),
+            trace_digest=golden.trace_digest(self.manifest, execution.out),
+        )
+
+
+def activation_of(report: Mapping[str, Any]) -> Activation | None:
+    """What a probe's report says about all injections together: earliest, latest, number of executions."""
+    injections = report.get("injections")
+    ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
+    if not ran:
+        return None
+    return Activation(
+        first=min(i["first"] for i in ran),
+        last=max(i["last"] for i in ran),
+        count=sum(i["count"] for i in ran),
+    )
+
+
+def _told(err: BadOutput) -> str:
+    """What is wrong with an output, without the scratch folder that it was in."""
+    return f"{Path(err.where or '').name}: {err.got}"
+
+
+def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:
+    """Why a difference from golden cannot be the fault's doing; empty if it can."""
+    if t_first is None or (activation is not None and t_first >= activation.first):
+        return ""
+    when = "although the fault was never active" if activation is None else f"before {activation.first} s"
+    return f"differs from golden at {t_first} s, {when}"
+
+
+def _bare(
+    experiment: Experiment,
+    status: Status,
+    detail: str,
+    built: Mutant | None,
+    activation: Activation | None = None,
+) -> Record:
+    """The record of an experiment without an outcome."""
+    return Record(
+        experiment_id=experiment.id,
+        status=status,
+        outcome=None,
+        detail=detail,
+        tree=built.tree_digest if built else "",
+        activation=activation,
+        t_manifest=None,
+        max_dev=(),
+        hazards=(),
+        alerts=(),
+        trace_digest="",
+    )

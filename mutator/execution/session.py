@@ -1,0 +1,285 @@
+"""Run a campaign: plan if needed, check, run what lacks a record, build the table.
+
+`mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` are this same code: `run` starts pytest in
+this process with the plugin of `mutator.execution.pytest_plugin`.
+"""
+
+import io
+import os
+import shutil
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common.files import DiskFull, is_half_written
+from mutator._common.interrupts import terminable
+from mutator._common.locks import owned
+from mutator.campaigns.chunks import Pending, pending
+from mutator.campaigns.plans import Choices, make_run_folder
+from mutator.engines import choice as engines
+from mutator.engines.reference import prepare_base
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
+from mutator.execution.run_plan import frozen
+from mutator.model import Record, Status
+from mutator.outcomes import results
+from mutator.store.records import Progress, Tail, label, read_records
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence as proof
+from mutator.verification.preflight import run_checks
+from mutator.workspace import Workspace
+
+EXIT_INTERRUPTED = 130
+_NOTIFY_S = 0.5
+
+Notify = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What a run came to. `outcomes` as in Progress; `harness_errors` are (experiment id, detail) pairs."""
+
+    planned: int
+    done: int  # have a record that counts
+    ran: int  # of these, in this session
+    outcomes: Counter[str]
+    harness_errors: tuple[tuple[str, str], ...]
+    problem: str  # empty, or why the session ended early (disk full, a worker died)
+    interrupted: bool
+    results: Path | None  # results.csv; None when there was no room for it
+    proof: proof.Proof | None  # None: nothing that the reference engine has not run
+    elapsed_s: float
+
+    @property
+    def exit_code(self) -> int:
+        """0 fine; 3 harness errors or experiments left; 130 interrupted."""
+        if self.interrupted:
+            return EXIT_INTERRUPTED
+        whole = self.done == self.planned and (self.proof is None or self.proof.whole)
+        return EXIT_OK if whole and not self.problem else EXIT_HARNESS_ERRORS
+
+
+def run(
+    workspace: Workspace,
+    campaign: str | Path,
+    out: Path,
+    *,
+    workers: int = 0,
+    choices: Choices | None = None,
+    engine: str | None = None,
+    reviewed: bool = False,
+    notify: Notify | None = None,
+) -> Summary:
+    """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
+
+    A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
+    MutatorError, as is a changed campaign file or target. `engine` is one of `engines.ENGINES` (None: the
+    fastest that is worth it). With `reviewed` only what is approved is run (`mutator.review.gate`). `notify`
+    is called from another thread about twice a second. MutatorError for wrong input, CheckFailed when
+    something is not approved, the checks before the campaign fail, or the proof of its engine does.
+    """
+    with session(
+        workspace,
+        campaign,
+        out,
+        workers=workers,
+        choices=choices or Choices(),
+        engine=engine,
+        reviewed=reviewed,
+        notify=notify,
+    ) as begun:
+        begun.prepare()
+        if begun.pending or begun.proof:
+            with _followed(begun):
+                _run_pytest(begun)
+        return begun.finish()
+
+
+class Session:
+    """One command at work in a run folder that it owns."""
+
+    def __init__(
+        self, workspace: Workspace, folder: RunFolder, workers: int, engine: str | None, notify: Notify | None
+    ) -> None:
+        self.workspace = workspace
+        self.folder = folder
+        self.workers = workers
+        self.notify: Notify = notify or (lambda progress: None)
+        self.pending: tuple[Pending, ...] = ()
+        self.proof: tuple[proof.Sample, ...] = ()
+        self._manifest = workspace.manifest(folder.head["target"])
+        self.engine = engines.choose(engine, self._manifest, folder.planned)
+        self.problem = ""
+        self.interrupted = False
+        self._began = time.monotonic()
+        self._done_before = 0
+        self._records: dict[str, Record] | None = None
+
+    def prepare(self) -> None:
+        """Find what is left to run; if anything is, pass the checks and lay out the pristine tree."""
+        records = read_records(self.folder.path)
+        self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
+        left = pending(self.folder, records)
+        if left and self.engine != engines.REFERENCE:
+            proof.begin(self.folder.path)
+        self.proof = proof.left(self.folder)
+        if left or self.proof:
+            run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
+            prepare_base(self._manifest, self.folder.base)
+        self.pending = left
+        self._records = None if left else records
+
+    def worker_name(self, name: str) -> str:
+        """Name of a worker's files, used by no session before this one."""
+        files = self.folder.path.glob("records/*.jsonl")
+        taken = [int(path.name.split("-")[0]) for path in files]
+        return f"{max(taken, default=0) + 1:04d}-{name}"
+
+    def worker_input(self) -> dict[str, Any]:
+        """All that an xdist worker needs, in types that execnet can send."""
+        return {
+            "parent": os.getpid(),
+            "run": str(self.folder.path),
+            "session": self.worker_name(""),
+            "workspace": {k: str(v) if v else None for k, v in asdict(self.workspace).items()},
+            "engine": self.engine,
+            "pending": [[item.chunk, list(item.places)] for item in self.pending],
+            "proof": [[piece.number, list(piece.ids)] for piece in self.proof],
+        }
+
+    def finish(self) -> Summary:
+        """Build the table from what there is now, and say what the run has come to."""
+        self.notify(Progress(stage="results"))
+        records = read_records(self.folder.path) if self._records is None else self._records
+        wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
+        done = len(records) - len(wrong)
+        built = None
+        try:
+            built = results.ensure(self.folder.path)
+        except DiskFull as err:  # the records are there, the table can be made any time
+            self.problem = self.problem or str(err)
+        proven = proof.judge(self.folder, records)
+        return Summary(
+            planned=self.folder.planned,
+            done=done,
+            ran=done - self._done_before,
+            outcomes=Counter(label(r.status, r.outcome) for r in records.values()),
+            harness_errors=(*sorted(wrong.items()), *(proven.errors if proven else ())),
+            problem=self.problem,
+            interrupted=self.interrupted,
+            results=built,
+            proof=proven,
+            elapsed_s=time.monotonic() - self._began,
+        )
+
+
+@contextmanager
+def session(
+    workspace: Workspace,
+    campaign: str | Path,
+    out: Path,
+    *,
+    workers: int,
+    choices: Choices,
+    engine: str | None = None,
+    reviewed: bool = False,
+    notify: Notify | None = None,
+) -> Iterator[Session]:
+    """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
+    is_new = not out.exists()
+    make_run_folder(out)
+    with terminable(), owned(out):
+        if notify and not RunFolder.exists(out):
+            notify(Progress(stage="plan"))
+        try:
+            folder = frozen(workspace, campaign, out, choices, reviewed=reviewed)
+        except MutatorError:
+            if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is left
+                shutil.rmtree(out, ignore_errors=True)
+            raise
+        shutil.rmtree(folder.work, ignore_errors=True)
+        # not everywhere: there may be thousands of patches
+        written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))
+        for path in chain(*written):
+            if is_half_written(path.name):
+                path.unlink()
+        try:
+            yield Session(workspace, folder, workers, engine, notify)
+        finally:
+            shutil.rmtree(folder.work, ignore_errors=True)
+
+
+@contextmanager
+def _followed(begun: Session) -> Iterator[None]:
+    """Tell how far the run is while it goes on."""
+    tail = Tail(begun.folder.path, begun.folder.planned)
+    stop = threading.Event()
+
+    def follow() -> None:
+        while not stop.wait(_NOTIFY_S):
+            begun.notify(tail.poll())
+
+    thread = threading.Thread(target=follow, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        begun.notify(tail.poll())
+
+
+def _run_pytest(begun: Session) -> None:
+    """Run the pending chunks as pytest items, without anything of the user's pytest configuration."""
+    from mutator.execution.pytest_session import Controller
+
+    installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
+    folder = begun.folder.path
+    arguments = [
+        *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
+        *(
+            "--disable-plugin-autoload",
+            "-p",
+            "xdist",
+            "-p",
+            "mutator" if installed else "mutator.execution.pytest_plugin",
+        ),
+        *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest", "--assert=plain"),
+        *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(begun.workers)),
+    ]
+    output = _Silent()
+    with _without("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
+        code = pytest.main(arguments, plugins=[Controller(begun), output])
+    if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not begun.problem:
+        begun.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
+
+
+@contextmanager
+def _without(*names: str) -> Iterator[None]:
+    """Without these variables in the environment, also that of the workers."""
+    kept = {name: os.environ.pop(name) for name in names if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(kept)
+
+
+class _Silent:
+    """Pytest plugin: the terminal reporter writes into a buffer, so the terminal is the caller's."""
+
+    def __init__(self) -> None:
+        self.text = io.StringIO()
+
+    @pytest.hookimpl(trylast=True)  # after the reporter was made, before xdist (registered later) takes it
+    def pytest_configure(self, config: pytest.Config) -> None:
+        manager = config.pluginmanager
+        manager.unregister(name="terminalreporter")
+        manager.register(pytest.TerminalReporter(config, self.text), "terminalreporter")

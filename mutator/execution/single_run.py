@@ -1,0 +1,143 @@
+"""One experiment outside a campaign, with everything kept: what `try`, `show` and `rerun --trace` need."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator._common.files import full_disk_told, make_folder
+from mutator.campaigns.campaign_files import Limits
+from mutator.campaigns.provenance import check_sources, sources
+from mutator.engines.reference import Job, ReferenceEngine, prepare_base
+from mutator.errors import CheckFailed
+from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.model import Experiment, Record, Status
+from mutator.mutants.building import Mutant
+from mutator.store import plan_file as planfile
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+
+@dataclass(frozen=True, kw_only=True)
+class Single:
+    """An experiment run alone: `golden` and `faulty` are output folders (`golden.load_trace` reads them)."""
+
+    experiment: Experiment
+    mutant: Mutant | None  # None: the mutant does not compile (the record says so)
+    record: Record
+    golden: Path
+    faulty: Path
+    log: str
+
+
+def run_single(
+    workspace: Workspace,
+    manifest: TargetManifest,
+    experiment: Experiment,
+    out: Path,
+    *,
+    limits: Limits | None = None,
+    golden: Path | None = None,
+) -> Single:
+    """Run `experiment` into the folder `out`: golden/ (unless given), faulty/ and mutant.patch.
+
+    `faulty` is an empty folder when the mutant was refused, and holds what the run left when it did not end
+    well. CheckFailed when the golden run does not end well.
+    """
+    make_folder(out)
+    with _engine(manifest, out, limits or Limits()) as engine:
+        reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
+        goldens = Goldens(manifest, lambda scenario, changes: reference)
+        runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
+        (finished,) = _kept(runner.run([experiment]), out)
+    return Single(
+        experiment=experiment,
+        mutant=finished.mutant,
+        record=finished.record,
+        golden=reference,
+        faulty=out / "faulty",
+        log=finished.log,
+    )
+
+
+def rerun(
+    workspace: Workspace, run: Path, experiment_id: str, *, film: Path | None = None
+) -> tuple[Single, bool]:
+    """Run a planned experiment again with its trace kept in the run folder (traces/<id>/).
+
+    With a folder `film` golden and faulty run are driven and kept there, each with a film.
+    The flag says whether the record equals the one of the campaign (true if there is none yet).
+    """
+    folder = RunFolder.open(run)
+    manifest = manifest_of(workspace, folder)
+    wanted = folder.find(experiment_id)
+    experiment = next(e for e in planfile.read_all(folder.path) if e.id == wanted)
+    golden = folder.golden(experiment.scenario, experiment.changes)
+    single = run_single(
+        workspace,
+        manifest.filming() if film else manifest,
+        experiment,
+        film or folder.path / "traces" / wanted,
+        limits=folder.limits,
+        golden=golden if golden.is_dir() and not film else None,
+    )
+    known = read_records(folder.path).get(wanted)
+    return single, known is None or known == single.record
+
+
+def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
+    """The target of a run; MutatorError when it, templates or scenarios are no longer those of the run."""
+    manifest = workspace.manifest(folder.head["target"])
+    scenarios = {scenario for scenario, _ in folder.head["goldens"]}
+    check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, scenarios))
+    return manifest
+
+
+@contextmanager
+def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
+    """An engine whose scratch is in `out`, and gone afterwards."""
+    work = out / "work"
+    shutil.rmtree(work, ignore_errors=True)
+    try:
+        with full_disk_told(work):
+            work.mkdir()
+        yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, place: Path) -> Path:
+    """The fault-free run of the experiment's scenario, its output at `place`."""
+    job = Job(
+        name="golden",
+        scenario=workspace.scenario(experiment.scenario),
+        seed=experiment.seed,
+        changes=experiment.changes,
+    )
+    execution = engine.execute(job, engine.work / job.name)
+    if execution.status is not Status.OK:
+        raise CheckFailed(
+            f"the run without any fault ended as {execution.status.value}: {execution.detail}",
+            where=job.scenario,
+            remedy="mend the target or the scenario first",
+        )
+    shutil.rmtree(place, ignore_errors=True)
+    execution.out.rename(place)
+    return place
+
+
+def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
+    """The runs with their output moved to `out`/faulty and their diff beside it."""
+    for finished in runs:
+        place = out / "faulty"
+        shutil.rmtree(place, ignore_errors=True)
+        if finished.out is not None:
+            finished.out.rename(place)
+        else:
+            place.mkdir()
+        if finished.mutant is not None:
+            (out / "mutant.patch").write_bytes(finished.mutant.patch_bytes)
+        yield finished

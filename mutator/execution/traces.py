@@ -1,0 +1,66 @@
+"""The traces of a run's experiments: those that are kept, and those that are made when they are needed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from mutator.errors import MutatorError
+from mutator.execution.single_run import rerun
+from mutator.model import Experiment, Record
+from mutator.outcomes.golden import Trace, load_trace, trace_digest
+from mutator.store import plan_file as planfile
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Fault-free and faulty trace of any experiment of a run folder."""
+
+    workspace: Workspace
+    folder: RunFolder
+
+    @cached_property
+    def manifest(self) -> TargetManifest:
+        """The run's target; MutatorError where it is not to be found."""
+        return self.workspace.manifest(self.folder.head["target"])
+
+    @cached_property
+    def _records(self) -> Mapping[str, Record]:
+        return read_records(self.folder.path)
+
+    @cached_property
+    def _experiments(self) -> Mapping[str, Experiment]:
+        return {experiment.id: experiment for experiment in planfile.read_all(self.folder.path)}
+
+    def record(self, experiment_id: str) -> Record:
+        """What the campaign found out of an experiment; MutatorError when only its results are there."""
+        if experiment_id not in self._records:
+            raise MutatorError(f"there is no record of {experiment_id} any more", where=self.folder.path)
+        return self._records[experiment_id]
+
+    def of(self, experiment_id: str) -> tuple[Trace, Trace]:
+        """(fault-free, faulty) of an experiment that ended well; without a kept trace it is driven again.
+
+        MutatorError when that cannot be done any more, or does not give what the campaign found.
+        """
+        kept = self.folder.path / "traces" / experiment_id
+        experiment = self._experiments[experiment_id]
+        golden = self.folder.golden(experiment.scenario, experiment.changes)
+        if not golden.is_dir():
+            golden = kept / "golden"
+        if not (golden.is_dir() and self.is_kept(experiment_id)):
+            single, same = rerun(self.workspace, self.folder.path, experiment_id)
+            if not same:
+                raise MutatorError(f"{experiment_id} driven again is not what the campaign found")
+            golden = single.golden
+        return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
+
+    def is_kept(self, experiment_id: str) -> bool:
+        """Whether the trace of the campaign's run is there, not that of another state of the sources."""
+        faulty = self.folder.path / "traces" / experiment_id / "faulty"
+        if not (faulty / self.manifest.trace_file).is_file():
+            return False
+        return trace_digest(self.manifest, faulty) == self.record(experiment_id).trace_digest

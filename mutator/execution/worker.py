@@ -1,0 +1,155 @@
+"""The process that runs chunks: an xdist worker, or the command itself when there are none."""
+
+import ctypes
+import os
+import signal
+import socket
+import sys
+from dataclasses import asdict, dataclass
+from itertools import chain
+from pathlib import Path
+
+from mutator._common.files import full_disk_told
+from mutator.campaigns.chunks import Pending
+from mutator.campaigns.provenance import check_sources, sources
+from mutator.engines import choice as engines
+from mutator.engines.reference import Engine, ReferenceEngine
+from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.model import Experiment, Status
+from mutator.store import plan_file as planfile
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence as proof
+from mutator.verification.equivalence import Sample
+from mutator.workspace import Workspace
+
+_PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Assignment:
+    """Who a worker is: `name` makes its files in the run folder its own, `engine` runs its chunks, `parent`
+    is the process it must not outlive (None: it is the command itself)."""
+
+    run: Path
+    name: str
+    engine: str
+    parent: int | None = None
+
+
+class Worker:
+    """Runs chunks of a run folder and appends what came of them. Reads the plan only chunk by chunk."""
+
+    def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
+        self.folder = RunFolder.open(assignment.run)
+        self._name = assignment.name
+        head = self.folder.head
+        manifest = workspace.manifest(head["target"])
+        scenarios = {scenario for scenario, _ in head["goldens"]}
+        check_sources(self.folder.path, head["sources"], sources(workspace, manifest, scenarios))
+        with full_disk_told(self.folder.work):
+            self.folder.work.mkdir(exist_ok=True)
+        self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
+        self._runner = self._make_runner(self._engine(assignment.engine))
+        self._prover: Runner | None = None
+        self._proofs: LineWriter | None = None
+        self._planned: tuple[Experiment, ...] = ()
+        self._faults = planfile.read_faults(self.folder.path)
+        plan = head["plan"]
+        self._head = {"schema": SCHEMA, "plan": plan}
+        self._records = LineWriter(self._file("records"), self._head)
+        self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
+
+    def run(self, pending: Pending) -> list[tuple[str, str]]:
+        """Run what is left of a chunk; returns (experiment id, detail) of its harness errors."""
+        experiments = planfile.read_chunk(
+            self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
+        )
+        errors = []
+        for finished in self._runner.run([experiments[place] for place in pending.places]):
+            self._keep(finished)
+            if finished.record.status is Status.HARNESS_ERROR:
+                errors.append((finished.experiment.id, finished.record.detail))
+        return errors
+
+    def prove(self, sample: Sample) -> list[tuple[str, str]]:
+        """Run a piece of the proof's sample on the reference engine; harness errors as `run`.
+
+        Each has a run of its own, which takes nothing from others: what they share is to be proved, too.
+        """
+        if self._prover is None or self._proofs is None:
+            self._prover = self._make_runner(self._independent_engine())
+            self._proofs = LineWriter(self._file(proof.FOLDER), self._head)
+            self._planned = planfile.read_all(self.folder.path)
+        wanted = [experiment for experiment in self._planned if experiment.id in sample.ids]
+        errors = []
+        for finished in chain.from_iterable(self._prover.run([experiment]) for experiment in wanted):
+            self._proofs.append(asdict(finished.record))
+            if finished.record.status is Status.HARNESS_ERROR:
+                errors.append((finished.experiment.id, finished.record.detail))
+        return errors
+
+    def close(self) -> None:
+        """End the engine; sync and close this worker's files."""
+        self._runner.engine.close()
+        for writer in (self._records, self._timings, self._proofs):
+            if writer is not None:
+                writer.close()
+
+    def _make_runner(self, engine: Engine) -> Runner:
+        goldens = Goldens(self._manifest, self.folder.golden)
+        models = self._workspace.fault_models()
+        return Runner(self._manifest, models, engine, goldens, self._workspace.scenario)
+
+    def _engine(self, name: str) -> Engine:
+        folder = self.folder
+        return engines.make(
+            name,
+            self._manifest,
+            self._workspace.fault_models(),
+            base=folder.base,
+            work=folder.work,
+            limits=folder.limits,
+            parent=self._parent,
+        )
+
+    def _independent_engine(self) -> Engine:
+        folder = self.folder
+        return ReferenceEngine(
+            self._manifest, folder.base, folder.work, folder.limits, self._parent, independent=True
+        )
+
+    def _keep(self, finished: Finished) -> None:
+        """Patch first, record last: what has a record has everything."""
+        if finished.mutant is not None:
+            self._write_patch(finished.experiment, finished.mutant.patch_bytes)
+        self._timings.append(
+            {
+                "experiment_id": finished.experiment.id,
+                "cpu_s": finished.cpu_s,
+                "wall_s": finished.wall_s,
+                "host": socket.gethostname(),
+                "worker": self._name,
+                "engine": finished.how,
+                "why": finished.why,
+            }
+        )
+        self._records.append(asdict(finished.record))
+
+    def _write_patch(self, experiment: Experiment, data: bytes) -> None:
+        path = self.folder.patch(experiment.id)
+        with full_disk_told(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+
+    def _file(self, kind: str) -> Path:
+        return self.folder.path / kind / f"{self._name}.jsonl"
+
+
+def bind_to_parent(parent: int) -> None:
+    """End with the process `parent`: the kernel kills this one when it dies, and Ctrl-C is its business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)

@@ -1,0 +1,152 @@
+"""From spec to faults: values drawn, units converted, parameters checked against their model."""
+
+import math
+from collections.abc import Iterator
+
+from mutator._common.random_streams import generator
+from mutator.config import units
+from mutator.config.yaml_files import Keys
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.faults.imports import check_import
+from mutator.faults.injections import InjectionSpec
+from mutator.faults.parameters import resolve
+from mutator.faults.specs import AS_DESCRIBED, READINGS, Draw, FaultSpec, Variant
+from mutator.model import Fault, Injection
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.paths import check_location
+
+_REDRAWS = 100
+
+
+def expand(
+    spec: FaultSpec,
+    seed: int,
+    reading: str = AS_DESCRIBED,
+    *,
+    models: FaultModels,
+    manifest: TargetManifest,
+) -> tuple[Fault, ...]:
+    """The faults of `spec`, in the order of its variants and ranges.
+
+    The same seed gives the same values in both readings and whatever the triggers, scenarios and methods are.
+    MutatorError (file:line) for an unknown model or parameter, a wrong unit, a value out of range, a location
+    outside the target or in a forbidden place, a change the target does not offer. Anchors are resolved when
+    a mutant is built.
+    """
+    if reading not in READINGS:
+        raise MutatorError(f"reading '{reading}'", expected=f"one of {', '.join(READINGS)}")
+    expander = _Expander(spec, seed, reading, models, manifest)
+    return tuple(fault for variant in spec for fault in expander.faults(variant))
+
+
+def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
+    """The values of `draw` for `seed`, in its own unit: one from each range, or the list as it is.
+
+    The value of a range depends on nothing but seed, key, its place and the values before it: a value that
+    came before is drawn again (two equal faults would be one), and so is a real 0 (no error is no fault).
+    """
+    if draw.kind == "list":
+        return draw.values
+    stream = generator(seed, draw.key).random(len(draw.ranges))
+    values: list[int | float] = []
+    for i, u in enumerate(map(float, stream)):
+        value = _value(draw, i, u)
+        for attempt in range(_REDRAWS):
+            if value not in values and not (value == 0 and draw.kind == "reals"):
+                break
+            value = _value(draw, i, float(generator(seed, f"{draw.key}/{i}/{attempt}").random()))
+        values.append(value)
+    return tuple(values)
+
+
+def _value(draw: Draw, index: int, u: float) -> int | float:
+    """The value at `u` (0 to 1) of one range, rounded and capped as the draw says."""
+    low, high = draw.ranges[index]
+    if draw.kind == "integers":
+        whole = int(low) + math.floor(u * (int(high) - int(low) + 1))
+        return whole if draw.cap is None else min(whole, int(draw.cap))
+    value = low + u * (high - low)
+    value = value if draw.decimals is None else round(value, draw.decimals)
+    return value if draw.cap is None else float(min(value, draw.cap))
+
+
+class _Expander:
+    """Expands the variants of one spec in one reading."""
+
+    def __init__(
+        self, spec: FaultSpec, seed: int, reading: str, models: FaultModels, manifest: TargetManifest
+    ) -> None:
+        self.spec = spec
+        self.seed = seed
+        self.reading = reading
+        self.models = models
+        self.manifest = manifest
+
+    def faults(self, variant: Variant) -> Iterator[Fault]:
+        """One fault for each value of the variant's draw, or the one fault of a variant without."""
+        self._check(variant)
+        draw = variant.draw
+        unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"
+        values: tuple[int | float | None, ...] = draw_values(draw, self.seed) if draw else (None,)
+        for number, value in enumerate(values):
+            yield Fault(
+                spec=f"{self.spec.name}/{variant.name}",
+                module=self.spec.module,
+                fault_type=self.spec.fault_type,
+                reading=self.reading,
+                value=value,
+                unit=unit,
+                aim=variant.aim,
+                injections=self._injections(variant, value, number),
+                hold=variant.hold,
+                changes=variant.changes,
+            )
+
+    def _injections(self, variant: Variant, value: int | float | None, number: int) -> tuple[Injection, ...]:
+        return tuple(
+            resolve(
+                injection,
+                self.models.get(injection.model),
+                self.spec.source,
+                draw=variant.draw,
+                value=value,
+                seed=self.seed,
+                key=f"{self.spec.name}/{variant.name}/{number}/{i}",
+            )
+            for i, injection in enumerate(variant.injections(self.reading))
+        )
+
+    def _check(self, variant: Variant) -> None:
+        if variant.aim not in self.manifest.hazards:
+            raise self._wrong((*variant.keys, "aim"), f"aim '{variant.aim}'", self.manifest.hazards)
+        for i, change in enumerate(variant.changes):
+            if change not in self.manifest.changes:
+                keys = (*variant.keys, "changes", i)
+                raise self._wrong(keys, f"change '{change}'", tuple(self.manifest.changes))
+        for injection in variant.injections(self.reading):
+            self._check_injection(injection)
+
+    def _check_injection(self, injection: InjectionSpec) -> None:
+        keys: Keys = (*injection.keys, "model")
+        try:
+            model = self.models.get(injection.model)
+            keys = (*injection.keys, "at", "file")
+            check_location(self.manifest, injection.location)
+            for param in injection.params:
+                schema = model.param(param.name)
+                if schema and schema.type == "import":
+                    keys = param.keys
+                    check_import(self.manifest, str(param.value))
+        except MutatorError as error:
+            raise self.spec.source.error(
+                keys, error.got, expected=error.expected, remedy=error.remedy
+            ) from None
+
+    def _wrong(self, keys: Keys, got: str, known: tuple[str, ...]) -> MutatorError:
+        return self.spec.source.error(
+            keys,
+            got,
+            expected=f"one of {', '.join(known) or 'none'}, as in {self.manifest.path.name}",
+            remedy="correct it",
+        )

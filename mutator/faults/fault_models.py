@@ -1,0 +1,182 @@
+"""Fault models: what a fault does to a statement. Each is a Jinja2 template and a YAML, no Python."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from mutator._common import hashing as ids
+from mutator.config import units
+from mutator.config.problems import suggestion
+from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.errors import MutatorError
+from mutator.faults.injections import InjectionModel, InjectionSpec
+
+SCHEMA = "fault_model/1"
+PROBE_TEMPLATE = "_fi.py.j2"
+TARGET_UNIT = "target"
+# `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
+ParamType = Literal["variable", "import", "number", "integer", "boolean", "seed"]
+NAMES = ("variable", "import")
+
+
+class SnippetKind(StrEnum):
+    """How a snippet meets the anchored statement."""
+
+    INSERT = "insert"  # lines before or after it
+    GUARD = "guard"  # lines above it, the last opening a block, the statement indented beneath
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParamSchema:
+    """One parameter of a model.
+
+    `unit` is None (a plain number), 'target' (the unit of the changed variable), or the unit that the
+    template wants (`s`). `min` and `max` are inclusive, in that unit.
+    """
+
+    name: str
+    type: ParamType
+    about: str
+    unit: str | None = None
+    optional: bool = False
+    min: float | None = None
+    max: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Example:
+    """A source before and after one injection (its tag is `example`): documentation that is run as a test."""
+
+    about: str
+    injection: InjectionSpec
+    before: str
+    after: str
+    line: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultModel:
+    """A fault model: template text, parameter schema, examples."""
+
+    name: str
+    kind: SnippetKind
+    about: str
+    params: tuple[ParamSchema, ...]
+    examples: tuple[Example, ...]
+    template: str
+    source: Source  # the YAML
+    template_path: Path
+
+    def param(self, name: str) -> ParamSchema | None:
+        """The parameter `name`, if the model has it."""
+        return next((p for p in self.params if p.name == name), None)
+
+
+@dataclass(frozen=True)
+class FaultModels:
+    """All fault models of a templates folder, by name, and the probe's template."""
+
+    folder: Path
+    models: Mapping[str, FaultModel]
+    probe: str
+    digest: str  # of every template and the probe: what a mutant's text depends on
+
+    def __iter__(self) -> Iterator[FaultModel]:
+        return iter(self.models.values())
+
+    def get(self, name: str) -> FaultModel:
+        """The model `name`; MutatorError that lists the known ones."""
+        if name not in self.models:
+            raise MutatorError(
+                f"unknown fault model '{name}'",
+                expected=f"one of {', '.join(self.models)}",
+                remedy=f"correct it, or add it to {self.folder}" + suggestion(name, list(self.models)),
+            )
+        return self.models[name]
+
+
+class _ParamModel(StrictModel):
+    type: ParamType
+    about: str
+    unit: str | None = None
+    optional: bool = False
+    min: float | None = None
+    max: float | None = None
+
+
+class _ExampleModel(StrictModel):
+    about: str
+    injection: InjectionModel
+    before: str
+    after: str
+
+
+class FaultModelModel(StrictModel):
+    """The YAML of a fault model, but for its key `schema`."""
+
+    name: str
+    kind: Literal["insert", "guard"]
+    about: str
+    params: dict[str, _ParamModel] = Field(default_factory=dict)
+    examples: list[_ExampleModel] = Field(min_length=1)
+
+
+def load_fault_models(folder: Path) -> FaultModels:
+    """Read every `<model>.yaml` and `<model>.py.j2` of `folder`, and `_fi.py.j2`."""
+    models = {}
+    for path in sorted(folder.glob("*.yaml")):
+        model = _load(path)
+        models[model.name] = model
+    if not models:
+        raise MutatorError("no fault model", where=folder, expected="<model>.yaml beside <model>.py.j2")
+    probe = _text(folder / PROBE_TEMPLATE)
+    texts = {name: model.template for name, model in models.items()}
+    return FaultModels(folder=folder, models=models, probe=probe, digest=ids.digest([texts, probe]))
+
+
+def _load(path: Path) -> FaultModel:
+    model, source = read(path, FaultModelModel, SCHEMA)
+    if model.name != path.stem:
+        raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', as the file is named")
+    template_path = path.with_suffix(".py.j2")
+    return FaultModel(
+        name=model.name,
+        kind=SnippetKind(model.kind),
+        about=model.about,
+        params=tuple(_param(name, param, source) for name, param in model.params.items()),
+        examples=tuple(
+            Example(
+                about=example.about,
+                injection=example.injection.injection(source, ("examples", i, "injection")),
+                before=example.before,
+                after=example.after,
+                line=source.line(("examples", i)),
+            )
+            for i, example in enumerate(model.examples)
+        ),
+        template=_text(template_path),
+        source=source,
+        template_path=template_path,
+    )
+
+
+def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
+    keys = ("params", name)
+    if not name.isidentifier() or units.split(name)[1] or name == "fi":
+        raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
+    if model.unit not in (None, TARGET_UNIT, *units.UNITS):
+        raise source.error((*keys, "unit"), f"'{model.unit}'", expected=f"target or one of {units.KNOWN}")
+    return ParamSchema(name=name, **model.model_dump())
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MutatorError(
+            f"cannot be read ({error})", where=path, remedy="put the template beside its YAML, as UTF-8"
+        ) from None

@@ -1,0 +1,134 @@
+"""Injections as YAML writes them: a place, a fault model, parameters whose units are in their names."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import Field
+
+from mutator.config import units
+from mutator.config.locations import AtModel
+from mutator.config.problems import shown
+from mutator.config.yaml_files import Keys, Source, StrictModel
+from mutator.model import FaultLocation
+
+DIMENSIONLESS = "1"
+_REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """A parameter that takes the drawn value `name`, times `sign`.
+
+    Where a reading says that a number written in one unit is read as another, the value goes through that
+    mistake.
+    """
+
+    name: str
+    sign: int = 1
+    written_in: str | None = None
+    read_as: str | None = None
+
+
+ParamValue = int | float | str | bool | Drawn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParamSpec:
+    """A parameter as written: `name` without its unit suffix, `unit` the suffix or None."""
+
+    name: str
+    unit: str | None
+    value: ParamValue
+    keys: Keys  # where it stands in the file
+
+    @property
+    def key(self) -> str:
+        """The key in the file."""
+        return f"{self.name}_{self.unit}" if self.unit else self.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InjectionSpec:
+    """One injection as written; `unit` is the unit of the changed variable, where the model needs it."""
+
+    location: FaultLocation
+    model: str
+    params: tuple[ParamSpec, ...]
+    unit: str | None
+    keys: Keys
+
+
+class InjectionModel(StrictModel):
+    """`at`, `model`, `unit` of the changed variable (a suffix, or '1' for a plain number) and `params`."""
+
+    at: AtModel
+    model: str
+    unit: str | None = None
+    params: dict[str, Any] = Field(default_factory=dict)
+
+    def injection(self, source: Source, keys: Keys) -> InjectionSpec:
+        """The injection; errors point into `source` at `keys`."""
+        if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
+            raise source.error(
+                (*keys, "unit"),
+                f"unit '{self.unit}'",
+                expected=f"one of {units.KNOWN}, or '1' for a plain number",
+                remedy="give the unit that the variable has in the source",
+            )
+        params = []
+        for key, value in self.params.items():
+            name, unit = units.split(key)
+            place = (*keys, "params", key)
+            suffix = unit.suffix if unit else None
+            params.append(ParamSpec(name=name, unit=suffix, value=_value(value, source, place), keys=place))
+        return InjectionSpec(
+            location=self.at.location(source, (*keys, "at")),
+            model=self.model,
+            params=tuple(params),
+            unit=self.unit,
+            keys=keys,
+        )
+
+
+def _value(value: Any, source: Source, keys: Keys) -> ParamValue:
+    if isinstance(value, bool | int | float | str):
+        return value
+    key = keys[-1]
+    if not isinstance(value, dict) or set(value) != {"draw", "written_in", "read_as"}:
+        raise source.error(
+            keys,
+            f"{shown(value)} for '{key}'",
+            expected="a number, a name, or {draw: ..., written_in: ..., read_as: ...}",
+            remedy="write a plain value",
+        )
+    for name in ("written_in", "read_as"):
+        if value[name] not in units.UNITS:
+            raise source.error(
+                (*keys, name), f"{shown(value[name])} for '{name}'", expected=f"one of {units.KNOWN}"
+            )
+    match = _REFERENCE.match(str(value["draw"]))
+    if not match:
+        raise source.error((*keys, "draw"), f"{shown(value['draw'])} for 'draw'", expected="the draw's name")
+    return Drawn(
+        name=match[2],
+        sign=-1 if match[1] else 1,
+        written_in=value["written_in"],
+        read_as=value["read_as"],
+    )
+
+
+def reference(text: str) -> Drawn | None:
+    """`distance` or `-distance` as a reference to the draw of that name."""
+    match = _REFERENCE.match(text)
+    return Drawn(name=match[2], sign=-1 if match[1] else 1) if match else None
+
+
+def quantity(drawn: Drawn, number: float, unit: units.Unit, target: units.Unit) -> float:
+    """The drawn `number` (in `unit`) as the parameter takes it, in `target`; ValueError for wrong units."""
+    number = math.copysign(1.0, drawn.sign) * number
+    if drawn.written_in and drawn.read_as:
+        number = units.convert(number, unit, units.UNITS[drawn.written_in])
+        unit = units.UNITS[drawn.read_as]
+    return units.convert(number, unit, target)

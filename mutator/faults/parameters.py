@@ -1,0 +1,172 @@
+"""Parameters of an injection: from what a spec wrote to what a template takes, checked against the schema."""
+
+from mutator._common.random_streams import generator
+from mutator.config import units
+from mutator.config.locations import dotted_name
+from mutator.config.problems import shown, suggestion
+from mutator.config.yaml_files import Source
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
+from mutator.faults.injections import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
+from mutator.faults.specs import Draw
+from mutator.model import AnchorKind, Injection, Value
+
+_NAMED = {"variable": "a name as in the source", "import": "a module of the target and a name in it"}
+_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
+
+
+def resolve(
+    spec: InjectionSpec,
+    model: FaultModel,
+    source: Source,
+    *,
+    draw: Draw | None = None,
+    value: float | int | None = None,
+    seed: int = 0,
+    key: str = "",
+) -> Injection:
+    """The injection with `value` (of `draw`) put in: numbers in the variable's own unit, sorted by name.
+
+    A `target` that is not given is the name that the anchor assigns to. A `seed` parameter is drawn from
+    (seed, key). MutatorError with file and line for whatever does not fit the model.
+    """
+    resolver = _Resolver(spec, model, source, draw, value)
+    params: dict[str, Value] = {}
+    for param in spec.params:
+        schema = resolver.schema(param)
+        params[schema.name] = resolver.value(param, schema)
+    for schema in model.params:
+        if schema.type == "seed":
+            params[schema.name] = int(generator(seed, f"{key}/{schema.name}").random() * 2**53)
+        elif schema.name == "target" and spec.location.anchor.kind in _WITH_DEFAULT_TARGET:
+            params.setdefault("target", spec.location.anchor.name)
+        if schema.name not in params and not schema.optional:
+            raise source.error(
+                (*spec.keys, "params"),
+                f"parameter '{schema.name}' of model {model.name} is missing",
+                expected=schema.about,
+                remedy=f"add {resolver.key(schema)}",
+            )
+    return Injection(location=spec.location, model=model.name, params=tuple(sorted(params.items())))
+
+
+class _Resolver:
+    """Checks the parameters of one injection one by one."""
+
+    def __init__(
+        self,
+        spec: InjectionSpec,
+        model: FaultModel,
+        source: Source,
+        draw: Draw | None,
+        value: float | int | None,
+    ) -> None:
+        self.spec = spec
+        self.model = model
+        self.source = source
+        self.draw = draw
+        self.drawn = value
+
+    def schema(self, param: ParamSpec) -> ParamSchema:
+        """The schema of a parameter as written; its unit suffix must be of the right dimension."""
+        schema = self.model.param(param.name)
+        if schema is None or schema.type == "seed":
+            known = [p for p in self.model.params if p.type != "seed"]
+            names = [key for p in known for key in self.keys(p)]
+            raise self.source.error(
+                param.keys,
+                f"unknown parameter '{param.key}' of model {self.model.name}",
+                expected=f"one of {', '.join(map(self.key, known)) or 'none'}",
+                remedy="correct or remove it" + suggestion(param.key, names),
+            )
+        unit = self.unit(schema)
+        given = units.UNITS[param.unit] if param.unit else None
+        if (unit is None) != (given is None) or (unit and given and unit.dimension != given.dimension):
+            raise self.source.error(
+                param.keys,
+                f"'{param.key}'" + (f" (a unit of {given.dimension})" if given else " (no unit)"),
+                expected=self.key(schema),
+                remedy="end the key in the number's unit",
+            )
+        return schema
+
+    def keys(self, schema: ParamSchema) -> list[str]:
+        """How a parameter may be written: with each suffix that fits."""
+        unit = self.unit(schema)
+        if unit is None:
+            return [schema.name]
+        fitting = [u.suffix for u in units.UNITS.values() if u.dimension == unit.dimension]
+        return [f"{schema.name}_{suffix}" for suffix in fitting]
+
+    def key(self, schema: ParamSchema) -> str:
+        """`keys` in an error."""
+        return " or ".join(f"`{key}`" for key in self.keys(schema))
+
+    def unit(self, schema: ParamSchema) -> units.Unit | None:
+        """The unit in which the template takes the parameter."""
+        if schema.unit != TARGET_UNIT:
+            return units.UNITS[schema.unit] if schema.unit else None
+        if self.spec.unit is None:
+            raise self.source.error(
+                self.spec.keys,
+                f"model {self.model.name} without `unit`",
+                expected=f"the changed variable's unit, one of {units.KNOWN}, or '1'",
+                remedy="add `unit: m` (or what it is in the source) beside `model`",
+            )
+        return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
+
+    def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
+        """The parameter's value in the template's unit, of the right type and in range."""
+        if schema.type in NAMES:
+            if not isinstance(param.value, str) or not dotted_name(param.value):
+                raise self._wrong(param, _NAMED[schema.type])
+            return param.value
+        if schema.type == "boolean":
+            if not isinstance(param.value, bool):
+                raise self._wrong(param, "true or false")
+            return param.value
+        number = self._number(param, schema)
+        if schema.type == "integer":
+            if not number.is_integer():
+                raise self._wrong(param, "a whole number", f"{number}")
+            number = int(number)
+        low = "" if schema.min is None else f"at least {schema.min:g}"
+        high = "" if schema.max is None else f"at most {schema.max:g}"
+        below = schema.min is not None and not number >= schema.min
+        above = schema.max is not None and not number <= schema.max
+        if below or above:
+            unit = self.unit(schema)
+            written = param.value if isinstance(param.value, int | float) else number
+            expected = " and ".join(filter(None, (low, high))) + (f" {unit.symbol}" if unit else "")
+            raise self._wrong(param, expected, f"{written:g}")
+        return number
+
+    def _number(self, param: ParamSpec, schema: ParamSchema) -> float:
+        value = param.value
+        unit = self.unit(schema)
+        if isinstance(value, bool):
+            raise self._wrong(param, "a number")
+        if isinstance(value, int | float):
+            return (
+                units.convert(value, units.UNITS[param.unit], unit) if unit and param.unit else float(value)
+            )
+        drawn = value if isinstance(value, Drawn) else reference(value)
+        if drawn is None or self.draw is None or self.drawn is None or drawn.name != self.draw.name:
+            expected = f"a number, or '{self.draw.name}', the draw" if self.draw else "a number"
+            raise self._wrong(param, expected)
+        source = units.UNITS[self.draw.unit] if self.draw.unit else None
+        if unit is None or source is None:
+            if unit is not source:
+                raise self._wrong(param, "a draw with a unit" if unit else "a draw without a unit")
+            return float(drawn.sign * self.drawn)
+        try:
+            return quantity(drawn, self.drawn, source, unit)
+        except ValueError as error:
+            raise self._wrong(param, f"the same dimension: {error}") from None
+
+    def _wrong(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
+        value = param.value.name if isinstance(param.value, Drawn) else param.value
+        text = got or shown(value)
+        return self.source.error(
+            param.keys, f"{text} for '{param.key}'", expected=expected, remedy="correct the value"
+        )

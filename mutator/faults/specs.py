@@ -1,0 +1,235 @@
+"""Fault specs: what may go wrong in one module, as a YAML file says it, values not yet drawn."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from mutator.config import units
+from mutator.config.yaml_files import Keys, Source, StrictModel, read
+from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.model import Hold
+
+SCHEMA = "fault_spec/1"
+AS_DESCRIBED = "as_described"
+AS_CODED = "as_coded"
+READINGS = (AS_DESCRIBED, AS_CODED)
+_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draw:
+    """How a variant's values are made: one draw from each range, or a list taken as it is.
+
+    Values are in `unit` (a suffix; None for plain numbers), the unit in the YAML key. `key` seeds the draw:
+    equal keys and ranges give equal values.
+    """
+
+    key: str
+    name: str
+    unit: str | None
+    kind: Literal["integers", "reals", "list"]
+    ranges: tuple[tuple[float, float], ...] = ()
+    values: tuple[float | int, ...] = ()
+    decimals: int | None = None
+    cap: float | None = None
+    keys: Keys = ()
+
+    @property
+    def count(self) -> int:
+        """How many values it makes."""
+        return len(self.values) if self.kind == "list" else len(self.ranges)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """One row of the library: injections that share a trigger and a draw, in one or both readings."""
+
+    name: str
+    aim: str
+    about: str
+    draw: Draw | None
+    hold: Hold | None
+    changes: tuple[str, ...]
+    readings: Mapping[str, tuple[InjectionSpec, ...]]
+    keys: Keys
+
+    def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
+        """The injections under `reading`; a variant without `as_coded` is the same in both."""
+        return self.readings.get(reading, self.readings[AS_DESCRIBED])
+
+    @property
+    def count(self) -> int:
+        """Number of faults it expands to."""
+        return self.draw.count if self.draw else 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaultSpec:
+    """One file of `fault_library/faults/<module>/`: a fault type of a module with its variants."""
+
+    module: str
+    fault_type: str
+    about: str
+    variants: tuple[Variant, ...]
+    source: Source
+
+    @property
+    def name(self) -> str:
+        """`<module>/<fault_type>`; its faults carry `<module>/<fault_type>/<variant>` as `Fault.spec`."""
+        return f"{self.module}/{self.fault_type}"
+
+    @property
+    def path(self) -> Path:
+        """The file it was read from."""
+        return self.source.path
+
+    @property
+    def count(self) -> int:
+        """Number of faults it expands to, in each reading."""
+        return sum(v.count for v in self.variants)
+
+    def __iter__(self) -> Iterator[Variant]:
+        return iter(self.variants)
+
+
+class SweepModel(StrictModel):
+    """Ranges of equal width at equal distances: first, step, last."""
+
+    first: list[float]
+    step: float = Field(gt=0.0, allow_inf_nan=False)
+    last: list[float]
+
+    @model_validator(mode="after")
+    def _even(self) -> "SweepModel":
+        self.ranges()
+        return self
+
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """All ranges, (low, high)."""
+        if len(self.first) != 2 or len(self.last) != 2 or not self.first[0] <= self.first[1]:
+            raise ValueError("first and last as [low, high]")
+        low, high = self.first
+        count = round((self.last[0] - low) / self.step) + 1
+        ranges = tuple((low + i * self.step, high + i * self.step) for i in range(min(count, 10_000)))
+        if not ranges or any(abs(a - b) > 1e-9 for a, b in zip(ranges[-1], self.last, strict=True)):
+            raise ValueError("a last range that lies whole steps above the first")
+        return ranges
+
+
+class _DrawModel(StrictModel):
+    integers_from: SweepModel | None = None
+    reals_from: SweepModel | None = None
+    decimals: int | None = Field(None, ge=0, le=12)
+    values: list[float | int] | None = None
+    cap: float | None = Field(None, allow_inf_nan=False)
+    key: str | None = None
+
+
+class _ReadingModel(StrictModel):
+    injections: list[InjectionModel]
+
+
+class _VariantModel(StrictModel):
+    aim: str
+    about: str
+    changes: list[str] = Field(default_factory=list)
+    hold: Literal["while", "to_end"] | None = None
+    draw: dict[str, _DrawModel] | None = None
+    as_described: _ReadingModel
+    as_coded: _ReadingModel | None = None
+
+
+class SpecModel(StrictModel):
+    """A spec file, but for its key `schema`."""
+
+    module: str
+    fault_type: str
+    about: str
+    variants: dict[str, _VariantModel]
+
+
+def load_spec(path: Path) -> FaultSpec:
+    """Read one spec strictly (file:line errors). Models, ranges and anchors are checked by `expand`."""
+    model, source = read(path, SpecModel, SCHEMA)
+    for key in ("module", "fault_type"):
+        _check_name(getattr(model, key), source, (key,))
+    if not model.variants:
+        raise source.error(("variants",), "no variant", expected="at least one", remedy="describe a fault")
+    name = f"{model.module}/{model.fault_type}"
+    variants = tuple(_variant(name, key, variant, source) for key, variant in model.variants.items())
+    return FaultSpec(
+        module=model.module,
+        fault_type=model.fault_type,
+        about=model.about,
+        variants=variants,
+        source=source,
+    )
+
+
+def _check_name(name: str, source: Source, keys: Keys) -> None:
+    if not _NAME.match(name):
+        raise source.error(keys, f"'{name}'", expected="small letters, digits and _", remedy="rename it")
+
+
+def _variant(spec: str, name: str, model: _VariantModel, source: Source) -> Variant:
+    keys: Keys = ("variants", name)
+    _check_name(name, source, keys)
+    readings = {AS_DESCRIBED: _injections(model.as_described, source, (*keys, AS_DESCRIBED))}
+    if model.as_coded:
+        readings[AS_CODED] = _injections(model.as_coded, source, (*keys, AS_CODED))
+    return Variant(
+        name=name,
+        aim=model.aim,
+        about=model.about,
+        draw=_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw")) if model.draw is not None else None,
+        hold=Hold(model.hold) if model.hold else None,
+        changes=tuple(model.changes),
+        readings=readings,
+        keys=keys,
+    )
+
+
+def _injections(model: _ReadingModel, source: Source, keys: Keys) -> tuple[InjectionSpec, ...]:
+    if not model.injections:
+        raise source.error((*keys, "injections"), "no injection", expected="at least one")
+    return tuple(
+        injection.injection(source, (*keys, "injections", i)) for i, injection in enumerate(model.injections)
+    )
+
+
+def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys: Keys) -> Draw:
+    if len(models) != 1:
+        raise source.error(keys, f"{len(models)} draws", expected="one", remedy="let the injections share it")
+    key, model = next(iter(models.items()))
+    name, unit = units.split(key)
+    _check_name(name, source, (*keys, key))
+    ways = {"integers": model.integers_from, "reals": model.reals_from, "list": model.values}
+    given = [kind for kind, way in ways.items() if way is not None]
+    place = (*keys, key)
+    if len(given) != 1:
+        raise source.error(
+            place, f"{len(given)} ways to draw", expected="integers_from, reals_from or values"
+        )
+    kind: Literal["integers", "reals", "list"] = given[0]  # type: ignore[assignment]
+    ranges = model.integers_from or model.reals_from
+    if model.integers_from and any(x != int(x) for pair in model.integers_from.ranges() for x in pair):
+        raise source.error((*place, "integers_from"), "a range with fractions", expected="whole numbers")
+    if model.decimals is not None and kind != "reals":
+        raise source.error(
+            (*place, "decimals"), f"{model.decimals} decimals", expected="them with reals_from"
+        )
+    return Draw(
+        key=model.key or default_key,
+        name=name,
+        unit=unit.suffix if unit else None,
+        kind=kind,
+        ranges=ranges.ranges() if ranges else (),
+        values=tuple(model.values or ()),
+        decimals=model.decimals,
+        cap=model.cap,
+        keys=place,
+    )

@@ -1,0 +1,152 @@
+"""Golden against faulty on one time axis, with marks for trigger, manifestation, alerts and hazards.
+
+matplotlib's Agg and SVG back ends, without pyplot: no display, no global state, the same bytes each time.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mutator.errors import MutatorError
+from mutator.model import Record
+from mutator.outcomes.golden import Trace
+from mutator.targets.manifest import Channel, TargetManifest
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: told apart by colour-blind readers and in grey
+FAULTY_COLOUR = "#d55e00"
+PANEL_HEIGHT = 1.1  # inches
+WIDTH = 9.0
+
+
+class MarkKind(StrEnum):
+    """What happened at a marked time."""
+
+    TRIGGER = "trigger"
+    MANIFEST = "manifest"
+    ALERT = "alert"
+    HAZARD = "hazard"
+
+
+MARK_COLOURS = {
+    MarkKind.TRIGGER: "#555555",
+    MarkKind.MANIFEST: "#009e73",
+    MarkKind.ALERT: "#b8860b",
+    MarkKind.HAZARD: "#b00020",
+}
+MARK_LINES = {MarkKind.TRIGGER: "-", MarkKind.MANIFEST: ":", MarkKind.ALERT: "--", MarkKind.HAZARD: "-"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A vertical line at `t` (s of simulation), and what to call it."""
+
+    kind: MarkKind
+    t: float
+    label: str
+
+
+def marks_of(record: Record) -> tuple[Mark, ...]:
+    """What a record knows of times, earliest first."""
+    marks = []
+    if record.activation is not None:
+        marks.append(Mark(kind=MarkKind.TRIGGER, t=record.activation.first, label="activated"))
+    if record.t_manifest is not None:
+        marks.append(Mark(kind=MarkKind.MANIFEST, t=record.t_manifest, label="manifested"))
+    marks += [Mark(kind=MarkKind.ALERT, t=t, label=name) for name, t in record.alerts]
+    marks += [Mark(kind=MarkKind.HAZARD, t=t, label=name) for name, t in record.hazards]
+    return tuple(sorted(marks, key=lambda m: m.t))
+
+
+def plot_run(
+    golden: Trace,
+    faulty: Trace,
+    manifest: TargetManifest,
+    *,
+    title: str,
+    marks: Iterable[Mark] = (),
+    paths: Sequence[Path],
+) -> None:
+    """Draw the manifest's channels of two runs into `paths` (.svg or .png by suffix), one panel a channel.
+
+    Compared channels (actuators) come first. A channel that either run lacks is left out.
+    """
+    channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
+    if not channels:
+        raise MutatorError("no channel of the manifest is in both traces", where=manifest.path)
+    figure, axes = _figure(len(channels))
+    time = manifest.time_channel
+    for axis, channel in zip(axes, channels, strict=True):
+        _panel(axis, channel, (golden[time], golden[channel.name]), (faulty[time], faulty[channel.name]))
+    _decorate(figure, axes, title, tuple(marks))
+    save(figure, paths)
+
+
+def _figure(rows: int) -> tuple["Figure", list["Axes"]]:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 1.1 + PANEL_HEIGHT * rows), layout="constrained")
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    return figure, list(axes)
+
+
+def _panel(axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any]) -> None:
+    """One channel: golden broad beneath, faulty narrow above, so that equal lines show in both colours."""
+    axis.plot(*map(finite, golden), color=GOLDEN_COLOUR, linewidth=2.4, alpha=0.55, label="golden")
+    axis.plot(*map(finite, faulty), color=FAULTY_COLOUR, linewidth=1.1, label="faulty")
+    unit = f"\n[{channel.unit}]" if channel.unit not in ("", "-") else ""
+    axis.set_ylabel(channel.name + unit, fontsize=8)
+    axis.tick_params(labelsize=8)
+    axis.grid(visible=True, linewidth=0.4, alpha=0.5)
+    axis.margins(x=0.01, y=0.12)
+
+
+def _decorate(figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mark, ...]) -> None:
+    for axis in axes:
+        for mark in marks:
+            axis.axvline(
+                mark.t, color=MARK_COLOURS[mark.kind], linestyle=MARK_LINES[mark.kind], linewidth=1.0
+            )
+    top = axes[0]
+    # Names of marks close together would lie on each other, so they take turns on three levels.
+    for i, mark in enumerate(marks):
+        top.annotate(
+            f"{mark.label} {mark.t:.2f}",
+            (mark.t, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, 2 + 9 * (i % 3)),
+            textcoords="offset points",
+            fontsize=7,
+            color=MARK_COLOURS[mark.kind],
+        )
+    axes[-1].set_xlabel("time [s]", fontsize=8)
+    top.legend(loc="best", fontsize=7, ncols=2, frameon=False)
+    figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+
+
+def save(figure: "Figure", paths: Sequence[Path]) -> None:
+    """Write a figure into each of `paths` (.svg or .png by suffix), the same bytes each time."""
+    import matplotlib
+
+    # A salt and no date: the same run draws the same SVG.
+    with matplotlib.rc_context({"svg.hashsalt": "mutator", "svg.fonttype": "none"}):
+        for path in paths:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            no_date = {"Date": None} if path.suffix == ".svg" else None
+            figure.savefig(path, dpi=110, metadata=no_date)
+
+
+def finite(values: Any) -> Any:
+    """Infinities (time headway at standstill) become gaps; everything else stays."""
+    array = np.asarray(values, dtype=float)
+    return np.where(np.isfinite(array), array, np.nan)

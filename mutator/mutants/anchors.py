@@ -1,0 +1,295 @@
+"""Anchors: from a qualified function name and a statement to lines of a source file.
+
+LibCST parses each file once; what is kept is, for each function, its statements that assign, call or return,
+with the lines they span. A location resolves to exactly one of them, or to an error that lists the
+candidates.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import libcst as cst
+from libcst.metadata import CodeRange, MetadataWrapper, PositionProvider
+
+from mutator._common.interrupts import held
+from mutator.config.problems import suggestion
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants.statements import Function, Statement, collect
+
+if TYPE_CHECKING:
+    from mutator.mutants.shapes import Mold, Shape
+
+TAG = re.compile(rb"[ \t]*# fi:([0-9a-z]+)(?: guard:(\d+))?(?=\r?\n?\Z)")
+_LONE_CR = re.compile(rb"\r(?!\n)")
+_PROBE_NAME = re.compile(rb"\b_fi\b")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Site:
+    """A resolved anchor: the anchored statement is lines `first` to `last` (exclusive, from 0).
+
+    For `entry` it is empty: `first == last`. `reindent` is how many of its lines a guard may indent: all,
+    or only the first when a string spans lines. `names` are the names that the function knows.
+    """
+
+    first: int
+    last: int
+    after: bool
+    alone: bool
+    reindent: int
+    indent: bytes
+    names: frozenset[str]
+
+
+@dataclass(frozen=True)
+class ParsedFile:
+    """A Python file of the target: its lines, its functions, where an import may go, its molds so far."""
+
+    path: str
+    data: bytes
+    lines: tuple[bytes, ...]
+    encoding: str
+    newline: bytes
+    indent_unit: bytes
+    import_line: int
+    functions: Mapping[str, tuple[Function, ...]]
+    where: Path
+    molds: dict["Shape", "Mold"] = field(default_factory=dict, repr=False, compare=False)
+    _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
+
+    def resolve(self, location: FaultLocation) -> Site:
+        """The one place that `location` means; MutatorError with candidates if there is none or several."""
+        key = (location.function, location.anchor)
+        if key not in self._sites:
+            self._sites[key] = _resolve(self, location)
+        return self._sites[key]
+
+
+@held()
+def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
+    """Parse one file of the target; MutatorError when it is no Python, or was instrumented before."""
+    where = root / path
+    lines = tuple(data.splitlines(keepends=True))
+    if _LONE_CR.search(data):
+        raise MutatorError(
+            "line ends of CR alone", where=where, expected="LF or CRLF", remedy="convert the file's line ends"
+        )
+    _refuse_instrumented(lines, data, where)
+    try:
+        compile(data, str(where), "exec", dont_inherit=True)
+        module = cst.parse_module(data)
+    except (SyntaxError, ValueError, RecursionError, cst.ParserSyntaxError) as error:
+        message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
+        raise MutatorError(
+            f"not valid Python: {message}", where=where, line=line, remedy="mend the target"
+        ) from None
+    wrapper = MetadataWrapper(module, unsafe_skip_copy=True)
+    positions: Mapping[cst.CSTNode, CodeRange] = wrapper.resolve(PositionProvider)
+    return ParsedFile(
+        path=path,
+        data=data,
+        lines=lines,
+        encoding=module.encoding.removesuffix("-sig"),
+        newline=module.default_newline.encode(),
+        indent_unit=module.default_indent.encode(),
+        import_line=_import_line(module, positions),
+        functions=collect(module, positions),
+        where=where,
+    )
+
+
+def _refuse_instrumented(lines: tuple[bytes, ...], data: bytes, where: Path) -> None:
+    match = _PROBE_NAME.search(data)
+    tagged = next((i for i, line in enumerate(lines) if TAG.search(line)), None) if b"# fi:" in data else None
+    if match or tagged is not None:
+        line = tagged if tagged is not None else data[: match.start()].count(b"\n") if match else 0
+        raise MutatorError(
+            "the name _fi or a `# fi:` tag is in use",
+            where=where,
+            line=line + 1,
+            expected="a tree without injected lines",
+            remedy="point the manifest at the original tree, or rename it in the target",
+        )
+
+
+def _import_line(module: cst.Module, positions: Mapping[cst.CSTNode, CodeRange]) -> int:
+    """Line index for an import: after docstring and `__future__` imports, else before the first statement."""
+    after = None
+    for i, node in enumerate(module.body):
+        if not isinstance(node, cst.SimpleStatementLine):
+            break
+        small = node.body[0]
+        docstring = (
+            i == 0
+            and isinstance(small, cst.Expr)
+            and isinstance(small.value, cst.SimpleString | cst.ConcatenatedString)
+        )
+        future = (
+            isinstance(small, cst.ImportFrom)
+            and isinstance(small.module, cst.Name)
+            and small.module.value == "__future__"
+        )
+        if not (docstring or future):
+            break
+        after = positions[node].end.line + _continued(node)
+    if after is not None:
+        return after
+    return _first_line(module.body[0], positions) if module.body else len(module.header)
+
+
+def _first_line(node: cst.CSTNode, positions: Mapping[cst.CSTNode, CodeRange]) -> int:
+    """Index of the first line of a statement, its decorators included."""
+    decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
+    return min(positions[n].start.line for n in (node, *decorators)) - 1
+
+
+def _continued(node: cst.SimpleStatementLine) -> int:
+    """Lines that a trailing backslash adds after the last token of a statement."""
+    return node.trailing_whitespace.whitespace.value.count("\\")
+
+
+def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
+    name = location.function.replace(".<locals>", "")
+    functions = file.functions.get(name)
+    if not functions:
+        known = list(file.functions)
+        raise MutatorError(
+            f"no function '{location.function}'",
+            where=file.where,
+            expected=f"one of {', '.join(known) or 'none: the file has no function'}",
+            remedy="correct the qualified name" + suggestion(name, known),
+        )
+    if location.anchor.kind is AnchorKind.ENTRY:
+        return _entry(file, location, functions)
+    function, statement = _choose(file, location, functions)
+    _refuse_awkward(file, location.anchor, statement)
+    first = statement.first
+    return Site(
+        first=first,
+        last=statement.last,
+        after=location.anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL),
+        alone=statement.alone,
+        reindent=1 if statement.spanning_string else statement.last - first,
+        indent=_indent(file.lines[first]),
+        names=function.names,
+    )
+
+
+def _indent(line: bytes) -> bytes:
+    return line[: len(line) - len(line.lstrip(b" \t\f"))]
+
+
+def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function, ...]) -> Site:
+    nth = location.anchor.nth
+    if (len(functions) > 1) if nth is None else (nth > len(functions)):
+        places = ", ".join(f"line {f.line + 1}" for f in functions)
+        raise MutatorError(
+            f"{len(functions)} functions '{location.function}', nth {nth}",
+            where=file.where,
+            line=functions[0].line + 1,
+            expected=f"one of those at {places}",
+            remedy=f"give `nth`, from 1 to {len(functions)}",
+        )
+    function = functions[(nth or 1) - 1]
+    if function.entry is None:
+        raise MutatorError(
+            f"function '{location.function}' has no line of its own to insert at",
+            where=file.where,
+            line=function.line + 1,
+            expected="a body on lines below its head, its docstring on lines of its own",
+            remedy="anchor somewhere else, or reformat the target",
+        )
+    index, model_line = function.entry
+    return Site(
+        first=index,
+        last=index,
+        after=index != model_line,
+        alone=True,
+        reindent=0,
+        indent=_indent(file.lines[model_line]),
+        names=function.names,
+    )
+
+
+def _choose(
+    file: ParsedFile, location: FaultLocation, functions: tuple[Function, ...]
+) -> tuple[Function, Statement]:
+    anchor = location.anchor
+    verb = anchor.kind.partition("_")[2]
+    pairs = [(f, s) for f in functions for s in f.statements if anchor.name in s.names(verb)]
+    hits = [(f, s) for f, s in pairs if s.reason is None]
+    nth = anchor.nth
+    if hits and (len(hits) == 1 if nth is None else nth <= len(hits)):
+        return hits[(nth or 1) - 1]
+    raise _no_single_hit(file, location, functions, pairs, hits)
+
+
+def _no_single_hit(
+    file: ParsedFile,
+    location: FaultLocation,
+    functions: tuple[Function, ...],
+    pairs: list[tuple[Function, Statement]],
+    hits: list[tuple[Function, Statement]],
+) -> MutatorError:
+    """Why none of `pairs` (what bears the name) or `hits` (those that are statements) can be taken."""
+    anchor = location.anchor
+    verb = anchor.kind.partition("_")[2]
+    what, place = _what(verb, anchor.name), f"in {location.function}"
+    if hits:
+        lines = ", ".join(str(s.first + 1) for _, s in hits)
+        take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+        got = f"{what} matches {len(hits)} statements {place}: lines {lines}"
+        remedy = f"give `nth`, {take}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {take}"
+        line, expected = hits[0][1].first, "exactly one"
+    elif pairs:
+        statement = pairs[0][1]
+        got = f"{what} {place} is no statement of its own: {statement.reason}"
+        line, expected = statement.first, "a statement that does nothing else"
+        remedy = "anchor at another statement"
+    else:
+        got, line, expected = f"no {what} {place}", functions[0].line, _candidates(functions, verb)
+        remedy = "correct the name as it is written in the source"
+    return MutatorError(got, where=file.where, line=line + 1, expected=expected, remedy=remedy)
+
+
+def _what(verb: str, name: str) -> str:
+    words = {"assign": "assignment to", "call": "call of", "return": "return of"}
+    return f"{words[verb]} '{name}'" if name else "return"
+
+
+def _candidates(functions: tuple[Function, ...], verb: str) -> str:
+    """All statements of the kind asked for, with their lines."""
+    found = [
+        f"'{name}' (line {s.first + 1})" if name else f"line {s.first + 1}"
+        for f in functions
+        for s in f.statements
+        if s.reason is None
+        for name in s.names(verb)
+    ]
+    return f"one of {', '.join(found)}" if found else "another anchor: there is none of this kind"
+
+
+def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
+    """Line-wise insertion needs the statement's own line on the side where it inserts."""
+    after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
+    reason = None
+    if statement.one_line_suite:
+        reason = "stands on the line of its `if`, `for` or `def`"
+    elif after and statement.is_return:
+        reason = "returns, so nothing after it runs"
+    elif after and not statement.last_in_line:
+        reason = "shares its line with statements after it"
+    elif not after and not statement.first_in_line:
+        reason = "shares its line with statements before it"
+    if reason:
+        raise MutatorError(
+            f"the anchored statement {reason}",
+            where=file.where,
+            line=statement.first + 1,
+            expected="a statement on lines of its own",
+            remedy="anchor at another statement, or reformat the target",
+        )

@@ -1,0 +1,159 @@
+"""Rendering: a fault model's template and its parameters to lines of Python.
+
+Templates run in Jinja2's sandbox with undefined names as errors. Whatever is printed is a Python literal or a
+checked name, so a value cannot break out of its place.
+"""
+
+import ast
+import io
+import math
+import tokenize
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import StrictUndefined, TemplateError, TemplateSyntaxError, Undefined
+from jinja2.exceptions import SecurityError
+from jinja2.runtime import Context
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+from mutator.config.locations import dotted_name
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import NAMES, FaultModel, SnippetKind
+from mutator.model import Value
+from mutator.mutants.skeletons import skeleton
+
+
+def literal(value: object) -> str:
+    """A value as Python source: numbers exactly, non-finite ones as `float('nan')`; names as they are."""
+    if value is None or isinstance(value, bool):
+        return repr(value)
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else f"float('{value}')"
+    if isinstance(value, int):
+        return repr(value)
+    if isinstance(value, str | Undefined):
+        return str(value)  # of an undefined name it raises UndefinedError
+    raise MutatorError(f"a {type(value).__name__} in a template", expected="a number or a name")
+
+
+def signed(value: int | float) -> str:
+    """`+ 3.0` or `- 3.0`: how a term is added in an expression."""
+    if math.copysign(1.0, value) < 0.0 and not math.isnan(value):
+        return f"- {literal(-value)}"
+    return f"+ {literal(value)}"
+
+
+class _Sandbox(ImmutableSandboxedEnvironment):
+    """Jinja2's sandbox without powers, which take time without end: 9 ** 9 ** 9."""
+
+    intercepted_binops = frozenset({"**"})
+
+    def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
+        raise SecurityError(f"{operator} in a template")
+
+
+_ENVIRONMENT = _Sandbox(
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    finalize=literal,
+)
+_ENVIRONMENT.filters["signed"] = signed
+_compiled = lru_cache(maxsize=256)(_ENVIRONMENT.from_string)
+_FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError, RecursionError, MemoryError)
+
+
+def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[str, ...]:
+    """The model's lines for these parameters, untagged, 4 spaces a level. `fi` is the injection's id.
+
+    MutatorError when the template fails or its result is not whole lines of Python.
+    """
+    names = {param.name: params.get(param.name) for param in model.params}
+    for param in model.params:
+        value = names[param.name]
+        is_name = isinstance(value, str) and dotted_name(value)
+        if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
+            raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
+    text = render(model.template, {"fi": fi, **names}, model.template_path)
+    text = text.removesuffix("\n")
+    if not _are_lines(skeleton(text, (fi,)), model.kind):
+        _check_lines(text, model.kind, model.template_path)
+    return tuple(text.split("\n"))
+
+
+def render(template: str, names: Mapping[str, object], where: Path) -> str:
+    """Render one template; every failure is a MutatorError with the template and, if known, its line."""
+    try:
+        return _compiled(template).render(names)
+    except TemplateSyntaxError as error:
+        raise _template_error(str(error.message), where, error.lineno) from None
+    except TemplateError as error:
+        raise _template_error(str(error.message or error), where, _line_in(error)) from None
+    except _FAILURES as error:
+        raise _template_error(f"{type(error).__name__}: {error}", where, _line_in(error)) from None
+
+
+def _template_error(what: str, where: Path, line: int | None) -> MutatorError:
+    return MutatorError(
+        f"the template fails: {what}",
+        where=where,
+        line=line,
+        expected="names of the model's parameters, `fi`, a loop or a condition",
+        remedy="correct the template",
+    )
+
+
+def _line_in(error: BaseException) -> int | None:
+    """The template's line in a traceback (Jinja2 maps its frames back to template lines)."""
+    line = None
+    trace = error.__traceback__
+    while trace:
+        if trace.tb_frame.f_code.co_filename == "<template>":
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+@lru_cache(maxsize=1024)
+def _are_lines(text: str, kind: SnippetKind) -> bool:
+    """Whether a skeleton passes `_check_lines`, and so every text that has it."""
+    try:
+        _check_lines(text, kind, Path())
+    except MutatorError:
+        return False
+    return True
+
+
+def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
+    """Every line must end a statement or open a block: only then can each carry its tag."""
+    text += "\n"
+    whole = text + "    pass\n" if kind is SnippetKind.GUARD else text
+    try:
+        ast.parse(whole)
+        ends = [
+            token.start[0]
+            for token in tokenize.generate_tokens(io.StringIO(text).readline)
+            if token.type == tokenize.NEWLINE
+        ]
+    except (SyntaxError, tokenize.TokenError) as error:
+        if isinstance(error, tokenize.TokenError) or kind is not SnippetKind.GUARD:
+            problem = error.args[0]
+        else:
+            problem = f"{error.msg} (a guard's last line must open a block)"
+        raise MutatorError(
+            f"the template does not give Python: {problem}: {text!r}",
+            where=where,
+            remedy="correct the template",
+        ) from None
+    lines = text.split("\n")[:-1]
+    uneven = any((len(x) - len(x.lstrip(" "))) % 4 or "\t" in x for x in lines)
+    if uneven or ends != list(range(1, len(lines) + 1)):
+        raise MutatorError(
+            f"the template gives {text!r}",
+            where=where,
+            expected="one statement a line, 4 spaces a level, no blank lines, no comments, no tabs",
+            remedy="correct the template",
+        )

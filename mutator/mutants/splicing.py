@@ -1,0 +1,200 @@
+"""The splicer: puts tagged lines between the lines of a source file, and takes them out again.
+
+Edits are whole lines at line boundaries, so everything else keeps its bytes by construction: line ends, tabs,
+comments, a missing newline at the end. A guard also indents the statement it wraps; its tag says how many
+lines.
+"""
+
+from codecs import BOM_UTF8
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+from mutator.errors import MutatorError
+from mutator.mutants.anchors import TAG, ParsedFile, Site
+
+PROBE_TAG = "probe"
+
+
+class Rank(IntEnum):
+    """Order of edits at one boundary: what belongs to the statement above goes first, a guard last."""
+
+    AFTER = 0
+    BEFORE = 1
+    GUARD = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Edit:
+    """Lines to go before line `index`; the `reindent` lines that follow are indented by `unit`."""
+
+    index: int
+    rank: Rank
+    lines: tuple[bytes, ...]
+    reindent: int = 0
+    unit: bytes = b""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """A run of lines of the result: kept (' '), taken out ('-') or put in ('+')."""
+
+    sign: str
+    lines: tuple[bytes, ...]
+
+
+def insertion(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
+    """The edit that puts `code` (4 spaces an indentation level) at `site`, each line tagged."""
+    lines = _lines(file, site.indent, code, f"# fi:{tag}")
+    index, rank = (site.last, Rank.AFTER) if site.after else (site.first, Rank.BEFORE)
+    return Edit(index=index, rank=rank, lines=lines)
+
+
+def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
+    """The edit that puts `code`, whose last line opens a block, around the statement at `site`."""
+    if site.first == site.last or not site.alone or site.after:
+        raise MutatorError(
+            "a guard needs a statement to wrap, alone on its lines",
+            where=file.where,
+            line=site.first + 1,
+            expected="an anchor before_call, before_assign or before_return",
+            remedy="anchor at the statement that is to be left out",
+        )
+    lines = _lines(file, site.indent, code, f"# fi:{tag} guard:{site.reindent}")
+    return Edit(
+        index=site.first,
+        rank=Rank.GUARD,
+        lines=lines,
+        reindent=site.reindent,
+        unit=_unit(file, site.indent),
+    )
+
+
+def probe_import(file: ParsedFile, package: str) -> Edit:
+    """The edit that imports the probe: after docstring and `__future__` imports."""
+    if file.import_line == 0 and file.data.startswith(BOM_UTF8):
+        raise MutatorError(
+            "a byte order mark right before the first statement",
+            where=file.where,
+            line=1,
+            expected="a comment or docstring there, or no mark",
+            remedy="save the file without byte order mark",
+        )
+    line = f"from {package} import _fi  # fi:{PROBE_TAG}".encode(file.encoding)
+    return Edit(index=file.import_line, rank=Rank.BEFORE, lines=(line + file.newline,))
+
+
+def _unit(file: ParsedFile, indent: bytes) -> bytes:
+    return b"\t" if indent.endswith(b"\t") else file.indent_unit
+
+
+def _lines(file: ParsedFile, indent: bytes, code: Sequence[str], tag: str) -> tuple[bytes, ...]:
+    unit = _unit(file, indent)
+    result = []
+    for line in code:
+        body = line.lstrip(" ")
+        levels = (len(line) - len(body)) // 4
+        try:
+            result.append(indent + unit * levels + f"{body}  {tag}".encode(file.encoding) + file.newline)
+        except UnicodeEncodeError:
+            raise MutatorError(
+                f"{body!r} cannot be written in {file.encoding}",
+                where=file.where,
+                expected="names that the file's encoding has",
+                remedy="use other names",
+            ) from None
+    return tuple(result)
+
+
+def in_order(edits: Iterable[Edit]) -> list[Edit]:
+    """Edits from the top of the file to its end; those at one boundary keep their order within a rank."""
+    return sorted(edits, key=lambda e: (e.index, e.rank))
+
+
+def apply(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
+    """The file's lines with the edits made, as pieces; `joined` gives the bytes.
+
+    MutatorError when two guards want one statement.
+    """
+    pieces: list[Piece] = []
+    done = 0
+    for edit in in_order(edits):
+        if edit.index < done:
+            raise MutatorError(
+                "two guards around one statement, or an injection inside a guarded one",
+                where=file.where,
+                line=edit.index + 1,
+                expected="one omission a statement",
+                remedy="drop one of the injections",
+            )
+        _keep(pieces, file.lines[done : edit.index])
+        done = edit.index
+        added = list(edit.lines)
+        if done and edit.index == len(file.lines):
+            added = _end_of_file(pieces, added, file.newline)
+        if edit.reindent:
+            done += edit.reindent
+            wrapped = file.lines[edit.index : done]
+            pieces.append(Piece(sign="-", lines=wrapped))
+            added += _indented(wrapped, edit.unit)
+        pieces.append(Piece(sign="+", lines=tuple(added)))
+    _keep(pieces, file.lines[done:])
+    return tuple(pieces)
+
+
+def _keep(pieces: list[Piece], lines: tuple[bytes, ...]) -> None:
+    if lines:
+        pieces.append(Piece(sign=" ", lines=lines))
+
+
+def _indented(lines: Sequence[bytes], unit: bytes) -> tuple[bytes, ...]:
+    """The first line one level deeper (after its indentation, lest tabs and spaces mix), the others alike."""
+    start = len(_margin(lines[0]))
+    first = lines[0][:start] + unit + lines[0][start:]
+    return (first, *(unit + line if line.strip() else line for line in lines[1:]))
+
+
+def _margin(line: bytes) -> bytes:
+    return line[: len(line) - len(line.lstrip(b" \t\f"))]
+
+
+def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> list[bytes]:
+    """A file whose last line has no end keeps that property: the new last line has none instead."""
+    last = pieces[-1]
+    if last.lines[-1].endswith((b"\n", b"\r")):
+        return added
+    pieces[-1] = Piece(sign=last.sign, lines=last.lines[:-1])
+    if last.sign == " ":
+        pieces.append(Piece(sign="-", lines=last.lines[-1:]))
+    pieces.append(Piece(sign="+", lines=(last.lines[-1] + newline,)))
+    added[-1] = added[-1].removesuffix(newline)
+    return added
+
+
+def joined(pieces: Iterable[Piece]) -> bytes:
+    """The bytes of the result."""
+    return b"".join(line for piece in pieces if piece.sign != "-" for line in piece.lines)
+
+
+def unsplice(lines: Sequence[bytes]) -> bytes:
+    """The original bytes of a mutated file's lines: tagged lines out, guarded statements put back."""
+    result: list[bytes] = []
+    left = 0  # lines still to be put back
+    margin = unit = b""
+    for line in lines:
+        match = TAG.search(line)
+        if match:
+            left = int(match[2] or 0)
+            margin, unit = _margin(line), b""
+        elif left and not unit:
+            unit = _margin(line)[len(margin) :]
+            result.append(margin + line[len(margin) + len(unit) :])
+            left -= 1
+        elif left:
+            result.append(line[len(unit) :] if line.strip() else line)
+            left -= 1
+        else:
+            result.append(line)
+    if result and TAG.search(lines[-1]) and not lines[-1].endswith((b"\n", b"\r")):
+        result[-1] = result[-1].rstrip(b"\r\n")
+    return b"".join(result)

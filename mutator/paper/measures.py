@@ -1,0 +1,196 @@
+"""What a published observation can be asked of: measures of a frame of results, each with an interval.
+
+`runs` is what `mutator.statistics.frame.load` gives; `of`, `part` and `against` are pandas queries on it, an
+empty one means all runs. A report shows each claim as the call that was evaluated; the same call answers in
+a Python session:
+
+    from mutator.paper.measures import *
+    from mutator.statistics.frame import load
+    runs = load(Path("results.csv"))
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from mutator.statistics import compare, times
+from mutator.statistics.share import CONFIDENCE, Share
+from mutator.statistics.share import share as wilson
+from mutator.statistics.tally import by_kind
+
+__all__ = [
+    "Path",
+    "clustered_difference",
+    "difference",
+    "mean_time",
+    "median_time",
+    "paired",
+    "share",
+    "stratified",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """An estimate with its 95 % interval (NaN: none), from `n` runs or pairs; `count`: how many of them have
+    what is asked for, where that is countable. `said`: all of it in words."""
+
+    estimate: float
+    low: float
+    high: float
+    n: int
+    count: int | None = None
+    said: str
+
+    def __str__(self) -> str:
+        return self.said
+
+
+def share(runs: pd.DataFrame, *, of: str, part: str) -> Found:
+    """The share of the runs of `of` that are in `part`, too; Wilson interval."""
+    return of_share(_share(runs, of, part))
+
+
+def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Found:
+    """The share of `part` in the runs of `of` less that in the runs of `against`; Newcombe interval."""
+    return of_difference(_share(runs, of, part), _share(runs, against, part))
+
+
+def clustered_difference(runs: pd.DataFrame, *, of: str) -> Found:
+    """Hazard rate of guided less that of random runs; whole faults (location and value) resampled."""
+    chosen = _query(runs, of)
+    one, other = (
+        _share(chosen, f'method == "{how}"', "is_hazard") for how in (compare.GUIDED, compare.RANDOM)
+    )
+    found = compare.resampled(chosen, "injected")  # of these runs: they are chosen already
+    return Found(
+        estimate=found.difference,
+        low=found.low,
+        high=found.high,
+        n=min(one.of, other.of),
+        said=_against(found.difference, found.low, found.high, one, other, f", {found.clusters} faults"),
+    )
+
+
+def stratified(runs: pd.DataFrame, *, of: str) -> Found:
+    """Odds of a hazard, guided against random, common to the fault types (Mantel-Haenszel)."""
+    parts = compare.strata(by_kind(_query(runs, of)), "injected")
+    found = compare.mantel_haenszel(parts)
+    said = f"- ({found.strata} fault types)"
+    if not math.isnan(found.odds_ratio):
+        said = (
+            f"odds ratio {found.odds_ratio:.3g} ({found.low:.3g} to {found.high:.3g}; {found.strata} fault "
+            f"types; p {found.p:.2g}, equal in all types: p {found.p_equal:.2g})"
+        )
+    return Found(
+        estimate=found.odds_ratio,
+        low=found.low,
+        high=found.high,
+        n=min(sum(s.guided for s in parts), sum(s.random for s in parts)),
+        said=said,
+    )
+
+
+def paired(runs: pd.DataFrame, *, of: str) -> Found:
+    """Of the pairs of guided and random run that differ in having a hazard, the share where the guided one
+    has it. Clopper-Pearson interval, which decides as McNemar's exact test does. `of` is a query on pairs:
+    its columns end in `_guided` and `_random`."""
+    from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
+
+    matched = compare.mcnemar(_query(compare.pairs(runs), of))
+    unlike = matched.first_only + matched.second_only
+    low = high = estimate = math.nan
+    if unlike:
+        estimate = matched.first_only / unlike
+        low, high = map(float, proportion_confint(matched.first_only, unlike, 1 - CONFIDENCE, "beta"))
+    return Found(
+        estimate=estimate,
+        low=low,
+        high=high,
+        n=unlike,
+        count=matched.first_only,
+        said=f"hazard in the guided run only {matched.first_only}, in the random one only "
+        f"{matched.second_only}, of {matched.pairs} pairs (McNemar p {matched.p:.2g})",
+    )
+
+
+def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Found:
+    """Mean of `end - start` in s over the runs of `of` that have both; interval of Student's t."""
+    from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
+
+    chosen = _query(runs, of)
+    known = (chosen[end] - chosen[start]).dropna()
+    if len(known) < 2 or known.nunique() < 2:  # of a single value nothing is known about the spread
+        return Found(estimate=math.nan, low=math.nan, high=math.nan, n=len(known), said=f"- (N {len(known)})")
+    interval = ttest_1samp(known, 0.0).confidence_interval(CONFIDENCE)
+    return _seconds(float(known.mean()), float(interval.low), float(interval.high), len(known))
+
+
+def median_time(runs: pd.DataFrame, *, of: str) -> Found:
+    """Kaplan-Meier median of the time in s from the first alert to a hazard, censored at the end of the run
+    (column `t_end`, s of simulation). Infinite: most alerts are never followed by a hazard."""
+    chosen = _query(runs, of)
+    if chosen["t_end"].isna().any():
+        nan = math.nan
+        return Found(estimate=nan, low=nan, high=nan, n=0, said="- (when a run ends is not known here)")
+    ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
+    found = times.reaction(chosen, ends, 0.0)
+    median = found.median
+    low, high = found.median_low, found.median_high
+    if found.at_risk and math.isnan(
+        low
+    ):  # the curve is nowhere near a half: always above, or past it in a step
+        median = low = high = math.inf if math.isnan(median) else median
+    return _seconds(median, low, high, found.at_risk)
+
+
+def of_share(one: Share) -> Found:
+    """What a share says."""
+    return Found(estimate=one.rate, low=one.low, high=one.high, n=one.of, count=one.count, said=str(one))
+
+
+def of_difference(one: Share, other: Share) -> Found:
+    """What two shares of different runs say, the first less the second (Newcombe, statsmodels)."""
+    from statsmodels.stats.proportion import confint_proportions_2indep
+
+    low = high = math.nan
+    if one.of and other.of:
+        low, high = confint_proportions_2indep(
+            one.count, one.of, other.count, other.of, method="newcomb", compare="diff", alpha=1 - CONFIDENCE
+        )
+    gap = one.rate - other.rate
+    said = _against(gap, low, high, one, other)
+    return Found(estimate=gap, low=float(low), high=float(high), n=min(one.of, other.of), said=said)
+
+
+def _query(runs: pd.DataFrame, text: str) -> pd.DataFrame:
+    return runs.query(text, engine="python") if text else runs
+
+
+def _share(runs: pd.DataFrame, of: str, part: str) -> Share:
+    chosen = _query(runs, of)
+    return wilson(len(_query(chosen, part)), len(chosen))
+
+
+def _against(gap: float, low: float, high: float, one: Share, other: Share, more: str = "") -> str:
+    both = f"{_plain(one)} against {_plain(other)}"
+    if math.isnan(gap):
+        return both
+    return f"{100 * gap:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}{more}): {both}"
+
+
+def _plain(one: Share) -> str:
+    return f"{100 * one.rate:.1f} % ({one.count}/{one.of})" if one.of else "- (0/0)"
+
+
+def _seconds(value: float, low: float, high: float, n: int) -> Found:
+    said = f"{value:.2f} s (N {n}; {low:.2f} to {high:.2f})" if n else "- (N 0)"
+    return Found(estimate=value, low=low, high=high, n=n, said=said)
+
+
+MEASURES = {
+    f.__name__: f
+    for f in (share, difference, clustered_difference, stratified, paired, mean_time, median_time)
+}

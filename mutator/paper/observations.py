@@ -1,0 +1,257 @@
+"""The published observations, put to the test: each claim a query on the results, and a verdict by a rule.
+
+Claims, queries and rules are data of the fault library (`references/paper_observations.yaml`). The query that
+a report shows is the call that was evaluated; see `mutator.paper.measures`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pydantic import Field, model_validator
+
+from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.paper.measures import MEASURES, Found, of_difference, of_share
+from mutator.statistics.share import share
+
+FILE = "paper_observations.yaml"
+SCHEMA = "paper_observations/1"
+FEWEST = 10  # runs of which an interval is believed
+
+
+class Verdict(StrEnum):
+    """What became of a claim."""
+
+    HOLDS = "holds"
+    FAILS = "does not hold"
+    UNTOLD = "cannot be told"
+
+
+class Rule(StrictModel):
+    """When a claim holds; exactly one of these. Shares and differences are of 1, times in s.
+
+    `above, below, within`: where the whole interval must lie (within: of plus and minus). `some`: at least
+    one run must have it, `never`: none may; where none has, the interval must end at this share or below.
+    """
+
+    above: float | None = None
+    below: float | None = None
+    within: float | None = Field(None, gt=0)
+    some: float | None = Field(None, gt=0, lt=1)
+    never: float | None = Field(None, gt=0, lt=1)
+
+    @model_validator(mode="after")
+    def _check(self) -> "Rule":
+        if len(self.model_dump(exclude_none=True)) != 1:
+            raise ValueError("not exactly one of above, below, within, some, never")
+        return self
+
+    def verdict(self, found: Found) -> Verdict:
+        """What the rule says of an estimate."""
+        if self.some is not None or self.never is not None:
+            return self._seen(found)
+        if found.n < FEWEST:
+            return Verdict.UNTOLD
+        low, high = found.low, found.high  # NaN: no comparison is true
+        if self.within is not None:
+            holds, fails = -self.within < low and high < self.within, low > self.within or high < -self.within
+        elif self.above is not None:
+            holds, fails = low > self.above, high < self.above
+        else:
+            assert self.below is not None
+            holds, fails = high < self.below, low > self.below
+        return Verdict.HOLDS if holds else Verdict.FAILS if fails else Verdict.UNTOLD
+
+    def _seen(self, found: Found) -> Verdict:
+        wanted = self.some is not None
+        if found.count:
+            return Verdict.HOLDS if wanted else Verdict.FAILS
+        if found.n and found.high <= (self.some or self.never or 0.0):
+            return Verdict.FAILS if wanted else Verdict.HOLDS
+        return Verdict.UNTOLD
+
+    def __str__(self) -> str:
+        [(name, value)] = self.model_dump(exclude_none=True).items()
+        return f"{name} {value:g}"
+
+
+class _Each(StrictModel):
+    column: str
+    values: list[str] = Field(min_length=1)
+
+
+class Claim(StrictModel):
+    """One claim; see the head of the file of observations. Without a measure it is one that results cannot
+    decide, and `see` says what may."""
+
+    says: str
+    measure: str | None = None
+    of: str = ""
+    against: str | None = None
+    part: str | None = None
+    start: str | None = None
+    end: str | None = None
+    each: _Each | None = None
+    holds: Rule | None = None
+    see: str = ""
+    paper: list[list[int]] = Field(default_factory=list, max_length=2)
+    told: str = ""
+    mixture: bool = False
+    needed: bool = False
+
+    @model_validator(mode="after")
+    def _check(self) -> "Claim":
+        if self.measure is not None and self.measure not in MEASURES:
+            raise ValueError(f"measure '{self.measure}' is none of {', '.join(MEASURES)}")
+        if (self.measure is None) != (self.holds is None) or (self.measure is None) != bool(self.see):
+            raise ValueError("either measure and holds, or see")
+        if any(len(pair) != 2 for pair in self.paper):
+            raise ValueError("paper: pairs of a count and its whole")
+        return self
+
+    def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
+        """The measure's arguments, by the group they are of (once, with an empty name, if there are none)."""
+        named = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
+        # `of` may be empty, which asks for all runs; the others are there or not
+        arguments = {name: text for name, text in named.items() if text is not None}
+        if self.each is None:
+            yield "", arguments
+            return
+        for value in self.each.values:
+            chosen = f'({self.of}) and {self.each.column} == "{value}"'
+            yield value, arguments | {"of": chosen}
+
+    def published(self) -> Found | None:
+        """The paper's counts as our measures see them."""
+        shares = [share(count, of) for count, of in self.paper]
+        if len(shares) == 2:
+            return of_difference(*shares)
+        return of_share(shares[0]) if shares else None
+
+
+class Observation(StrictModel):
+    """One observation, split into claims."""
+
+    title: str
+    claims: list[Claim] = Field(min_length=1)
+
+
+class Observations(StrictModel):
+    """The file of observations."""
+
+    source: str
+    observations: list[Observation] = Field(min_length=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """One query and what it found; `group` is empty where the claim has no groups."""
+
+    group: str
+    query: str
+    found: Found
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """A claim, what was found, and its verdict; `why` says what the rule alone does not."""
+
+    number: str  # 1.2: the second claim of the first observation
+    claim: Claim
+    answers: tuple[Answer, ...]
+    verdict: Verdict
+    paper: Verdict | None  # by the same rule on the published counts
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summed:
+    """An observation and its verdict."""
+
+    number: int
+    title: str
+    claims: tuple[Judged, ...]
+    verdict: Verdict
+
+
+def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[Summed, ...]:
+    """The observations of a file, put to a frame of results.
+
+    `lacks`: why these are not the paper's mixture of faults, if they are not. MutatorError with file and line
+    for a file or a query that is wrong.
+    """
+    model, source = read(path, Observations, SCHEMA)
+    made = []
+    for i, observation in enumerate(model.observations):
+        claims = tuple(
+            _judged(f"{i + 1}.{k + 1}", claim, runs, lacks, source, ("observations", i, "claims", k))
+            for k, claim in enumerate(observation.claims)
+        )
+        needed = [one.verdict for one in claims if one.claim.needed]
+        made.append(Summed(number=i + 1, title=observation.title, claims=claims, verdict=together(needed)))
+    return tuple(made)
+
+
+def together(verdicts: Sequence[Verdict]) -> Verdict:
+    """All must hold: one that does not is enough against, one that cannot be told leaves the rest open."""
+    for verdict in (Verdict.FAILS, Verdict.UNTOLD):
+        if verdict in verdicts:
+            return verdict
+    return Verdict.HOLDS if verdicts else Verdict.UNTOLD
+
+
+def _judged(
+    number: str,
+    claim: Claim,
+    runs: pd.DataFrame,
+    lacks: Sequence[str],
+    source: Source,
+    keys: tuple[str | int, ...],
+) -> Judged:
+    if claim.measure is None or claim.holds is None:
+        return Judged(
+            number=number, claim=claim, answers=(), verdict=Verdict.UNTOLD, paper=None, why=claim.see.strip()
+        )
+    answers = tuple(
+        _answer(group, claim.measure, claim.holds, arguments, runs, source, keys)
+        for group, arguments in claim.calls()
+    )
+    verdict, why = together([one.verdict for one in answers]), ""
+    if claim.mixture and lacks:
+        verdict, why = Verdict.UNTOLD, "; ".join(lacks)
+    published = claim.published()
+    return Judged(
+        number=number,
+        claim=claim,
+        answers=answers,
+        verdict=verdict,
+        paper=claim.holds.verdict(published) if published else None,
+        why=why,
+    )
+
+
+def _answer(
+    group: str,
+    measure: str,
+    rule: Rule,
+    arguments: dict[str, str],
+    runs: pd.DataFrame,
+    source: Source,
+    keys: tuple[str | int, ...],
+) -> Answer:
+    query = f"{measure}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"
+    call: Any = MEASURES[measure]
+    try:
+        found: Found = call(runs, **arguments)
+    except (NameError, SyntaxError, TypeError, ValueError, KeyError, AttributeError) as err:
+        raise source.error(
+            keys,
+            f"a query that cannot be answered: {err}",
+            expected=f"what {measure} takes, with columns of the results",
+            remedy="see mutator/paper/measures.py",
+        ) from err
+    return Answer(group=group, query=query, found=found, verdict=rule.verdict(found))

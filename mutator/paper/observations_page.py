@@ -1,0 +1,117 @@
+"""The observations as Markdown and as a table."""
+
+from collections.abc import Iterator, Sequence
+
+from mutator.paper.observations import FEWEST, Judged, Summed
+from mutator.report.page import markdown_table
+from mutator.statistics.sheet import Cell, Sheet
+
+RULES = f"""\
+A claim is decided by the 95 % interval of its number, not by the number. *above x*: it holds if the whole
+interval lies above x, and does not hold if it lies below; *below x* and *within x* (of plus and minus x)
+likewise; with fewer than {FEWEST} runs it cannot be told. *some x*: it holds once one run shows it; *never
+x*: it does not hold once one run shows it; if none does, the opposite is said only if the interval ends at
+x or below. Where a claim has groups it must hold in each. A claim about all faults cannot be told from a
+run that lacks fault types of the paper or is not complete. An observation holds if all claims that it rests
+on hold, does not hold if one of them does not, and cannot be told otherwise. The intervals take runs as
+independent, except where whole faults are resampled; they are the least uncertainty there is."""
+
+SESSION = """\
+from mutator.paper.measures import *
+from mutator.statistics.frame import load
+
+runs = load(Path("results.csv"))"""
+
+HEADS = ("claim", "", "the paper", "rule on its counts", "here", "rule", "verdict")
+
+
+def lines(observation: Summed) -> list[list[str]]:
+    """One line for each claim as it is read, and one for each group."""
+    made = []
+    for one in observation.claims:
+        rule = str(one.claim.holds or "")
+        first = [one.number, _says(one), published(one), str(one.paper or "-")]
+        if len(one.answers) == 1:
+            first += [one.answers[0].found.said, rule, _verdict(one)]
+        else:
+            first += ["" if one.answers else "-", rule, _verdict(one)]
+        made.append(first)
+        if len(one.answers) > 1:
+            made += [["", a.group, "", "", a.found.said, "", a.verdict.value] for a in one.answers]
+    return made
+
+
+def published(one: Judged) -> str:
+    """What the paper says, counts first."""
+    found = one.claim.published()
+    return "; ".join(text for text in (found.said if found else "", one.claim.told) if text) or "-"
+
+
+def session(ends: Sequence[tuple[str, float]]) -> str:
+    """The lines of Python after which the queries below them can be run."""
+    if not ends:
+        return SESSION
+    told = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
+    return f'{SESSION}\nruns["t_end"] = runs["scenario"].map({{{told}}})'
+
+
+def markdown(observations: Sequence[Summed], ends: Sequence[tuple[str, float]], coverage: str) -> str:
+    """All of it: verdicts, claims, rules, and the queries as they were evaluated."""
+    parts = ["# The paper's observations", coverage, verdicts(observations), rules()]
+    for one in observations:
+        parts += [f"## {heading(one)}", markdown_table(list(HEADS), lines(one))]
+    parts += ["## The queries", "In the run folder, in Python:", f"```python\n{session(ends)}\n```"]
+    for one in observations:
+        for claim in one.claims:
+            shown = "\n".join(answer.query for answer in claim.answers) or f"# {claim.why}"
+            parts += [f"**{claim.number}** {claim.claim.says}", f"```python\n{shown}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def verdicts(observations: Sequence[Summed]) -> str:
+    """The observations with their verdicts as a table."""
+    rows = [[str(one.number), one.title, one.verdict.value] for one in observations]
+    return markdown_table(["observation", "", "verdict"], rows)
+
+
+def heading(one: Summed) -> str:
+    return f"Observation {one.number}: {one.title} ({one.verdict.value})"
+
+
+def rules() -> str:
+    return RULES.replace("\n", " ") + " Claims that an observation rests on are marked with *."
+
+
+def sheet(observations: Sequence[Summed]) -> Sheet:
+    """One line for each query, its numbers in columns of their own."""
+    return Sheet(
+        name="observations",
+        title="The paper's observations",
+        note=rules(),
+        heads=(
+            *("observation", "claim", "needed", "says", "group", "paper", "paper's counts by the rule"),
+            *("N", "estimate", "low", "high", "rule", "verdict", "verdict of the claim", "query"),
+        ),
+        lines=tuple(_cells(observations)),
+    )
+
+
+def _cells(observations: Sequence[Summed]) -> Iterator[tuple[Cell, ...]]:
+    for observation in observations:
+        for one in observation.claims:
+            head = (observation.number, one.number, int(one.claim.needed), one.claim.says)
+            paper, by_rule, rule = published(one), str(one.paper or ""), str(one.claim.holds or "")
+            if not one.answers:
+                yield (*head, "", paper, by_rule, *[None] * 4, rule, "", one.verdict.value, "")
+            for a in one.answers:
+                numbers = (a.found.n, a.found.estimate, a.found.low, a.found.high)
+                verdict = (a.verdict.value, one.verdict.value, a.query)
+                yield (*head, a.group, paper, by_rule, *numbers, rule, *verdict)
+
+
+def _says(one: Judged) -> str:
+    return one.claim.says + (" *" if one.claim.needed else "")
+
+
+def _verdict(one: Judged) -> str:
+    return f"{one.verdict.value}: {one.why}" if one.why else one.verdict.value

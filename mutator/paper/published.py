@@ -1,0 +1,116 @@
+"""The published numbers, as cited in the fault library's `references/`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.statistics.tally import Tally
+
+FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paper:
+    """The published counts. `summary` by (method, scenario), `coverage` by (method, module/fault type), where
+    only injected, activated and hazards are known."""
+
+    summary: dict[tuple[str, str], Tally]
+    coverage: dict[tuple[str, str], Tally]
+    driver_reaction_s: float
+    least_alert_to_hazard_s: float  # mean of the scenario where it is least, and most
+    most_alert_to_hazard_s: float
+
+
+class _SummaryRow(StrictModel):
+    method: str
+    scenario: str
+    injected: int = Field(ge=0)
+    activated: int = Field(ge=0)
+    manifested: int = Field(ge=0)
+    hazards: int = Field(ge=0)
+    alerts: int = Field(ge=0)
+    hazards_no_alerts: int = Field(ge=0)
+    alerts_no_hazards: int = Field(ge=0)
+
+
+class _Summary(StrictModel):
+    source: str
+    rows: list[_SummaryRow]
+
+
+class _CoverageRow(StrictModel):
+    module: str
+    fault_type: str
+    injected: int = Field(ge=0)
+    guided_activated: int = Field(ge=0)
+    guided_hazards: int = Field(ge=0)
+    random_activated: int = Field(ge=0)
+    random_hazards: int = Field(ge=0)
+
+
+class _Coverage(StrictModel):
+    source: str
+    rows: list[_CoverageRow]
+
+
+class _Range(StrictModel):
+    least: float
+    most: float
+
+
+class _Times(StrictModel):
+    source: str
+    driver_reaction_s: float = Field(gt=0)
+    mean_alert_to_hazard_s: _Range
+
+
+def load_paper(references: Path) -> Paper:
+    """The cited numbers in a folder; MutatorError with file and line for counts that cannot be."""
+    summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
+    coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
+    times, _ = read(references / FILES[2], _Times, "paper_times/1")
+    by_scenario = {}
+    for i, row in enumerate(summary.rows):
+        tally = Tally(**row.model_dump(exclude={"method", "scenario"}))
+        _check(tally, summary_source, i)
+        by_scenario[row.method, row.scenario] = tally
+    by_kind = {}
+    for i, line in enumerate(coverage.rows):
+        kind = f"{line.module}/{line.fault_type}"
+        for method, activated, hazards in (
+            ("guided", line.guided_activated, line.guided_hazards),
+            ("random", line.random_activated, line.random_hazards),
+        ):
+            tally = Tally(injected=line.injected, activated=activated, hazards=hazards)
+            _check(tally, coverage_source, i)
+            by_kind[method, kind] = tally
+    return Paper(
+        summary=by_scenario,
+        coverage=by_kind,
+        driver_reaction_s=times.driver_reaction_s,
+        least_alert_to_hazard_s=times.mean_alert_to_hazard_s.least,
+        most_alert_to_hazard_s=times.mean_alert_to_hazard_s.most,
+    )
+
+
+def has_paper(references: Path) -> bool:
+    """Whether the folder cites published numbers."""
+    return all((references / name).is_file() for name in FILES)
+
+
+def _check(tally: Tally, source: Source, row: int) -> None:
+    """Part and whole fit, and hazards with and without alert are the same number counted from both sides."""
+    parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
+    fits = tally.activated <= tally.injected and max(parts) <= tally.activated
+    if tally.alerts is not None:
+        warned = tally.hazards - (tally.hazards_no_alerts or 0)
+        fits = fits and warned == tally.alerts - (tally.alerts_no_hazards or 0)
+    if not fits:
+        raise source.error(
+            ("rows", row),
+            f"counts that contradict each other: {tally}",
+            expected="parts no larger than their whole",
+            remedy="compare with the published table",
+        )

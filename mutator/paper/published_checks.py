@@ -1,0 +1,89 @@
+"""Do the published numbers that the library cites agree with themselves and with the library?"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from mutator.config.yaml_files import Source, load
+from mutator.errors import MutatorError
+from mutator.paper.published import FILES, Paper, load_paper
+from mutator.statistics.tally import Tally, total
+from mutator.workspace import Workspace
+
+_METHODS = ("guided", "random")
+_SUMS = ("injected", "activated", "hazards")  # what both tables count
+_REMEDY = "compare with the published table"
+
+
+def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
+    """Every problem of `references/paper_*.yaml`; none where nothing is cited.
+
+    Numbers that cannot be (`load_paper`), a row that stands twice, methods, scenarios and fault types that
+    the library does not have, and sums over scenarios that are not those over fault types.
+    """
+    references = workspace.library / "references"
+    if not any((references / name).is_file() for name in FILES):
+        return
+    try:
+        paper = load_paper(references)
+    except MutatorError as error:
+        yield error
+        return
+    summary, coverage = (load(references / name) for name in FILES[:2])
+    base = workspace.library / "faults"
+    kinds = {path.relative_to(base).with_suffix("").as_posix() for path in workspace.spec_files()}
+    problems = [
+        *_twice(summary, lambda row: f"{row['method']} in {row['scenario']}"),
+        *_unknown(summary, lambda row: row["method"], "method", set(_METHODS)),
+        *_unknown(summary, lambda row: row["scenario"], "scenario", set(workspace.scenario_names())),
+        *_twice(coverage, _kind),
+        *_unknown(coverage, _kind, "fault type", kinds),
+    ]
+    yield from problems or _sums(paper, coverage, summary.path)
+
+
+def _kind(row: dict[str, Any]) -> str:
+    return f"{row['module']}/{row['fault_type']}"
+
+
+def _twice(source: Source, name_of: Callable[[dict[str, Any]], str]) -> Iterator[MutatorError]:
+    seen: Counter[str] = Counter()
+    for i, row in enumerate(source.data["rows"]):
+        seen[name_of(row)] += 1
+        if seen[name_of(row)] == 2:
+            yield source.error(
+                ("rows", i), f"{name_of(row)} a second time", expected="it once", remedy=_REMEDY
+            )
+
+
+def _unknown(
+    source: Source, name_of: Callable[[dict[str, Any]], str], what: str, known: set[str]
+) -> Iterator[MutatorError]:
+    for i, row in enumerate(source.data["rows"]):
+        if name_of(row) not in known:
+            yield source.error(
+                ("rows", i),
+                f"{what} '{name_of(row)}'",
+                expected=f"one of {', '.join(sorted(known))}",
+                remedy="correct the name, or add what it names to the library",
+            )
+
+
+def _sums(paper: Paper, coverage: Source, summary: Path) -> Iterator[MutatorError]:
+    """Both tables count the same experiments, once by fault type and once by scenario."""
+
+    def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
+        return total(tally for (how, _), tally in counts.items() if how == method)
+
+    for method in _METHODS:
+        kinds, scenarios = of(paper.coverage, method), of(paper.summary, method)
+        for name in _SUMS:
+            got, expected = getattr(kinds, name), getattr(scenarios, name)
+            if got != expected:
+                yield coverage.error(
+                    ("rows",),
+                    f"{got} {method} {name} in all",
+                    expected=f"{expected}, the sum in {summary.name}",
+                    remedy=_REMEDY,
+                )

@@ -1,0 +1,225 @@
+"""What the report's page carries of every experiment: results as columns, fault, trigger, diff.
+
+Columns of words are dictionaries and codes, and a diff is its shape and what fills the holes of it, so that
+11,280 experiments take no more than a photograph or two.
+"""
+
+import base64
+import csv
+import json
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+from markupsafe import Markup
+
+from mutator._common.hashing import plain
+from mutator.errors import MutatorError
+from mutator.model import Anchor, Experiment, Fault
+from mutator.mutants.readable_diffs import readable
+from mutator.outcomes.columns import type_of
+from mutator.outcomes.rows import Row
+from mutator.report import series as report_series
+from mutator.review.groups import Shape, shapes
+from mutator.store import plan_file as planfile
+from mutator.store.run_folder import RunFolder
+from mutator.web import embedded
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
+
+SCHEMA = "report-table/1"
+DETAILS_SCHEMA = "report-details/1"
+STILLS_BYTES = 4_000_000  # of pictures in the page; more are links
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Browse:
+    """What the page's scripts get: `facts` as JSON, the rest in script elements; of how many experiments the
+    series are among them, and how large these are."""
+
+    facts: Markup
+    scripts: tuple[Markup, ...]
+    carried: int
+    carried_kb: int
+
+
+def browse(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "Workspace | None") -> Browse:
+    """Of a run folder and the rows of its results.csv; the page will be in the folder `out`."""
+    names = report_series.chosen(rows)
+    carried = {}
+    if workspace:
+        carried = report_series.carried(folder, workspace, names)
+        report_series.keep_traces(folder, workspace, but=names)
+    series = [Markup(embedded(data, f"series-{name}")) for name, data in carried.items()]
+    data = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
+    data["table"], data["details"] = tables_of(folder, rows)
+    facts = {"filmed": _is_filmed(folder, workspace), "series": report_series.kept(out)}
+    return Browse(
+        facts=Markup(json.dumps(facts)),
+        scripts=(*(Markup(embedded(value, name)) for name, value in data.items()), *series),
+        carried=len(series),
+        carried_kb=sum(map(len, series)) // 1000,
+    )
+
+
+def _is_filmed(folder: RunFolder, workspace: "Workspace | None") -> bool:
+    """Whether pictures can be made of the target's runs; true where the target is not to be found."""
+    try:
+        return workspace is None or workspace.manifest(folder.head["target"]).film is not None
+    except MutatorError:
+        return True
+
+
+def tables_of(folder: RunFolder, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The table and the details of a run folder with these rows in its results.csv."""
+    with (folder.path / "results.csv").open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
+    rows, lines = [rows[i] for i in order], [lines[i] for i in order]
+    experiments = {e.id: e for e in planfile.read_all(folder.path)}
+    planned = [experiments.get(row.experiment_id) for row in rows]
+    return table(rows, lines), details(planned, shapes(_patches(folder, rows)), rows)
+
+
+def reading_order(row: Row) -> tuple[str, ...]:
+    return (row.module, row.fault_type, row.scenario, row.method, row.trigger, row.experiment_id)
+
+
+def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, Any]:
+    """The results, a column each, and those that are filtered by: `kind`, `ending`, `hazards`, `t_hazard`."""
+    columns: dict[str, list[str]] = {
+        name: [line[name] for line in lines] for name in (lines[0] if lines else ())
+    }
+    columns["kind"] = [f"{r.module}/{r.fault_type}" for r in rows]
+    columns["ending"] = [r.ending for r in rows]
+    columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
+    columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
+    checked = sorted({name for r in rows for name in r.checked})
+    made = [{"name": name, **column(name, values)} for name, values in columns.items()]
+    return {"schema": SCHEMA, "count": len(rows), "checked": checked, "columns": made}
+
+
+def column(name: str, values: Sequence[str]) -> dict[str, Any]:
+    """Numbers as they are (None: empty), ids as texts, anything else as codes of its distinct values in their
+    order. A name is never taken for a number, whatever it looks like: a variant may be called `nan`."""
+    if type_of(name) != "text" and any(values):
+        try:
+            return {"numbers": [_number(text) for text in values]}
+        except ValueError:
+            pass
+    if name == "experiment_id":  # codes of what is different in each row would say nothing
+        return {"texts": list(values)}
+    words = sorted(set(values))
+    code = {word: i for i, word in enumerate(words)}
+    return {"words": words, "codes": [code[text] for text in values]}
+
+
+def _number(text: str) -> float | int | str | None:
+    """What JavaScript reads as the same number; an infinite one goes by its name there."""
+    if not text:
+        return None
+    value = float(text)
+    if math.isinf(value):
+        return "Infinity" if value > 0 else "-Infinity"
+    if math.isnan(value):
+        return "NaN"
+    return int(value) if value.is_integer() and abs(value) < 2**53 else value
+
+
+def details(
+    experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row]
+) -> dict[str, Any]:
+    """Of each row: code of its spec and of its trigger's setting (-1: not in the plan), shape of its diff
+    (-1: none). A shape's members come in the order of the rows; it has a list of values for each hole."""
+    specs, settings = _Codes(), _Codes()
+    faults = {e.fault.id: e.fault for e in experiments if e}
+    spec = {name: _spec(fault) for name, fault in faults.items()}
+    shape_of = {member: i for i, shape in enumerate(found) for member in shape.members}
+    return {
+        "schema": DETAILS_SCHEMA,
+        "spec": [specs.code(spec[e.fault.id]) if e else -1 for e in experiments],
+        "setting": [settings.code(_setting(e)) if e else -1 for e in experiments],
+        "shape": [shape_of.get(row.experiment_id, -1) for row in rows],
+        "specs": specs.known,
+        "settings": [json.loads(text) for text in settings.known],
+        "shapes": [
+            {"parts": s.parts, "places": s.places, "values": list(zip(*s.values, strict=True))} for s in found
+        ],
+    }
+
+
+class _Codes:
+    """Numbers for texts, in the order in which they are first seen."""
+
+    def __init__(self) -> None:
+        self._codes: dict[str, int] = {}
+
+    def code(self, text: str) -> int:
+        return self._codes.setdefault(text, len(self._codes))
+
+    @property
+    def known(self) -> list[str]:
+        return list(self._codes)
+
+
+def _spec(fault: Fault) -> str:
+    """The fault with its value drawn, in the words of a spec."""
+    told = {name: value for name, value in plain(fault).items() if value not in (None, [], "")}
+    told["injections"] = [
+        {
+            "at": {"file": i.location.path, "function": i.location.function, **_anchor(i.location.anchor)},
+            "model": i.model,
+            "params": dict(i.params),
+        }
+        for i in fault.injections
+    ]
+    return yaml.safe_dump(told, sort_keys=False, allow_unicode=True, width=100)
+
+
+def _anchor(anchor: Anchor) -> dict[str, Any]:
+    return {anchor.kind.value: anchor.name} | ({"nth": anchor.nth} if anchor.nth else {})
+
+
+def _setting(experiment: Experiment) -> str:
+    trigger = asdict(experiment.trigger)
+    hold = experiment.fault.hold or experiment.trigger.hold
+    told = {name: trigger[name] for name in ("hold_s", "armed_after_s")}
+    return json.dumps({"hold": hold.value, **told, "changes": experiment.changes})
+
+
+def _patches(folder: RunFolder, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
+    """(experiment, nothing more that a shape must have in common, its patch without the probe)."""
+    for row in rows:
+        try:
+            data = folder.patch(row.experiment_id).read_bytes()
+        except FileNotFoundError:  # never run, or no mutant
+            continue
+        yield row.experiment_id, "", readable(data.decode("utf-8", "replace"))[0]
+
+
+def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
+    """Pictures and films of experiments that are kept in plots/, by experiment.
+
+    Stills are put in as they are while `budget` bytes last, and are links from the folder `seen_from` then,
+    as films always are.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for path in sorted((folder.path / "plots").glob("*"), key=lambda p: (len(p.name), p.name)):
+        name, _, time = path.stem.partition("-")
+        link = Path(os.path.relpath(path, seen_from)).as_posix()
+        here = found.setdefault(name, {"stills": [], "films": []})
+        if path.suffix in (".mp4", ".gif"):
+            here["films"].append(link)
+        elif path.suffix in (".jpg", ".png") and time:
+            size = path.stat().st_size
+            if size <= budget:
+                budget -= size
+                kind = "jpeg" if path.suffix == ".jpg" else "png"
+                link = f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+            here["stills"].append([time.removesuffix("s"), link])
+    return {name: kept for name, kept in found.items() if kept["stills"] or kept["films"]}

@@ -1,0 +1,80 @@
+"""How the experiments of a run were run, and what their proof came to, as its report tells it."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mutator.engines.reference import How
+from mutator.errors import CheckFailed
+from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence as proof
+
+HEADS = ["how", "experiments"]
+LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
+_WORDS = {
+    How.FORK: "a fork of the golden run, taken right before the fault is first active",
+    How.GOLDEN: "no run: the trigger never holds, so what came of the golden run comes of it",
+    How.WARM: "a fork of the loaded program, from the run's beginning",
+    How.REFERENCE: "a fresh interpreter (reference engine)",
+    None: "no run: there is no mutant",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """A table of how many experiments were run how; what their proof came to, as a sentence and in few words;
+    `failed`: it found an experiment that is another one on the reference engine."""
+
+    heads: list[str]
+    lines: list[list[str]]
+    proof: str
+    state: str
+    failed: bool
+
+
+def told(folder: RunFolder) -> Told | None:
+    """What the timings and `proof/` of a run folder say; None when neither says anything of engines."""
+    ways = _ways(folder)
+    if not ways and not (folder.path / proof.FOLDER).is_dir():
+        return None
+    sentence, state, failed = _proof(folder)
+    return Told(heads=HEADS, lines=list(_lines(ways)), proof=sentence, state=state, failed=failed)
+
+
+def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
+    """How many experiments were run how, and why not as was asked; the newest line of each counts."""
+    newest: dict[str, tuple[str | None, str]] = {}
+    for path in sorted((folder.path / "timings").glob("*.jsonl")):
+        for line in read_lines(path, TIMINGS_SCHEMA):
+            if "engine" in line:  # not in runs of before there were several
+                newest[line["experiment_id"]] = (line["engine"], line["why"])
+    return Counter(newest.values())
+
+
+def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
+    for how, words in _WORDS.items():
+        reasons = {why: count for (name, why), count in ways.items() if name == how}
+        if count := reasons.pop("", 0):
+            yield [words, str(count)]
+        by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
+        for why, count in by_count[:LISTED]:
+            yield [f"{words}, as it cannot be forked: {why}", str(count)]
+        if rest := sum(count for _, count in by_count[LISTED:]):
+            yield [f"{words}, for other reasons, which are in timings/", str(rest)]
+
+
+def _proof(folder: RunFolder) -> tuple[str, str, bool]:
+    """What is said of the proof, the same in few words, and whether it failed."""
+    try:
+        found = proof.judge(folder, read_records(folder.path))
+    except CheckFailed as err:
+        said = f"The proof failed, so nothing here is to be trusted: {err.got}."
+        return said, f"FAILED: {err.got}", True
+    if found is None:
+        return "All were run on the reference engine, so there is nothing to prove.", "none needed", False
+    same = f"{found.same} of {found.sampled} same"
+    if not found.whole:
+        said = f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run."
+        return said, f"not finished: {same}", False
+    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.", same, False

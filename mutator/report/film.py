@@ -1,0 +1,98 @@
+"""An experiment to watch: its two runs driven again with a film, shown by the target's own command."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mutator._common.files import make_folder
+from mutator.errors import MutatorError
+from mutator.execution.single_run import rerun
+from mutator.figures.run_plot import marks_of
+from mutator.model import Record
+from mutator.targets.manifest import FILM, TargetManifest
+from mutator.workspace import Workspace
+
+EVENTS_SCHEMA = "film-events/1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shot:
+    """A file that is wanted: a still picture of time `t` (s), or a video. Its name says the format."""
+
+    out: Path
+    t: float | None = None
+
+
+def film_experiment(
+    workspace: Workspace,
+    manifest: TargetManifest,
+    run: Path,
+    experiment_id: str,
+    title: str,
+    shots: Sequence[Shot],
+) -> bool:
+    """Drive a planned experiment's golden and faulty run again and write `shots` of them.
+
+    Says whether the new record equals the campaign's (true if there is none yet). MutatorError for a target
+    that cannot be filmed, a faulty run that left no film, and with what the target's command complains of.
+    """
+    with TemporaryDirectory(prefix="film-", dir=run) as name:
+        folder = Path(name).resolve()
+        single, same = rerun(workspace, run, experiment_id, film=folder)
+        if not (single.faulty / FILM).is_dir():
+            raise MutatorError(
+                f"the faulty run left no film: {single.record.status.value}, {single.record.detail}",
+                remedy="choose an experiment that drives",
+            )
+        events = folder / "events.json"
+        events.write_text(json.dumps(_events(single.record, title, _hazards(workspace))), encoding="utf-8")
+        places = {
+            "{golden}": str(single.golden / FILM),
+            "{faulty}": str(single.faulty / FILM),
+            "{events}": str(events),
+        }
+        for shot in shots:
+            _show(manifest, places, shot)
+    return same
+
+
+def _hazards(workspace: Workspace) -> dict[str, str]:
+    """Each hazard in a few words: what its description says before the first bracket."""
+    about = workspace.hazards().hazards
+    return {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
+
+
+def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, object]:
+    activation = record.activation
+    return {
+        "schema": EVENTS_SCHEMA,
+        "title": title,
+        "outcome": record.outcome.value if record.outcome else record.status.value,
+        "active": [activation.first, activation.last] if activation else None,
+        "marks": [{"kind": mark.kind.value, "t": mark.t, "label": mark.label} for mark in marks_of(record)],
+        "names": names,
+    }
+
+
+def _show(manifest: TargetManifest, places: Mapping[str, str], shot: Shot) -> None:
+    """Have the target's command write one file."""
+    film = manifest.film
+    assert film is not None  # it has been taken
+    here = {**places, "{out}": str(shot.out.absolute()), "{t}": str(shot.t)}
+    make_folder(shot.out.absolute().parent)
+    arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
+    done = subprocess.run(
+        [sys.executable, "-P", "-s", "-m", film.module, *(here.get(a, a) for a in arguments)],
+        env=os.environ | {"PYTHONPATH": str(manifest.root), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        said = done.stderr.strip().splitlines() or ["it said nothing"]
+        raise MutatorError(said[-1].removeprefix("error: "), where=f"{film.module}")

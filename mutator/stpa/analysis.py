@@ -1,0 +1,259 @@
+"""The hazard analysis as data: control structure, unsafe control actions, causal factors.
+
+Each file is read with its own lines, so that whatever is wrong with it is told there. What one file says
+about another (a link, an action, a context) is checked on load; what the analysis says about fault specs and
+target is checked by `stpa_checks`.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import Field
+
+from mutator.config.problems import suggestion
+from mutator.config.yaml_files import Keys, Source, StrictModel, read
+from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
+from mutator.triggers.conditions import VARIABLES
+
+T = TypeVar("T")
+
+
+class Kind(StrEnum):
+    """What a component of the control structure is."""
+
+    HUMAN = "human"
+    CONTROLLER = "controller"
+    ESTIMATOR = "estimator"
+    ACTUATOR = "actuator"
+    SENSOR = "sensor"
+    PROCESS = "process"
+
+
+class Category(StrEnum):
+    """The four ways in which a control action can be unsafe (Leveson, Engineering a Safer World, 2011)."""
+
+    NOT_PROVIDED = "not_provided"
+    PROVIDED = "provided"
+    WRONG_TIMING = "wrong_timing"
+    WRONG_DURATION = "wrong_duration"
+
+
+class VariableModel(StrictModel):
+    """A variable of a controller's process model; `observed` names what a trigger may ask instead."""
+
+    about: str
+    observed: str | None
+
+
+class ComponentModel(StrictModel):
+    """A box of the control structure; `drawn` is row, column and width in columns; `modules` its sources."""
+
+    kind: Kind = Field(strict=False)
+    label: str
+    about: str
+    modules: list[str] = Field(default_factory=list)
+    process_model: dict[str, VariableModel] = Field(default_factory=dict)
+    drawn: list[int] = Field(min_length=3, max_length=3)
+
+
+class LinkModel(StrictModel):
+    """An arrow of the control structure; one that is not studied is drawn dashed."""
+
+    from_: str = Field(alias="from")
+    to: str
+    label: str
+    studied: bool = True
+
+
+class ActionModel(StrictModel):
+    """A control action: the link that carries it and the recorded channel that shows it."""
+
+    link: str
+    channel: str
+    about: str
+
+
+class StructureModel(StrictModel):
+    """The control structure."""
+
+    about: str
+    components: dict[str, ComponentModel]
+    control_actions: dict[str, ActionModel]
+    links: dict[str, LinkModel]
+
+
+class UnsafeActionModel(StrictModel):
+    """An unsafe control action; `contexts` are rows as `table/row`."""
+
+    action: str
+    category: Category = Field(strict=False)
+    about: str
+    hazards: list[str] = Field(min_length=1)
+    contexts: list[str] = Field(min_length=1)
+
+
+class UnsafeActionsModel(StrictModel):
+    """All unsafe control actions, and the context tables they come from."""
+
+    about: str
+    tables: list[str]
+    unsafe_control_actions: dict[str, UnsafeActionModel]
+
+
+class FactorModel(StrictModel):
+    """A causal factor: links or components, places in the target (`file::function`), faults or a reason."""
+
+    about: str
+    where: list[str] = Field(min_length=1)
+    at: list[str] = Field(default_factory=list)
+    leads_to: list[str] = Field(min_length=1)
+    faults: list[str] = Field(default_factory=list)
+    no_fault: str | None = None
+
+
+class FactorsModel(StrictModel):
+    """All causal factors."""
+
+    about: str
+    causal_factors: dict[str, FactorModel]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """The whole analysis, its names consistent; `*_source` point at the files."""
+
+    hazards: HazardList
+    structure: StructureModel
+    structure_source: Source
+    tables: Mapping[str, ContextTable]
+    unsafe: Mapping[str, UnsafeActionModel]
+    unsafe_source: Source
+    factors: Mapping[str, FactorModel]
+    factors_source: Source
+
+
+def load_analysis(folder: Path) -> Analysis:
+    """Read hazards, control structure, unsafe control actions, their tables and causal factors of `folder`.
+
+    MutatorError with file and line for the first dangling name, uncovered context or other mistake.
+    """
+    hazards = load_hazards(folder / "hazards.yaml")
+    structure, s_source = read(folder / "control_structure.yaml", StructureModel, "control_structure/1")
+    _check_structure(structure, s_source)
+    unsafe, u_source = read(
+        folder / "unsafe_control_actions.yaml", UnsafeActionsModel, "unsafe_control_actions/1"
+    )
+    tables = _tables(folder / "contexts", unsafe, u_source, structure)
+    _check_unsafe(unsafe, u_source, structure, hazards, tables)
+    factors, f_source = read(folder / "causal_factors.yaml", FactorsModel, "causal_factors/1")
+    _check_factors(factors, f_source, structure, unsafe)
+    return Analysis(
+        hazards=hazards,
+        structure=structure,
+        structure_source=s_source,
+        tables=tables,
+        unsafe=unsafe.unsafe_control_actions,
+        unsafe_source=u_source,
+        factors=factors.causal_factors,
+        factors_source=f_source,
+    )
+
+
+def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[str]) -> None:
+    """A MutatorError at `keys` unless `name` is known."""
+    if name not in known:
+        raise source.error(
+            keys,
+            f"{what} '{name}'",
+            expected=f"one of {', '.join(known) or 'none'}",
+            remedy="correct the name" + suggestion(name, list(known)),
+        )
+
+
+def _check_structure(structure: StructureModel, source: Source) -> None:
+    for name, component in structure.components.items():
+        for variable, model in component.process_model.items():
+            if model.observed is not None:
+                at = ("components", name, "process_model", variable, "observed")
+                _known(source, at, "variable", model.observed, VARIABLES)
+    _check_grid(structure, source)
+    for name, link in structure.links.items():
+        if name in structure.components:
+            raise source.error(("links", name), f"link '{name}'", expected="a name no component has")
+        _known(source, ("links", name, "from"), "component", link.from_, structure.components)
+        _known(source, ("links", name, "to"), "component", link.to, structure.components)
+    for name, action in structure.control_actions.items():
+        keys = ("control_actions", name, "link")
+        _known(source, keys, "link", action.link, structure.links)
+        if structure.components[structure.links[action.link].from_].kind is not Kind.CONTROLLER:
+            raise source.error(keys, f"link '{action.link}'", expected="a link that comes from a controller")
+
+
+def _check_grid(structure: StructureModel, source: Source) -> None:
+    """Every component has fields of its own in the drawing's grid."""
+    taken: dict[tuple[int, int], str] = {}
+    for name, component in structure.components.items():
+        row, column, width = component.drawn
+        fields = [(row, column + i) for i in range(width)]
+        other = next((taken[field] for field in fields if field in taken), None)
+        if other or not fields or min(row, column) < 0:
+            raise source.error(
+                ("components", name, "drawn"),
+                f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
+                expected="row and column from 0, a width from 1, and fields of its own",
+            )
+        taken.update(dict.fromkeys(fields, name))
+
+
+def _tables(
+    folder: Path, unsafe: UnsafeActionsModel, source: Source, structure: StructureModel
+) -> dict[str, ContextTable]:
+    """The tables the unsafe actions come from; each judges control actions of the structure alone."""
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    tables = {}
+    for i, name in enumerate(unsafe.tables):
+        _known(source, ("tables", i), "context table", name, known)
+        tables[name] = table = load_context_table(folder / f"{name}.yaml")
+        for row in table.rows:
+            for action in row.actions:
+                keys = ("contexts", row.id, "actions", action)
+                _known(table.source, keys, "control action", action, structure.control_actions)
+    return tables
+
+
+def _check_unsafe(
+    unsafe: UnsafeActionsModel,
+    source: Source,
+    structure: StructureModel,
+    hazards: HazardList,
+    tables: Mapping[str, ContextTable],
+) -> None:
+    rows = [f"{table.name}/{row.id}" for table in tables.values() for row in table.rows]
+    for name, action in unsafe.unsafe_control_actions.items():
+        keys: Keys = ("unsafe_control_actions", name)
+        _known(source, (*keys, "action"), "control action", action.action, structure.control_actions)
+        for i, hazard in enumerate(action.hazards):
+            _known(source, (*keys, "hazards", i), "hazard", hazard, hazards.hazards)
+        for i, context in enumerate(action.contexts):
+            _known(source, (*keys, "contexts", i), "context", context, rows)
+
+
+def _check_factors(
+    factors: FactorsModel, source: Source, structure: StructureModel, unsafe: UnsafeActionsModel
+) -> None:
+    places = (*structure.components, *structure.links)
+    for name, factor in factors.causal_factors.items():
+        keys: Keys = ("causal_factors", name)
+        for i, place in enumerate(factor.where):
+            _known(source, (*keys, "where", i), "link or component", place, places)
+        for i, action in enumerate(factor.leads_to):
+            known = unsafe.unsafe_control_actions
+            _known(source, (*keys, "leads_to", i), "unsafe control action", action, known)
+        if bool(factor.faults) == (factor.no_fault is not None):
+            got = "both faults and no_fault" if factor.faults else "neither faults nor no_fault"
+            raise source.error(
+                keys, f"{got} in '{name}'", expected="fault specs, or the reason why there are none"
+            )

@@ -1,0 +1,260 @@
+"""Is the hazard analysis complete and without contradiction, and does the fault library follow from it?"""
+
+import ast
+from collections.abc import Iterator
+
+from mutator.config.problems import suggestion
+from mutator.config.yaml_files import Keys
+from mutator.errors import MutatorError
+from mutator.faults.specs import FaultSpec
+from mutator.stpa.analysis import Analysis, Category, FactorModel, UnsafeActionModel
+from mutator.stpa.context_tables import ContextRow
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import VARIABLES
+
+Specs = dict[str, FaultSpec]
+
+
+def check_analysis(
+    analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
+) -> list[MutatorError]:
+    """Every gap and contradiction, in the order of the files; empty when all is well.
+
+    Hazards follow from unsafe actions, unsafe actions agree with the context tables and these with them, each
+    action is judged in all four categories, each unsafe action has a causal factor, each factor's faults are
+    where it says, aim at hazards it leads to, and each spec of the library stands for a factor.
+    """
+    by_name = {spec.name: spec for spec in specs}
+    return [
+        *_hazards(analysis),
+        *_unobserved(analysis, manifest),
+        *_unmodelled(analysis),
+        *_categories(analysis),
+        *_contradictions(analysis),
+        *_unjudged(analysis),
+        *_causeless(analysis),
+        *_places(analysis, manifest),
+        *_faults(analysis, by_name),
+        *_unreached(analysis, specs),
+    ]
+
+
+def _hazards(analysis: Analysis) -> Iterator[MutatorError]:
+    reached = {hazard for action in analysis.unsafe.values() for hazard in action.hazards}
+    source = analysis.hazards.source
+    for hazard in analysis.hazards.hazards:
+        if hazard not in reached:
+            yield source.error(
+                ("hazards", hazard),
+                f"hazard '{hazard}' follows from no unsafe control action",
+                remedy=f"name it in {analysis.unsafe_source.path.name}, or leave it out",
+            )
+    led_to = {accident for names in analysis.hazards.leads_to.values() for accident in names}
+    for accident in analysis.hazards.accidents:
+        if accident not in led_to:
+            yield source.error(("accidents", accident), f"accident '{accident}' follows from no hazard")
+
+
+def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
+    channels = [channel.name for channel in manifest.compared]
+    for name, action in analysis.structure.control_actions.items():
+        if action.channel not in channels:
+            yield analysis.structure_source.error(
+                ("control_actions", name, "channel"),
+                f"channel '{action.channel}'",
+                expected=f"one that the target compares: {', '.join(channels)}",
+            )
+
+
+def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
+    """Contexts that ask for a variable which no controller has in its process model."""
+    models = [component.process_model for component in analysis.structure.components.values()]
+    observed = {variable.observed for model in models for variable in model.values()}
+    for table in analysis.tables.values():
+        for row in table.rows:
+            names = {node.id for node in ast.walk(ast.parse(row.condition)) if isinstance(node, ast.Name)}
+            for name in sorted(names & set(VARIABLES) - observed):
+                yield table.source.error(
+                    ("contexts", row.id, "when"),
+                    f"context '{row.id}' asks for '{name}', which no process model has",
+                    remedy=f"add it to a component of {analysis.structure_source.path.name}",
+                )
+
+
+def _categories(analysis: Analysis) -> Iterator[MutatorError]:
+    for name in analysis.structure.control_actions:
+        judged = {action.category for action in analysis.unsafe.values() if action.action == name}
+        for category in Category:
+            if category not in judged:
+                yield analysis.structure_source.error(
+                    ("control_actions", name),
+                    f"no unsafe control action for '{name}' {category}",
+                    expected="one in each of the four categories",
+                    remedy=f"add it to {analysis.unsafe_source.path.name}",
+                )
+
+
+def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
+    """Unsafe actions that the context tables do not call hazardous."""
+    for name, action in analysis.unsafe.items():
+        for i, context in enumerate(action.contexts):
+            row = _row(analysis, context)
+            for hazard in action.hazards:
+                if hazard not in _judged(row, action):
+                    table = analysis.tables[context.partition("/")[0]]
+                    yield analysis.unsafe_source.error(
+                        ("unsafe_control_actions", name, "contexts", i),
+                        f"{name} ({action.action} {action.category}) leads to {hazard} in {context}",
+                        expected=f"what {table.path.name} says there: "
+                        f"{', '.join(sorted(_judged(row, action))) or 'no hazard'}",
+                        remedy="correct one of the two",
+                    )
+
+
+def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
+    """Hazardous cells of the context tables that are no unsafe action."""
+    known = {
+        (context, action.action, action.category, hazard)
+        for action in analysis.unsafe.values()
+        for context in action.contexts
+        for hazard in action.hazards
+    }
+    for table in analysis.tables.values():
+        for row in table.rows:
+            for action, verdicts in row.actions.items():
+                for category in (Category.PROVIDED, Category.NOT_PROVIDED):
+                    hazard = getattr(verdicts, category.value)
+                    if hazard and (f"{table.name}/{row.id}", action, category, hazard) not in known:
+                        yield table.source.error(
+                            ("contexts", row.id, "actions", action, category.value),
+                            f"{hazard} from {action} {category} in '{row.id}' is no unsafe control action",
+                            remedy=f"add it to {analysis.unsafe_source.path.name}, or write null",
+                        )
+
+
+def _row(analysis: Analysis, context: str) -> ContextRow:
+    table, _, row = context.partition("/")
+    return next(r for r in analysis.tables[table].rows if r.id == row)
+
+
+def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
+    """The hazards the row knows for an action of that category: wrong timing and duration end as either."""
+    verdicts = row.actions.get(action.action)
+    if verdicts is None:
+        return set()
+    cells = {Category.PROVIDED: (verdicts.provided,), Category.NOT_PROVIDED: (verdicts.not_provided,)}
+    return {
+        hazard
+        for hazard in cells.get(action.category, (verdicts.provided, verdicts.not_provided))
+        if hazard is not None
+    }
+
+
+def _causeless(analysis: Analysis) -> Iterator[MutatorError]:
+    caused = {action for factor in analysis.factors.values() for action in factor.leads_to}
+    for name in analysis.unsafe:
+        if name not in caused:
+            yield analysis.unsafe_source.error(
+                ("unsafe_control_actions", name),
+                f"no causal factor leads to {name}",
+                remedy=f"add one to {analysis.factors_source.path.name}",
+            )
+
+
+def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
+    """Modules of components and places of factors that the target does not have."""
+    files = manifest.tree.files
+    for name, component in analysis.structure.components.items():
+        for i, path in enumerate(component.modules):
+            if path not in files:
+                yield analysis.structure_source.error(
+                    ("components", name, "modules", i),
+                    f"no file '{path}' in target {manifest.name}",
+                    remedy="correct the path" + suggestion(path, list(files)),
+                )
+    for name, factor in analysis.factors.items():
+        for i, place in enumerate(factor.at):
+            path, _, function = place.partition("::")
+            known = sorted(functions(files[path])) if path in files and path.endswith(".py") else []
+            if function not in known:
+                yield analysis.factors_source.error(
+                    ("causal_factors", name, "at", i),
+                    f"no place '{place}' in target {manifest.name}",
+                    expected="file::Class.function",
+                    remedy="correct it" + suggestion(function, known),
+                )
+
+
+def functions(code: bytes) -> Iterator[str]:
+    """Qualified names of a module's functions and of its classes' methods."""
+    for node in ast.parse(code).body:
+        if isinstance(node, ast.FunctionDef):
+            yield node.name
+        elif isinstance(node, ast.ClassDef):
+            yield from (f"{node.name}.{item.name}" for item in node.body if isinstance(item, ast.FunctionDef))
+
+
+def _faults(analysis: Analysis, specs: Specs) -> Iterator[MutatorError]:
+    for name, factor in analysis.factors.items():
+        keys: Keys = ("causal_factors", name)
+        known = True
+        for i, fault in enumerate(factor.faults):
+            if fault not in specs:
+                known = False
+                yield analysis.factors_source.error(
+                    (*keys, "faults", i),
+                    f"fault spec '{fault}'",
+                    expected="a spec of the library",
+                    remedy="correct the name" + suggestion(fault, list(specs)),
+                )
+        if known and factor.faults:
+            yield from _misplaced(analysis, keys, factor, specs)
+            yield from _misdirected(analysis, keys, factor, specs)
+
+
+def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
+    """A factor's faults are where it says they are, no more and no less."""
+    actual = {place for fault in factor.faults for place in injected(specs[fault])}
+    if actual != set(factor.at):
+        yield analysis.factors_source.error(
+            (*keys, "at"),
+            f"{keys[1]} at {', '.join(factor.at) or 'no place'}",
+            expected=f"where its faults are injected: {', '.join(sorted(actual))}",
+            remedy="correct the places or the faults",
+        )
+
+
+def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
+    """Every fault aims at a hazard that the factor leads to."""
+    hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
+    for i, fault in enumerate(factor.faults):
+        for variant in specs[fault]:
+            if variant.aim not in hazards:
+                yield analysis.factors_source.error(
+                    (*keys, "faults", i),
+                    f"{fault}/{variant.name} aims at {variant.aim}",
+                    expected=f"a hazard that {keys[1]} leads to: {', '.join(sorted(hazards))}",
+                    remedy="correct `leads_to` or the spec's `aim`",
+                )
+
+
+def injected(spec: FaultSpec) -> set[str]:
+    """Where a spec injects, in any reading: `file::function`."""
+    return {
+        f"{injection.location.path}::{injection.location.function}"
+        for variant in spec
+        for injections in variant.readings.values()
+        for injection in injections
+    }
+
+
+def _unreached(analysis: Analysis, specs: tuple[FaultSpec, ...]) -> Iterator[MutatorError]:
+    reached = {fault for factor in analysis.factors.values() for fault in factor.faults}
+    path = analysis.factors_source.path
+    for spec in specs:
+        if spec.name not in reached:
+            yield spec.source.error(
+                (),
+                f"fault spec '{spec.name}' stands for no causal factor",
+                remedy=f"name it in {path.parent.name}/{path.name}",
+            )

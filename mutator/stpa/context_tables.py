@@ -1,0 +1,212 @@
+"""STPA as data: hazards and context tables, from which the guided triggers come."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.errors import MutatorError
+from mutator.model import Hold, Trigger
+from mutator.stpa.coverage import Coverage, coverage
+from mutator.triggers.conditions import VARIABLES, check_condition
+
+CONTEXT_SCHEMA = "context_table/1"
+HAZARDS_SCHEMA = "hazards/1"
+_CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdicts:
+    """For one control action in one context: the hazard if it is given, and if it is not (None: none)."""
+
+    provided: str | None
+    not_provided: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContextRow:
+    """A context: its id (`C1`), its condition over observed variables with the constants put in, and for
+    each control action whether giving it or not giving it is hazardous."""
+
+    id: str
+    condition: str
+    about: str
+    actions: Mapping[str, Verdicts]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContextTable:
+    """A context table of the hazard analysis. Its rows cover everything exactly once, as `coverage` says."""
+
+    name: str
+    about: str
+    path: Path
+    constants: Mapping[str, float]
+    rows: tuple[ContextRow, ...]
+    coverage: Coverage
+    source: Source
+
+    def triggers(
+        self,
+        *,
+        hold_s: float | None = None,
+        armed_after_s: float = 0.0,
+        rows: tuple[str, ...] | None = None,
+    ) -> tuple[Trigger, ...]:
+        """One trigger per row (or row named in `rows`), named as the row: it holds while its condition does,
+        or for `hold_s` from then on. MutatorError for an unknown row."""
+        by_id = {row.id: row for row in self.rows}
+        unknown = [name for name in rows or () if name not in by_id]
+        if unknown:
+            raise MutatorError(
+                f"context '{unknown[0]}'", where=self.path, expected=f"one of {', '.join(by_id)}"
+            )
+        return tuple(
+            Trigger(
+                name=name,
+                condition=by_id[name].condition,
+                hold=Hold.WHILE if hold_s is None else Hold.FOR,
+                hold_s=hold_s,
+                armed_after_s=armed_after_s,
+            )
+            for name in (by_id if rows is None else rows)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class HazardList:
+    """Accidents and hazards: id -> description; hazards also name the accidents they may lead to."""
+
+    source: Source
+    accidents: Mapping[str, str]
+    hazards: Mapping[str, str]
+    leads_to: Mapping[str, tuple[str, ...]]
+
+
+class _VerdictsModel(StrictModel):
+    provided: str | None
+    not_provided: str | None
+
+
+class _RowModel(StrictModel):
+    when: str
+    about: str
+    actions: dict[str, _VerdictsModel]
+
+
+class TableModel(StrictModel):
+    """The file of a context table, but for its key `schema`."""
+
+    name: str
+    about: str = ""
+    constants: dict[str, float]
+    contexts: dict[str, _RowModel]
+
+
+class _HazardModel(StrictModel):
+    about: str
+    leads_to: list[str]
+
+
+class HazardsModel(StrictModel):
+    """The file of accidents and hazards, but for its key `schema`."""
+
+    accidents: dict[str, str]
+    hazards: dict[str, _HazardModel]
+
+
+def load_context_table(path: Path) -> ContextTable:
+    """Read a context table; every condition is checked as a trigger condition.
+
+    MutatorError also for contexts that leave something uncovered or overlap, where that can be proved, and
+    for rows that do not judge the same control actions.
+    """
+    model, source = read(path, TableModel, CONTEXT_SCHEMA)
+    for name in model.constants:
+        if not _CONSTANT.match(name) or name in VARIABLES:
+            raise source.error(
+                ("constants", name), f"constant '{name}'", expected="a name of its own in small letters"
+            )
+    rows = tuple(
+        ContextRow(
+            id=name,
+            condition=_condition(row.when, model.constants, source, name),
+            about=row.about,
+            actions={
+                action: Verdicts(provided=v.provided, not_provided=v.not_provided)
+                for action, v in row.actions.items()
+            },
+        )
+        for name, row in model.contexts.items()
+    )
+    _check_actions(rows, source)
+    return ContextTable(
+        name=model.name,
+        about=model.about,
+        path=path,
+        constants=dict(model.constants),
+        rows=rows,
+        coverage=_covered_once(rows, source),
+        source=source,
+    )
+
+
+def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:
+    for row in rows[1:]:
+        if row.actions.keys() != rows[0].actions.keys():
+            raise source.error(
+                ("contexts", row.id, "actions"),
+                f"the actions {', '.join(row.actions) or 'none'} in context '{row.id}'",
+                expected=f"those of '{rows[0].id}': {', '.join(rows[0].actions) or 'none'}",
+                remedy="judge every control action in every context",
+            )
+
+
+def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
+    found = coverage({row.id: row.condition for row in rows})
+    if found.place is None:
+        return found
+    if not found.rows:
+        raise source.error(
+            ("contexts",),
+            f"no context holds at {found.place}",
+            expected="contexts that cover everything exactly once",
+            remedy="add a context or widen one",
+        )
+    first, second = found.rows[:2]
+    raise source.error(
+        ("contexts", second, "when"),
+        f"context '{second}' overlaps '{first}' at {found.place}",
+        expected="contexts that cover everything exactly once",
+        remedy="narrow one of the two",
+    )
+
+
+def _condition(text: str, constants: Mapping[str, float], source: Source, row: str) -> str:
+    try:
+        return check_condition(text, constants)
+    except MutatorError as error:
+        raise source.error(
+            ("contexts", row, "when"), error.got, expected=error.expected, remedy=error.remedy
+        ) from None
+
+
+def load_hazards(path: Path) -> HazardList:
+    """Read the accidents and hazards; a hazard that leads to an unknown accident is an error."""
+    model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
+    for name, hazard in model.hazards.items():
+        for i, accident in enumerate(hazard.leads_to):
+            if accident not in model.accidents:
+                raise source.error(
+                    ("hazards", name, "leads_to", i),
+                    f"accident '{accident}'",
+                    expected=f"one of {', '.join(model.accidents)}",
+                    remedy="correct it or describe the accident",
+                )
+    return HazardList(
+        source=source,
+        accidents=dict(model.accidents),
+        hazards={name: hazard.about for name, hazard in model.hazards.items()},
+        leads_to={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},
+    )

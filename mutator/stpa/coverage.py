@@ -1,0 +1,102 @@
+"""Do the conditions of a context table cover everything exactly once? Proved by cells, not sampled.
+
+Where every condition compares one observed variable with a constant, the constants cut each variable's line
+into points and open intervals, and no condition can tell two places of one cell apart. So it is enough to
+test one place of every cell, borders and the outermost cells (which reach to infinity) included. Variables
+are taken as independent of each other, though hwt and rs are made from others: a table that passes is right,
+one that is only right because of that dependence does not pass.
+"""
+
+import ast
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+from mutator.triggers.conditions import VARIABLES, evaluate
+
+MAX_CELLS = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """A piece of a variable's line: `value` lies in it, `text` says it (`hwt > 2.0`)."""
+
+    value: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coverage:
+    """What was found: how many cells were tested, and a first place that is covered not exactly once.
+
+    `beyond` says why nothing could be proved, if so; `rows` are the contexts that hold at `place`.
+    """
+
+    cells: int = 0
+    beyond: str | None = None
+    place: str | None = None
+    rows: tuple[str, ...] = ()
+
+
+class _BeyondError(Exception):
+    """A comparison that is not of one variable with a constant."""
+
+
+def coverage(conditions: Mapping[str, str]) -> Coverage:
+    """Test the checked conditions of a table, row id -> condition, in every cell."""
+    try:
+        cuts = _cuts(conditions.values())
+    except _BeyondError as error:
+        return Coverage(beyond=f"{error} is no comparison of one variable with a constant")
+    lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
+    total = math.prod(len(line) for line in lines)
+    if total > MAX_CELLS:
+        return Coverage(beyond=f"its constants cut out {total} cells, more than {MAX_CELLS}")
+    for place in product(*lines):
+        values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
+        rows = tuple(row for row, condition in conditions.items() if evaluate(condition, values))
+        if len(rows) != 1:
+            text = " and ".join(cell.text for cell in place) or "any observation"
+            return Coverage(cells=total, place=text, rows=rows)
+    return Coverage(cells=total)
+
+
+def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
+    """The constants each variable is compared with, variables in the order of VARIABLES."""
+    found: dict[str, set[float]] = {}
+    for condition in conditions:
+        for node in ast.walk(ast.parse(condition, mode="eval")):
+            if isinstance(node, ast.Compare):
+                for left, right in pairwise((node.left, *node.comparators)):
+                    name, value = _cut(left, right)
+                    found.setdefault(name, set()).add(value)
+    return {name: found[name] for name in VARIABLES if name in found}
+
+
+def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
+    for variable, constant in ((left, right), (right, left)):
+        value = _constant(constant)
+        if isinstance(variable, ast.Name) and value is not None:
+            return variable.id, value
+    raise _BeyondError(f"'{ast.unparse(left)}' with '{ast.unparse(right)}'")
+
+
+def _constant(node: ast.expr) -> float | None:
+    """The number a sign and a numeral make; None for anything else."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        value = _constant(node.operand)
+        return None if value is None else -value
+    return float(node.value) if isinstance(node, ast.Constant) and isinstance(node.value, float) else None
+
+
+def _cells(name: str, cuts: list[float]) -> list[Cell]:
+    """The cells of one variable's line, from minus to plus infinity."""
+    cells = [Cell(value=-math.inf, text=f"{name} < {cuts[0]}")]
+    for low, high in pairwise(cuts):
+        cells.append(Cell(value=low, text=f"{name} = {low}"))
+        middle = low + (high - low) / 2.0
+        if low < middle < high:  # else no number lies between the two
+            cells.append(Cell(value=middle, text=f"{low} < {name} < {high}"))
+    cells.append(Cell(value=cuts[-1], text=f"{name} = {cuts[-1]}"))
+    return [*cells, Cell(value=math.inf, text=f"{name} > {cuts[-1]}")]

@@ -1,0 +1,237 @@
+"""Where the boxes and arrows of a control structure go: rows of boxes, channels with one track an arrow.
+
+All lengths are in px, y points down. Boxes stand in the grid that the file gives. Arrows leave and enter a
+box at ports on its edges; one that cannot go straight up or down gets a track of its own in a channel between
+two rows, so that no two run on top of each other. One that would have to go through a box takes the left
+margin.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from mutator.stpa.analysis import ComponentModel, LinkModel, StructureModel
+
+PITCH = 190  # from column to column
+GAP = 66  # between boxes side by side
+MARGIN = 110  # left of the first column, for arrows that go past the rows
+EDGE = 20
+BOX_HEIGHT = 46
+LINE = 17  # one more line of text in a box
+TRACK = 30
+CHANNEL = 64  # a channel without any track
+LABEL = 110  # about the length of a label
+APART = 24  # between arrows that run side by side
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box:
+    """A drawn component: left, top, width, height, and the lines of text in it."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    row: int
+    lines: tuple[str, ...]
+
+    @property
+    def bottom(self) -> float:
+        return self.y + self.height
+
+    def holds(self, x: float) -> bool:
+        """Whether an arrow at `x` would meet the box well inside its edges."""
+        return self.x + 8 <= x <= self.x + self.width - 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrow:
+    """A drawn link: its corners from tail to tip, and where its label stands (`anchor` as in SVG)."""
+
+    points: tuple[Point, ...]
+    label: Point
+    anchor: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """The whole drawing."""
+
+    boxes: dict[str, Box]
+    arrows: dict[str, Arrow]
+    width: float
+    height: float
+
+
+def lay_out(structure: StructureModel) -> Layout:
+    """Place every component and link."""
+    boxes = _boxes(structure)
+    ports = _ports(structure.links, boxes)
+    arrows = {}
+    used: dict[int, int] = defaultdict(int)
+    for name, link in structure.links.items():
+        tail, tip = boxes[link.from_], boxes[link.to]
+        if tail.row == tip.row:
+            arrows[name] = _sideways(tail, tip)
+        elif _blocked(ports[name], tail, tip, boxes.values()):
+            arrows[name] = _around(tail, tip)
+        elif ports[name][0] == ports[name][1]:
+            tips = [ports[other][1] for other, mate in structure.links.items() if mate.to == link.to]
+            arrows[name] = _straight(ports[name][0], tail, tip, tips)
+        else:
+            row = min(tail.row, tip.row)
+            used[row] += 1
+            top = max(box.bottom for box in boxes.values() if box.row == row)
+            arrows[name] = _elbow(ports[name], tail, tip, top + used[row] * TRACK)
+    return Layout(
+        boxes=boxes,
+        arrows=arrows,
+        width=max(box.x + box.width for box in boxes.values()) + EDGE,
+        height=max(box.bottom for box in boxes.values()) + EDGE,
+    )
+
+
+def _boxes(structure: StructureModel) -> dict[str, Box]:
+    components = structure.components
+    heights: dict[int, float] = defaultdict(float)
+    for component in components.values():
+        height = BOX_HEIGHT + LINE * (len(_lines(component)) - 1)
+        heights[component.drawn[0]] = max(heights[component.drawn[0]], height)
+    tops, y = {}, float(EDGE)
+    for row in sorted(heights):
+        tops[row] = y
+        y += heights[row] + CHANNEL + TRACK * _tracks(structure, row)
+    columns = max(component.drawn[1] + component.drawn[2] for component in components.values())
+    boxes = {}
+    for name, component in components.items():
+        row, column, width = component.drawn
+        all_along = MARGIN if width == columns else 0
+        boxes[name] = Box(
+            x=EDGE + MARGIN + column * PITCH - all_along,
+            y=tops[row],
+            width=width * PITCH - GAP + all_along,
+            height=heights[row],
+            row=row,
+            lines=_lines(component),
+        )
+    return boxes
+
+
+def _tracks(structure: StructureModel, row: int) -> int:
+    """How many arrows need a track below `row`: their ends have no column in common."""
+    count = 0
+    for link in structure.links.values():
+        (row1, first1, width1), (row2, first2, width2) = (
+            structure.components[name].drawn for name in (link.from_, link.to)
+        )
+        common = first1 < first2 + width2 and first2 < first1 + width1
+        count += row1 != row2 and min(row1, row2) == row and not common
+    return count
+
+
+def _lines(component: ComponentModel) -> tuple[str, ...]:
+    names = [name.replace("_", " ") for name in component.process_model]
+    pairs = [", ".join(names[i : i + 2]) for i in range(0, len(names), 2)]
+    return (component.label, *pairs)
+
+
+def _ports(links: dict[str, LinkModel], boxes: dict[str, Box]) -> dict[str, tuple[float, float]]:
+    """x of each link's tail and tip: one above the other where that can be, else apart from all others."""
+    ports = dict.fromkeys(links, (0.0, 0.0))
+    edges: dict[tuple[str, bool], list[str]] = defaultdict(list)  # (box, lower edge?) -> its links
+    for name, link in links.items():
+        down = boxes[link.from_].row < boxes[link.to].row
+        if boxes[link.from_].row != boxes[link.to].row:
+            edges[link.from_, down].append(name)
+            edges[link.to, not down].append(name)
+    taken: dict[int, list[float]] = defaultdict(list)  # channel -> x of arrows in it
+    bent = []
+    for name, link in links.items():
+        if boxes[link.from_].row == boxes[link.to].row:
+            continue
+        tail, tip = (_spread(own, name, edges, links, boxes) for own in (link.from_, link.to))
+        narrow = tail if boxes[link.from_].width <= boxes[link.to].width else tip
+        if boxes[link.from_].holds(narrow) and boxes[link.to].holds(narrow):
+            ports[name] = (narrow, narrow)
+            taken[min(boxes[link.from_].row, boxes[link.to].row)].append(narrow)
+        else:
+            bent.append((name, tail, tip))
+    for name, tail, tip in bent:
+        others = taken[min(boxes[links[name].from_].row, boxes[links[name].to].row)]
+        ports[name] = (
+            _apart(tail, tip, boxes[links[name].from_], others),
+            _apart(tip, tail, boxes[links[name].to], others),
+        )
+    return ports
+
+
+def _spread(
+    own: str,
+    name: str,
+    edges: dict[tuple[str, bool], list[str]],
+    links: dict[str, LinkModel],
+    boxes: dict[str, Box],
+) -> float:
+    """x of a link at the box `own`: the links of an edge evenly, in the order of what they lead to."""
+    other = links[name].to if links[name].from_ == own else links[name].from_
+    mates = edges[own, boxes[own].row < boxes[other].row]
+    mates = sorted(mates, key=lambda mate: _middle(boxes, links[mate], own))
+    return boxes[own].x + boxes[own].width * (mates.index(name) + 1) / (len(mates) + 1)
+
+
+def _apart(x: float, toward: float, box: Box, others: list[float]) -> float:
+    """The place next to `x` on the box's edge that keeps its distance from `others`; it is noted there.
+
+    It is sought on the side of the other end, `toward`, first, which saves a crossing.
+    """
+    side = 1.0 if toward > x else -1.0
+    edge = range(int(box.x) + 10, int(box.x + box.width) - 9)
+    places = sorted(edge, key=lambda place: ((place - x) * side < -1.0, abs(place - x)))
+    free = (p for p in places if all(abs(p - other) >= APART for other in others))
+    others.append(next(free, x))
+    return others[-1]
+
+
+def _middle(boxes: dict[str, Box], link: LinkModel, own: str) -> float:
+    other = boxes[link.to if link.from_ == own else link.from_]
+    return other.x + other.width / 2.0
+
+
+def _blocked(ports: tuple[float, float], tail: Box, tip: Box, boxes: Iterable[Box]) -> bool:
+    """Whether a box of the rows between stands where the long vertical part of the arrow would be."""
+    upper, lower = sorted((tail.row, tip.row))
+    x = ports[0] if tail.row > tip.row else ports[1]
+    return any(upper < box.row < lower and box.x - 8 <= x <= box.x + box.width + 8 for box in boxes)
+
+
+def _ends(tail: Box, tip: Box) -> tuple[float, float]:
+    return (tail.bottom, tip.y) if tail.row < tip.row else (tail.y, tip.bottom)
+
+
+def _straight(x: float, tail: Box, tip: Box, tips: list[float]) -> Arrow:
+    """An arrow up or down, its label near the tip, where fewest others cross, and away from other `tips`."""
+    y1, y2 = _ends(tail, tip)
+    left = any(0.0 < other - x < LABEL for other in tips)
+    label = (x - 6 if left else x + 6, y2 + (26 if y2 < y1 else -16))
+    return Arrow(points=((x, y1), (x, y2)), label=label, anchor="end" if left else "start")
+
+
+def _elbow(ports: tuple[float, float], tail: Box, tip: Box, y: float) -> Arrow:
+    (x1, x2), (y1, y2) = ports, _ends(tail, tip)
+    return Arrow(
+        points=((x1, y1), (x1, y), (x2, y), (x2, y2)), label=((x1 + x2) / 2.0, y - 5), anchor="middle"
+    )
+
+
+def _sideways(tail: Box, tip: Box) -> Arrow:
+    y = tail.y + tail.height / 2.0
+    x1, x2 = (tail.x + tail.width, tip.x) if tail.x < tip.x else (tail.x, tip.x + tip.width)
+    return Arrow(points=((x1, y), (x2, y)), label=((x1 + x2) / 2.0, y - 6), anchor="middle")
+
+
+def _around(tail: Box, tip: Box) -> Arrow:
+    x, y = EDGE + MARGIN / 2.0, tail.y + tail.height / 2.0
+    end = tip.y if tail.row < tip.row else tip.bottom
+    return Arrow(points=((tail.x, y), (x, y), (x, end)), label=(x + 6, y - 6), anchor="start")

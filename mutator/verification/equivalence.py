@@ -1,0 +1,127 @@
+"""The proof of a campaign's engine: a sample of its experiments, run again on the reference engine.
+
+Every record of the sample must be the same, trace digest included; one that is not fails the campaign. The
+proof's runs are independent: they take nothing from what other runs left behind (`entry.independent` of the
+manifest), so that whatever runs share is proved with the engine. What they found is kept in `proof/` of the
+run folder, as records.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator._common.hashing import digest
+from mutator.campaigns.sampling import pick
+from mutator.errors import CheckFailed
+from mutator.model import Experiment, Record, Status
+from mutator.store import plan_file as planfile
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
+
+FOLDER = "proof"
+_LEAST = 20
+_SHARE = 100  # one experiment in so many
+_PIECE = 5  # experiments of one piece of work
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A piece of the sample that is still to be run: its number, and its experiments' ids."""
+
+    number: int
+    ids: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proof:
+    """How far the proof of a run is: experiments in the sample, how many of them came out the same, and the
+    harness errors of its own runs (experiment id, detail)."""
+
+    sampled: int
+    same: int
+    errors: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        return self.same == self.sampled
+
+    def __str__(self) -> str:
+        return f"{self.same} of {self.sampled} experiments came out the same on the reference engine"
+
+
+def begin(run: Path) -> None:
+    """From now on the run has results that a proof is needed for."""
+    (run / FOLDER).mkdir(exist_ok=True)
+
+
+def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
+    """One in a hundred, at least 20, with every fault type and every scenario among them."""
+    count = max(_LEAST, -(-len(experiments) // _SHARE))
+    chosen = list(pick(experiments, count, seed))
+    seen = {mark for experiment in chosen for mark in _marks(experiment)}
+    for experiment in sorted(experiments, key=lambda e: digest([seed, e.id])):
+        if not seen.issuperset(_marks(experiment)):
+            chosen.append(experiment)
+            seen.update(_marks(experiment))
+    return tuple(chosen)
+
+
+def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
+    yield (experiment.fault.module, experiment.fault.fault_type)
+    yield (experiment.scenario,)
+
+
+def left(folder: RunFolder) -> tuple[Sample, ...]:
+    """What of the sample has no counting record in `proof/` yet; nothing where no proof is needed."""
+    if not (folder.path / FOLDER).is_dir():
+        return ()
+    found = read_records(folder.path, FOLDER)
+    ids = [name for name in _sampled(folder) if name not in found or not _counts(found[name])]
+    pieces = range(0, len(ids), _PIECE)
+    return tuple(Sample(number, tuple(ids[i : i + _PIECE])) for number, i in enumerate(pieces))
+
+
+def _sampled(folder: RunFolder) -> list[str]:
+    """Ids of the sample that are of this folder's share, in the plan's order."""
+    experiments = planfile.read_all(folder.path)
+    wanted = {experiment.id for experiment in sample(experiments, folder.head["seed"])}
+    shard, place, ids = folder.shard, 0, []
+    for index, (_, _, count) in enumerate(folder.head["chunks"]):
+        if shard is None or shard.has(index):
+            ids += [e.id for e in experiments[place : place + count] if e.id in wanted]
+        place += count
+    return ids
+
+
+def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
+    """How far the proof is, None where none is needed; CheckFailed at a record that is another one on the
+    reference engine."""
+    if not (folder.path / FOLDER).is_dir():
+        return None
+    found = read_records(folder.path, FOLDER)
+    same, errors = 0, []
+    for name, truth in found.items():
+        record = records.get(name)
+        if record is None or not _counts(record):
+            continue
+        if not _counts(truth):
+            errors.append((name, f"in the proof: {truth.detail}"))
+            continue
+        if record != truth:
+            raise CheckFailed(
+                f"experiment {name} is another one on the reference engine: {_difference(record, truth)}",
+                where=folder.path,
+                expected="the same record from every engine",
+                remedy="do not trust this run: run it anew with --engine reference, and report this",
+            )
+        same += 1
+    return Proof(sampled=len(_sampled(folder)), same=same, errors=tuple(sorted(errors)))
+
+
+def _difference(record: Record, truth: Record) -> str:
+    names = [name for name in Record.__slots__ if getattr(record, name) != getattr(truth, name)]
+    return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(truth, names[0])!r}"
+
+
+def _counts(record: Record) -> bool:
+    return record.status is not Status.HARNESS_ERROR

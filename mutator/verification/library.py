@@ -1,0 +1,161 @@
+"""Is everything in the library usable? What `mutator check` asks."""
+
+import os
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+from mutator.config.yaml_files import Keys
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.faults.fault_models import Example, FaultModel, FaultModels
+from mutator.faults.parameters import resolve
+from mutator.faults.specs import READINGS, FaultSpec, Variant
+from mutator.model import Fault
+from mutator.mutants import splicing as splice
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.building import build, injection_edit, unsplice
+from mutator.stpa.checks import check_analysis
+from mutator.stpa.context_tables import ContextTable
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import always
+from mutator.workspace import Workspace
+
+EXAMPLE_TAG = "example"
+T = TypeVar("T")
+
+
+def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
+    """Every problem of library, templates and target, in the order of the files; empty when all is well.
+
+    Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
+    that every spec expands in both readings; that every anchor is found in the target exactly once; that one
+    mutant of every shape compiles and un-splices; that published numbers, if any are cited, agree with one
+    another and with the library; and that a hazard analysis, if there is one, has no gap.
+    """
+    from mutator.paper.published_checks import check_paper  # pandas takes long to import
+
+    found = _Found()
+    manifest = found.tried(lambda: workspace.manifest(target))
+    models = found.tried(workspace.fault_models)
+    hazards = found.tried(workspace.hazards)
+    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_table_names()]
+    specs = [found.tried(partial(workspace.spec, path)) for path in workspace.spec_files()]
+    if models:
+        found.problems += check_examples(models)
+    if manifest and hazards:
+        found.problems += _unknown_hazards(manifest, tuple(hazards.hazards), [t for t in tables if t])
+    if manifest and models and found.tried(lambda: build(manifest, models, None, always())):
+        for spec in specs:
+            found.problems += check_spec(spec, models, manifest) if spec else ()
+    found.problems += check_paper(workspace)
+    if not found.problems:
+        checked = found.tried(workspace.specs)
+        analysis = found.tried(workspace.analysis)
+        if analysis and checked and manifest:
+            found.problems += check_analysis(analysis, checked, manifest)
+    return found.problems
+
+
+class _Found:
+    """Collects problems instead of stopping at the first."""
+
+    def __init__(self) -> None:
+        self.problems: list[MutatorError] = []
+
+    def tried(self, make: Callable[[], T]) -> T | None:
+        """What `make` returns; None, and a problem kept, when it fails."""
+        try:
+            return make()
+        except MutatorError as error:
+            self.problems.append(error)
+            return None
+
+
+def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
+    """Problems of one spec: expansion in both readings, anchors, and a mutant of each shape."""
+    for reading in READINGS:
+        try:
+            faults = expand(spec, 0, reading, models=models, manifest=manifest)
+        except MutatorError as error:
+            yield error
+            return
+        for variant in spec:
+            if reading in variant.readings:
+                name = f"{spec.name}/{variant.name}"
+                fault = next(f for f in faults if f.spec == name)
+                yield from _unbuildable(spec, variant, fault, models, manifest)
+
+
+def _unbuildable(
+    spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
+) -> Iterator[MutatorError]:
+    """Why a fault of a variant cannot be built, told at its first injection that is to blame, if one is."""
+    keys: Keys = (*variant.keys, fault.reading)
+    try:
+        for i, injection in enumerate(fault.injections):
+            keys = (*variant.keys, fault.reading, "injections", i, "at")
+            injection_edit(manifest.tree.parsed(injection.location.path), models, injection, EXAMPLE_TAG)
+        keys = (*variant.keys, fault.reading)
+        build(manifest, models, fault, always())
+    except MutatorError as error:
+        got = f"{fault.spec} ({fault.reading}): {error.got}{_where(error, manifest)}"
+        remedy = error.remedy or "correct the spec or the target"
+        yield spec.source.error(keys, got, expected=error.expected, remedy=remedy)
+
+
+def _where(error: MutatorError, manifest: TargetManifest) -> str:
+    """Where in the target an error is, as specs name its files: ` (pkg/radar.py:28)`."""
+    if not error.where:
+        return ""
+    path = error.where.removeprefix(f"{manifest.root}{os.sep}")
+    return f" ({path})" if error.line is None else f" ({path}:{error.line})"
+
+
+def _unknown_hazards(
+    manifest: TargetManifest, known: tuple[str, ...], tables: list[ContextTable]
+) -> Iterator[MutatorError]:
+    for name in manifest.hazards:
+        if name not in known:
+            yield MutatorError(f"hazard '{name}'", where=manifest.path, expected=f"one of {', '.join(known)}")
+    for table in tables:
+        for row in table.rows:
+            for action, verdicts in row.actions.items():
+                for hazard in (verdicts.provided, verdicts.not_provided):
+                    if hazard is not None and hazard not in known:
+                        yield table.source.error(
+                            ("contexts", row.id, "actions", action),
+                            f"hazard '{hazard}' of {action} in {row.id}",
+                            expected=f"one of {', '.join(known)}, or null",
+                        )
+
+
+def check_examples(models: FaultModels) -> Iterator[MutatorError]:
+    """Problems of the models' own examples."""
+    for model in models:
+        for example in model.examples:
+            try:
+                after = run_example(model, models, example)
+            except MutatorError as error:
+                yield MutatorError(f"the example fails: {error}", where=model.source.path, line=example.line)
+                continue
+            if after != example.after:
+                yield MutatorError(
+                    f"the example gives\n{after}",
+                    where=model.source.path,
+                    line=example.line,
+                    expected=f"\n{example.after}",
+                    remedy="correct the template or the example",
+                )
+
+
+def run_example(model: FaultModel, models: FaultModels, example: Example) -> str:
+    """The example's `before` with its injection spliced in (tag `example`); it must un-splice again."""
+    file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
+    injection = resolve(example.injection, model, model.source)
+    edit = injection_edit(file, models, injection, EXAMPLE_TAG)
+    after = splice.joined(splice.apply(file, [edit]))
+    if unsplice(after) != file.data:
+        raise MutatorError("the example does not un-splice to its `before`")
+    return after.decode()

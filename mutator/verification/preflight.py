@@ -1,0 +1,302 @@
+"""The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import full_disk_told, read_json, write_json
+from mutator._common.hashing import digest
+from mutator.campaigns.provenance import sources, versions
+from mutator.campaigns.shared_runs import same_in
+from mutator.engines.reference import Execution, Job, ReferenceEngine, prepare_base
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Experiment, Status
+from mutator.mutants import building as mutant
+from mutator.mutants.building import InvalidMutant
+from mutator.outcomes import golden
+from mutator.outcomes.golden import BadOutput, golden_key
+from mutator.store import plan_file as planfile
+from mutator.store.records import Progress
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import always
+from mutator.verification import preflight_cache as check_cache
+from mutator.verification.preflight_rules import CheckRun, judge_golden, judge_null, judge_same
+from mutator.workspace import Workspace
+
+SCHEMA = "checks/1"
+FILE = "checks.json"
+_OTHER_HASH_SEED = 4242
+_GOLDEN, _AGAIN, _NULL, _CANARY = "golden", "golden again", "null mutant", "canary"
+
+Notify = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckResult:
+    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` says what was found."""
+
+    name: str
+    passed: bool
+    detail: str
+
+
+def measured_cpu_s(folder: RunFolder) -> float | None:
+    """Mean CPU time of the golden runs in a folder; None before they ran."""
+    path = folder.path / FILE
+    return read_json(path, SCHEMA)["run_cpu_s"] if path.is_file() else None
+
+
+def run_checks(
+    workspace: Workspace, folder: RunFolder, *, workers: int = 1, notify: Notify | None = None
+) -> tuple[CheckResult, ...]:
+    """Run the checks unless they are known to pass for these very sources, in this folder or in another one
+    of this machine; results stay in checks.json.
+
+    Also leaves the golden runs in the folder. CheckFailed (after all ran) when any fails.
+    """
+    checks = _Checks(workspace, folder)
+    known = checks.known()
+    if known is not None:
+        return known
+    with full_disk_told(folder.path):
+        results = tuple(checks.run(workers, notify or (lambda progress: None)))
+    failed = [result for result in results if not result.passed]
+    if failed:
+        text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
+        raise CheckFailed(
+            f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
+            where=folder.path / FILE,
+            remedy="mend target, templates or canary; the campaign does not start before all pass",
+        )
+    check_cache.store(check_cache.entry(checks.digest), folder.path, FILE)
+    return results
+
+
+class _Checks:
+    """The checks of one run folder."""
+
+    def __init__(self, workspace: Workspace, folder: RunFolder) -> None:
+        head = folder.head
+        self.workspace = workspace
+        self.folder = folder
+        self.manifest: TargetManifest = workspace.manifest(head["target"])
+        self.models = workspace.fault_models()
+        self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
+        self.seed: int = head["seed"]
+        fault = planfile.fault_from(head["canary"]["fault"])
+        self.canary: Experiment = planfile.experiment_from(
+            head["canary"] | {"fault": fault.id}, {fault.id: fault}
+        )
+        self.hazard: str = head["canary_hazard"]
+        now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
+        self.variants = {fault.spec: fault for fault in planfile.read_faults(folder.path).values()}
+        places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
+        content = [now, versions(), head["goldens"], self.seed, self.canary.id, self.hazard, head["limits"]]
+        self.digest = digest([*content, places])
+
+    def known(self) -> tuple[CheckResult, ...] | None:
+        """Results of an earlier time, here or in another folder, if all passed and the golden runs are still
+        as they were; they are then here."""
+        if (results := self._passed(self._before(), self.folder.path)) is not None:
+            return results
+        place = check_cache.entry(self.digest)
+        try:
+            found = read_json(place / FILE, SCHEMA)
+            results = self._passed(found, place)
+        except (MutatorError, KeyError, TypeError, AttributeError):
+            return None  # none is there, or a damaged one
+        if results is not None:
+            self._check_same_as_before(found["goldens"])
+            with full_disk_told(self.folder.path):
+                check_cache.copy(place, self.folder.path, FILE)
+        return results
+
+    def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
+        if said is None or said["digest"] != self.digest:
+            return None
+        keys = [golden_key(*key) for key in self.keys]
+        if any(_digest_of(self.manifest, place / "golden" / key) != said["goldens"][key] for key in keys):
+            return None
+        results = tuple(CheckResult(**result) for result in said["results"])
+        return results if all(result.passed for result in results) else None
+
+    def run(self, workers: int, notify: Notify) -> Iterator[CheckResult]:
+        anchors = self._anchors()
+        if not anchors.passed:  # seconds saved, not minutes spent
+            yield anchors
+            return
+        runs = self._run_all(workers, notify)
+        results = [anchors, *self._judge(runs)]
+        goldens = {golden_key(*key): runs[_GOLDEN, key].digest for key in self.keys}
+        self._check_same_as_before(goldens)
+        cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
+        write_json(
+            self.folder.path / FILE,
+            {
+                "schema": SCHEMA,
+                "digest": self.digest,
+                "results": [asdict(result) for result in results],
+                "goldens": goldens,
+                "run_cpu_s": sum(cpu) / len(cpu),
+            },
+        )
+        yield from results
+
+    def _before(self) -> dict[str, Any] | None:
+        path = self.folder.path / FILE
+        return read_json(path, SCHEMA) if path.is_file() else None
+
+    def _check_same_as_before(self, goldens: dict[str, str]) -> None:
+        """A run that has records must not go on with other golden runs (of another Python, say)."""
+        before = self._before()
+        started = any((self.folder.path / "records").glob("*.jsonl"))
+        other = [key for key in goldens if before and before["goldens"].get(key) != goldens[key]]
+        if started and other:
+            raise CheckFailed(
+                f"the golden run {other[0]} is not the one this run began with",
+                where=self.folder.path,
+                expected="the same Python and packages during a whole run",
+                remedy="go back to them (run.json has the versions), or run into another folder",
+            )
+
+    def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], CheckRun]:
+        """Every run of every check, `workers` at a time."""
+        jobs = dict(self._jobs())
+        runs: dict[tuple[str, Any], CheckRun] = {}
+        work = self.folder.work / "checks"
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir(parents=True)
+        base = prepare_base(self.manifest, self.folder.base)
+        engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
+        notify(Progress(stage="checks", total=len(jobs)))
+        pool = ThreadPoolExecutor(max(1, workers))
+        try:
+            futures: dict[Future[CheckRun], tuple[str, Any]] = {
+                pool.submit(self._run, engine, name, job): name for name, job in jobs.items()
+            }
+            for future in as_completed(futures):
+                name = futures[future]
+                runs[name] = future.result()
+                notify(Progress(stage="checks", detail=name[0], done=len(runs), total=len(jobs)))
+        finally:
+            pool.shutdown(cancel_futures=True)
+            shutil.rmtree(work, ignore_errors=True)
+        return runs
+
+    def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
+        null = mutant.build(self.manifest, self.models, None, always())
+        for key in self.keys:
+            scenario, changes = key
+            common: dict[str, Any] = {
+                "scenario": self.workspace.scenario(scenario),
+                "seed": self.seed,
+                "changes": changes,
+            }
+            name = golden_key(*key)
+            yield (_GOLDEN, key), Job(name=f"a-{name}", **common)
+            yield (_AGAIN, key), Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
+            yield (_NULL, key), Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
+        canary = self.canary
+        built = mutant.build(self.manifest, self.models, canary.fault, canary.trigger)
+        yield (
+            (_CANARY, None),
+            Job(
+                name="canary",
+                scenario=self.workspace.scenario(canary.scenario),
+                seed=canary.seed,
+                changes=canary.changes,
+                files=built.files,
+                mutant=built.id,
+            ),
+        )
+
+    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
+        scratch = engine.work / job.name
+        try:
+            execution = engine.execute(job, scratch)
+            run = self._look(execution)
+            if name[0] == _GOLDEN and not run.problem:
+                self._keep(execution.out, self.folder.golden(*name[1]))
+            return run
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+
+    def _look(self, execution: Execution) -> CheckRun:
+        if execution.status is not Status.OK:
+            log = execution.log.strip()
+            last = f" ({log.splitlines()[-1]})" if log else ""
+            return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
+        try:
+            record = golden.load_record(self.manifest, execution.out)
+            golden.load_trace(self.manifest, execution.out, [c.name for c in self.manifest.compared])
+        except BadOutput as err:
+            return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
+        return CheckRun(
+            problem="",
+            digest=_digest_of(self.manifest, execution.out),
+            trace=golden.trace_digest(self.manifest, execution.out),
+            alerts=tuple(golden.alerts_of(record, self.manifest.alerts)),
+            hazards=tuple(golden.hazards_of(record, self.manifest.hazards)),
+            triggered=bool(execution.probe and execution.probe["triggered"]),
+            cpu_s=execution.cpu_s,
+        )
+
+    def _keep(self, out: Path, place: Path) -> None:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(place, ignore_errors=True)
+        out.rename(place)
+
+    def _judge(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
+        for key in self.keys:
+            first, again, null = (runs[name, key] for name in (_GOLDEN, _AGAIN, _NULL))
+            detail = judge_golden(first, again)
+            yield _result(f"golden {golden_key(*key)}", detail, "the same bytes twice")
+            if not first.problem:
+                detail = judge_null(first, null)
+                yield _result(f"null mutant {golden_key(*key)}", detail, "the same bytes as golden")
+        yield from self._judge_same(runs)
+        canary = runs[_CANARY, None]
+        problem = canary.problem or (
+            "" if self.hazard in dict(canary.hazards) else f"did not reach {self.hazard}"
+        )
+        yield _result("canary", problem, f"reached {self.hazard}")
+
+    def _judge_same(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
+        """Scenarios that a change makes the same, as the manifest has it, drive to the same bytes."""
+        same: dict[tuple[str, ...], dict[str, CheckRun]] = {}
+        for scenario, changes in self.keys:
+            if scenario in same_in(self.manifest, changes):
+                same.setdefault(changes, {})[scenario] = runs[_GOLDEN, (scenario, changes)]
+        for changes, goldens in same.items():
+            yield _result(f"same {'+'.join((*goldens, *changes))}", judge_same(goldens), "one run for all")
+
+    def _anchors(self) -> CheckResult:
+        """Each variant of the plan finds its statements (not compiling is a result, told later)."""
+        problems: dict[str, list[str]] = {}
+        for fault in self.variants.values():
+            try:
+                mutant.build(self.manifest, self.models, fault, always())
+            except InvalidMutant:
+                continue
+            except MutatorError as err:
+                problems.setdefault(str(err), []).append(fault.spec)
+        text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
+        return _result("anchors", text, f"{len(self.variants)} variants found their statements")
+
+
+def _result(name: str, problem: str, found: str) -> CheckResult:
+    return CheckResult(name=name, passed=not problem, detail=problem or found)
+
+
+def _digest_of(manifest: TargetManifest, out: Path) -> str:
+    """Digest of trace and record in an output folder; empty when they are not there."""
+    try:
+        return digest(
+            [digest((out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
+        )
+    except OSError:
+        return ""

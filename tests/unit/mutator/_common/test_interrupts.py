@@ -1,0 +1,45 @@
+"""Ctrl-C and SIGTERM end a command in order, and wait while native code is at work."""
+
+import signal
+
+import pytest
+
+from mutator._common.interrupts import held, terminable
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_signal_interrupts(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), terminable():
+        signal.raise_signal(number)
+    assert signal.getsignal(number) is before
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_held_signal_waits_until_the_outermost_ends(number: signal.Signals) -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), terminable(), held():
+        with held():
+            signal.raise_signal(number)
+            done.append("inner")
+        done.append("outer")
+    assert done == ["inner", "outer"]
+    with terminable(), held():
+        pass  # it was asked once, and is answered once
+
+
+def test_held_signal_goes_before_the_error_that_it_found() -> None:
+    with pytest.raises(KeyboardInterrupt), terminable(), held():
+        signal.raise_signal(signal.SIGINT)
+        raise ValueError
+
+
+def test_ignored_signal_stays_ignored() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with terminable():
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,85 @@
+"""Campaign files: what is read, and how mistakes are answered."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.errors import MutatorError
+from mutator.model import Method
+from mutator.workspace import Workspace
+
+TEXT = """\
+schema: campaign/1
+name: mine
+about: For tests.
+target: toycar
+scenarios: [A, B]
+faults:
+  - spec: sensor/*
+  - {spec: sensor/lane/shifted, values: 2}
+methods: [guided, random]
+triggers:
+  table: near_far
+  armed_after_s: {as_described: 1.5, as_coded: 0.0}
+  random_until_s: 5.0
+seed: 3
+canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}
+"""
+
+
+def test_a_campaign_is_read(tmp_path: Path) -> None:
+    """Every key arrives; what is not given has its default."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(TEXT)
+    campaign = load_campaign(path)
+    assert (campaign.name, campaign.target, campaign.seed) == ("mine", "toycar", 3)
+    assert campaign.methods == (Method.GUIDED, Method.RANDOM)
+    assert [selection.values for selection in campaign.faults] == [None, 2]
+    assert campaign.armed_after_s == {"as_described": 1.5, "as_coded": 0.0}
+    assert (campaign.sample, campaign.rows, campaign.reading) == (None, None, "as_described")
+    assert campaign.limits.wall_s > campaign.limits.cpu_s
+    assert campaign.source == TEXT.encode()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "told"),
+    [
+        ("campaign/1", "campaign/2", 1, "newer version"),
+        ("name: mine", "name: My Campaign", 2, "My Campaign"),
+        ("[A, B]", "[A, B, A]", 5, "'A' stands here a second time"),
+        ("[A, B]", "[]", 5, "scenarios"),
+        ("values: 2", "values: 0", 8, "values"),
+        ("values: 2", "value: 2", 8, "unknown key 'value'"),
+        ("[guided, random]", "[guided, guided]", 9, "second time"),
+        ("[guided, random]", "[guided, chance]", 9, "chance"),
+        ("random_until_s: 5.0", "random_until_s: 1.0", None, "later than armed_after_s"),
+        ("random_until_s: 5.0", "random_until: 5.0", None, "random_until"),
+        ("as_described: 1.5", "as_described: -1.5", 12, "-1.5"),
+        ("seed: 3", "seed: three", 14, "three"),
+        ("at_s: 1.0", "at_s: .nan", 15, "nan"),
+        ("seed: 3", "seed: 3\nlimits: {cpu_s: 0}", 15, "cpu_s"),
+        ("seed: 3", "seed: 3\nchunk: 0", 15, "chunk"),
+        ("seed: 3", "seed: 3\nseed: 4", 15, "second time"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(
+    tmp_path: Path, old: str, new: str, line: int | None, told: str
+) -> None:
+    """A mistake is answered with file, line, and what was written."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(TEXT.replace(old, new))
+    with pytest.raises(MutatorError, match=re.escape(told)) as error:
+        load_campaign(path)
+    assert error.value.where == str(path)
+    assert error.value.line is not None
+    assert line is None or error.value.line == line
+
+
+def test_the_campaigns_that_ship_are_read(clone: Workspace) -> None:
+    """Every campaign of the library loads and is named as its file."""
+    names = clone.campaign_names()
+    assert "quickstart" in names
+    for name in names:
+        assert load_campaign(clone.campaign(name)).name == name

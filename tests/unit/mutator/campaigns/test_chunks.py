@@ -1,0 +1,61 @@
+"""Chunks: how a plan is cut, and what is left of it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.chunks import Pending, cut, pending
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.model import Record, Status
+from mutator.store.plan_file import read_chunk, read_faults
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+@pytest.mark.parametrize(
+    ("groups", "size", "lengths"),
+    [
+        ("aaaaa", 2, (2, 2, 1)),
+        ("aaabbb", 2, (2, 1, 2, 1)),
+        ("abab", 9, (1, 1, 1, 1)),
+        ("aaa", 9, (3,)),
+        ("", 3, ()),
+    ],
+)
+def test_cut(groups: str, size: int, lengths: tuple[int, ...]) -> None:
+    """Chunks have at most their size and never two groups."""
+    assert cut(groups, size) == lengths
+
+
+@pytest.fixture
+def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
+    return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
+
+
+def test_everything_is_pending_at_first(folder: RunFolder) -> None:
+    """Without records every place of every chunk is left."""
+    left = pending(folder, {})
+    assert [item.chunk for item in left] == list(range(8))
+    assert sum(len(item.places) for item in left) == 24
+
+
+def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Record]) -> None:
+    """What has a record is not run again, but for harness errors; whole chunks disappear."""
+    faults = read_faults(folder.path)
+    chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
+    records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
+    wrong = record(chunks[2][0].id, status=Status.HARNESS_ERROR, outcome=None)
+    records[wrong.experiment_id] = wrong
+    left = pending(folder, records)
+    assert left[0] == Pending(1, (0, 2))
+    assert left[1] == Pending(2, (0, 1, 2))
+    assert len(left) == 7
+
+
+def test_a_chunk_is_read_alone(folder: RunFolder) -> None:
+    """Each chunk's bytes give its experiments, all together the plan."""
+    faults = read_faults(folder.path)
+    found = [e.id for chunk in folder.head["chunks"] for e in read_chunk(folder.path, chunk, faults)]
+    assert len(found) == len(set(found)) == 24
+    assert folder.find(found[5][:10]) == found[5]

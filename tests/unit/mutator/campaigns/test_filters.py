@@ -1,0 +1,79 @@
+"""Filter expressions: what they accept, what they refuse, and that they are never run as code."""
+
+import pytest
+
+from mutator.campaigns.filters import compile_filter
+from mutator.errors import MutatorError
+
+ROW = {"fault_type": "ghost_vehicle", "scenario": "S2", "value": 120, "unit": None, "method": "guided"}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('scenario == "S2"', True),
+        ('scenario != "S2"', False),
+        ("value > 100 and value <= 120", True),
+        ("100 < value < 120", False),
+        ("value == -120", False),
+        ('scenario in ("S1", "S2")', True),
+        ('scenario not in ["S1", "S3"]', True),
+        ('"ghost" in fault_type', True),
+        ('match(fault_type, "ghost*")', True),
+        ('match(unit, "*")', False),
+        ('not method == "random" and (value < 5 or value > 50)', True),
+        ("unit == None", True),
+        ("unit < 5", False),
+        ("not unit < 5", True),
+        ("unit", False),
+        ("fault_type", True),
+    ],
+)
+def test_expressions(text: str, expected: bool) -> None:
+    """Comparisons, membership, globs and logic mean what they do in Python; an empty cell compares false."""
+    assert compile_filter(text, ROW)(ROW) is expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "value >",
+        "scenario = 'S1'",
+        "nosuch == 1",
+        "__import__('os').system('true')",
+        "value.real > 1",
+        "value + 1 > 2",
+        "(lambda: 1)() == 1",
+        "[x for x in (1,)] == 1",
+        "scenario is None",
+        "match(scenario)",
+        "match(scenario, method)",
+        "match('a', value, 3)",
+        "value[0] == 1",
+        "f'{value}' == 'x'",
+        "1",
+        "(" * 500,
+        "value == " + "-" * 1500 + "1",
+        "value == " + "1" * 3000,
+    ],
+)
+def test_anything_else_is_refused(text: str) -> None:
+    """Whatever is not on the list is an error that shows what was written."""
+    with pytest.raises(MutatorError) as error:
+        compile_filter(text, ROW)
+    assert "filter" in str(error.value)
+
+
+def test_unknown_column_lists_the_known_ones() -> None:
+    """A misspelt column is answered with the columns there are."""
+    with pytest.raises(MutatorError, match=r"unknown column `speed`.*fault_type.*value"):
+        compile_filter("speed > 1", ROW)
+
+
+@pytest.mark.parametrize("text", ['value > "S1"', "scenario in 5"])
+def test_comparing_unlike_things_is_told(text: str) -> None:
+    """A comparison that makes no sense for a row's values is a MutatorError, not a TypeError."""
+    accepts = compile_filter(text, ROW)
+    with pytest.raises(MutatorError):
+        accepts(ROW)

@@ -1,0 +1,298 @@
+"""Plans: what is in them, that they are the same each time, and that a frozen one stays what it is."""
+
+import csv
+import shutil
+from collections import Counter
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import Plan, freeze, load_plan, make_plan
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Hold, Method
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def whole(toycar: Workspace) -> Workspace:
+    """A workspace whose campaign `toy` takes everything."""
+    path = toycar.campaign("toy")
+    path.write_text(path.read_text().replace("sample: 24\n", ""))
+    return toycar
+
+
+def pair_key(experiment: Experiment) -> tuple[str, str, str]:
+    return experiment.scenario, experiment.fault.id, experiment.trigger.name.removeprefix("random/")
+
+
+def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
+    """Every guided experiment has one random partner of the same scenario, fault and row, and the reverse."""
+    experiments = make_plan(whole, "toy").experiments
+    guided = Counter(pair_key(e) for e in experiments if e.method is Method.GUIDED)
+    random = Counter(pair_key(e) for e in experiments if e.method is Method.RANDOM)
+    assert guided == random
+    assert set(guided.values()) == {1}
+    assert len(guided) == 2 * 2 * (4 + 2 + 4 + 1)  # scenarios, rows, faults
+
+
+def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
+    """Guided triggers wait until they are armed; random times lie on steps from there to the last."""
+    for reading, armed in (("as_described", 1.0), ("as_coded", 0.0)):
+        times = set()
+        for experiment in make_plan(whole, "toy", reading=reading).experiments:
+            if experiment.method is Method.GUIDED:
+                assert experiment.trigger.armed_after_s == armed
+                assert experiment.trigger.hold is Hold.WHILE
+            else:
+                assert experiment.trigger.hold is Hold.TO_END
+                times.add(float(experiment.trigger.condition.removeprefix("t >= ")))
+        assert armed <= min(times) <= max(times) <= 5.5
+        assert all(time == pytest.approx(round(time / 0.05) * 0.05) for time in times)
+        assert len(times) > 20
+
+
+def test_random_times_differ_between_rows_and_scenarios(whole: Workspace) -> None:
+    """A fault's random times are drawn anew for each scenario and row."""
+    experiments = [e for e in make_plan(whole, "toy").experiments if e.method is Method.RANDOM]
+    silent = [e for e in experiments if e.fault.fault_type == "silence"]
+    assert len({e.trigger.condition for e in silent}) == len(silent) == 4
+
+
+def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    """Ids, order, chunks and digest depend on campaign, library and seed, not on the place."""
+    plan = make_plan(toycar, "toy")
+    elsewhere = make_plan(copy_toycar(tmp_path / "elsewhere"), "toy")
+    assert (plan.experiments, plan.chunks, plan.digest) == (
+        elsewhere.experiments,
+        elsewhere.chunks,
+        elsewhere.digest,
+    )
+    other = make_plan(toycar, "toy", seed=8)
+    assert other.digest != plan.digest
+    assert all(e.seed == 8 for e in other.experiments)
+
+
+def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
+    """An experiment's id covers the scenario's content."""
+    before = make_plan(toycar, "toy")
+    with toycar.scenario("A").open("a") as file:
+        file.write("\n")
+    after = make_plan(toycar, "toy")
+    for one, other in zip(before.experiments, after.experiments, strict=True):
+        assert (one.id == other.id) == (one.scenario != "A")
+
+
+def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
+    """Experiments that share a golden run are neighbours, and no chunk crosses from one to another."""
+    plan = make_plan(whole, "toy")
+    keys = [(e.scenario, e.fault.changes) for e in plan.experiments]
+    assert len(dict.fromkeys(keys)) == 1 + sum(a != b for a, b in pairwise(keys))
+    first = 0
+    for length in plan.chunks:
+        assert length <= plan.campaign.chunk
+        assert len(set(keys[first : first + length])) == 1
+        first += length
+    assert first == len(keys)
+
+
+def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
+    """A campaign's setting joins every run's changes once, canary and goldens included, and their ids."""
+    before = make_plan(whole, "toy")
+    path = whole.campaign("toy")
+    path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
+    after = make_plan(whole, "toy")
+    assert {e.changes for e in (*after.experiments, after.canary)} == {("alone",)}
+    assert {changes for _, changes in after.goldens()} == {("alone",)}
+    assert Counter(e.fault.id for e in before.experiments) == Counter(e.fault.id for e in after.experiments)
+    assert not {e.id for e in before.experiments} & {e.id for e in after.experiments}
+    path.write_text(path.read_text().replace("[alone]", "[rainy]"))
+    with pytest.raises(MutatorError, match=r"toy\.yaml:\d+: change 'rainy'; expected one of alone"):
+        make_plan(whole, "toy")
+
+
+def test_filters_and_limit(whole: Workspace) -> None:
+    """--only keeps, --exclude drops, --limit takes an even part of what is left."""
+    plan = make_plan(
+        whole, "toy", only='scenario == "A"', exclude='method == "random" or value > 60', limit=5
+    )
+    assert len(plan.experiments) == 5
+    assert all(e.scenario == "A" and e.method is Method.GUIDED for e in plan.experiments)
+    assert len({e.fault.fault_type for e in plan.experiments}) == 3
+    with pytest.raises(MutatorError, match="no experiment is left"):
+        make_plan(whole, "toy", only="value > 1000")
+
+
+@pytest.mark.parametrize(
+    ("choices", "told"),
+    [
+        ({"only": "t_h1 > 2"}, "unknown column `t_h1`"),
+        ({"exclude": "value >"}, "not an expression"),
+        ({"limit": 0}, "limit 0"),
+        ({"seed": -1}, "seed -1"),
+        ({"reading": "as_dreamt"}, "as_dreamt"),
+    ],
+)
+def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> None:
+    """Choices that cannot be are errors before anything is expanded."""
+    with pytest.raises(MutatorError, match=told):
+        make_plan(toycar, "toy", **choices)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "told"),
+    [
+        ("spec: sensor/*", "spec: sensr/*", 7, "no fault in the library is named like 'sensr/*'"),
+        ("spec: sensor/*", "spec: sensor/lane", 7, "write 'sensor/lane/*' for all its variants"),
+        ("[A, B]", "[A, Z]", 5, "no scenario 'Z'"),
+        ("table: near_far", "table: nowhere", 10, "no context table 'nowhere'"),
+        ("table: near_far", "table: near_far\n  rows: [near, afar]", 11, "afar"),
+        ("hazard: H3", "hazard: H7", 15, "hazard 'H7'"),
+        ("sensor/lane/shifted", "sensor/lane", 15, "sensor/lane"),
+        ("scenario: A", "scenario: Z", 15, "no scenario 'Z'"),
+    ],
+)
+def test_names_that_do_not_exist_are_told(
+    toycar: Workspace, old: str, new: str, line: int, told: str
+) -> None:
+    """A name of something that is not there is answered with the campaign's file and line."""
+    path = toycar.campaign("toy")
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(MutatorError) as error:
+        make_plan(toycar, "toy")
+    assert told in str(error.value)
+    assert (error.value.where, error.value.line) == (str(path), line)
+
+
+def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
+    """A scenario file from anywhere is no scenario of a campaign; one in a folder of the library is."""
+    path, file = toycar.campaign("toy"), toycar.scenario("A")
+    text = path.read_text()
+    path.write_text(text.replace("[A, B]", f"[A, {file}]"))
+    with pytest.raises(MutatorError, match=r"no scenario '.*A\.yaml' in the library; expected one of A, B"):
+        make_plan(toycar, "toy")
+    (file.parent / "more").mkdir()
+    (file.parent / "more" / "C.yaml").write_text(file.read_text())
+    path.write_text(text.replace("[A, B]", "[more/C]"))
+    assert {e.scenario for e in make_plan(toycar, "toy").experiments} == {"more/C"}
+
+
+def test_faults_for_a_time(toycar: Workspace) -> None:
+    """With `hold_s` every fault, guided or random, stays active for that time once triggered."""
+    path = toycar.campaign("toy")
+    path.write_text(path.read_text().replace("  random_until_s", "  hold_s: 1.5\n  random_until_s"))
+    triggers = {e.trigger for e in make_plan(toycar, "toy").experiments}
+    assert {(trigger.hold, trigger.hold_s) for trigger in triggers} == {(Hold.FOR, 1.5)}
+
+
+def test_some_values_of_a_variant(whole: Workspace) -> None:
+    """`values` takes that many of each variant's values."""
+    path = whole.campaign("toy")
+    path.write_text(path.read_text().replace("  - spec: sensor/*", "  - {spec: sensor/*, values: 2}"))
+    faults = {e.fault.id: e.fault.spec for e in make_plan(whole, "toy").experiments}
+    assert Counter(faults.values()) == {
+        "sensor/distance/longer": 2,
+        "sensor/distance/nearer": 2,
+        "sensor/lane/shifted": 2,
+        "sensor/silence/no_data": 1,
+    }
+
+
+def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> None:
+    """What is frozen comes back equal, with plan.csv beside it."""
+    plan = make_plan(toycar, "toy", limit=9)
+    folder = freeze(plan, tmp_path / "run", toycar)
+    back = load_plan(folder.path)
+    for name in ("experiments", "chunks", "canary", "digest", "seed", "reading", "choices"):
+        assert getattr(back, name) == getattr(plan, name)
+    rows = list(csv.DictReader((folder.path / "plan.csv").open()))
+    assert [row["experiment_id"] for row in rows] == [e.id for e in plan.experiments]
+    assert rows[0]["condition"] == plan.experiments[0].trigger.condition
+
+
+def test_freezing_again_changes_nothing(toycar: Workspace, tmp_path: Path) -> None:
+    """The same plan may be frozen again; another one is refused."""
+    freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
+    before = {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*") if p.name != "owner.lock"}
+    freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
+    assert before == {p: p.stat().st_mtime_ns for p in before}
+    with pytest.raises(MutatorError, match="holds another plan"):
+        freeze(make_plan(toycar, "toy", seed=8), tmp_path / "run", toycar)
+
+
+@pytest.mark.parametrize("path", ["tree/toycar/driver.py", "templates/offset.py.j2"])
+def test_changed_sources_are_refused(toycar: Workspace, tmp_path: Path, path: str) -> None:
+    """A run that was planned with another target or other templates does not go on."""
+    plan = make_plan(toycar, "toy")
+    freeze(plan, tmp_path / "run", toycar)
+    with (toycar.library.parent / path).open("a") as file:
+        file.write("\n# changed\n")
+    with pytest.raises(MutatorError, match=r"changed since this run was planned: (target|templates)"):
+        freeze(plan, tmp_path / "run", toycar)
+
+
+def test_a_folder_with_other_things_is_left_alone(toycar: Workspace, tmp_path: Path) -> None:
+    """A folder that is no run folder and not empty is refused, and so is a file."""
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.tex").touch()
+    for place in ("full", "full/thesis.tex"):
+        with pytest.raises(MutatorError, match=r"not empty \(thesis\.tex\)"):
+            freeze(make_plan(toycar, "toy"), tmp_path / place, toycar)
+    assert [p.name for p in (tmp_path / "full").iterdir()] == ["thesis.tex"]
+
+
+def test_a_freeze_that_was_killed_is_done_again(toycar: Workspace, tmp_path: Path) -> None:
+    """A folder in which a freeze was killed before its end takes the plan."""
+    plan = make_plan(toycar, "toy")
+    freeze(plan, tmp_path / "run", toycar)
+    (tmp_path / "run" / "run.json").rename(tmp_path / "run" / ".run.json.4711")
+    assert freeze(plan, tmp_path / "run", toycar).planned == 24
+
+
+def test_cost_is_stated(toycar: Workspace) -> None:
+    """Expected time falls with workers; a measured rate goes before the default one."""
+    plan = make_plan(toycar, "toy")
+    one, two = plan.cost(1), plan.cost(2)
+    assert one.cpu_s == two.cpu_s > 0
+    assert two.wall_s < one.wall_s
+    assert two.disk_bytes > 24 * 1000
+    assert not one.measured
+    measured = replace(plan, run_cpu_s=100.0).cost(1)
+    assert measured.measured
+    assert measured.cpu_s > 100 * one.cpu_s / 10
+
+
+BEYOND = ("vision_weather",)  # modules of faults that are not published ones
+
+
+def test_quickstart_shows_everything(clone: Workspace) -> None:
+    """60 experiments: every published variant in guided and random, every scenario and context."""
+    plan = make_plan(clone, "quickstart")
+    experiments = plan.experiments
+    variants = {f"{spec.name}/{v.name}" for spec in clone.specs() if spec.module not in BEYOND for v in spec}
+    assert len(experiments) == 60
+    assert {(e.fault.spec, e.method) for e in experiments} == {(v, m) for v in variants for m in Method}
+    scenarios = Counter(e.scenario for e in experiments)
+    assert set(scenarios) == {"S1", "S2", "S3", "S4", "S5"}
+    assert max(scenarios.values()) - min(scenarios.values()) <= 2
+    assert {"C1", "C2", "C3", "C4"} <= {e.trigger.name for e in experiments}
+
+
+def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
+    path = tmp_path / "all.yaml"
+    path.write_text(clone.campaign("quickstart").read_text().replace("sample: 60\n", ""))
+    return make_plan(clone, path, **choices)
+
+
+def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
+    """Without a sample they are the published 11,280: each value in each scenario and context."""
+    described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
+    assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
+    assert len({e.id for e in described.experiments}) == len(described.experiments)
+    values = [
+        Counter((e.scenario, e.trigger.name, e.fault.spec, e.fault.value) for e in plan.experiments)
+        for plan in (described, coded)
+    ]
+    assert values[0] == values[1]
+    shutil.rmtree(tmp_path)

@@ -1,0 +1,87 @@
+"""Sampling: even, deterministic, and in the plan's order."""
+
+from collections import Counter
+from collections.abc import Callable
+
+import pytest
+
+from mutator.campaigns.sampling import pick, pick_in_proportion, spread
+from mutator.model import Experiment, Method
+
+SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
+
+
+@pytest.fixture
+def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
+    """Three variants (with 10, 1 and 3 values) in two scenarios, two methods, two triggers."""
+    made = []
+    for spec, values in zip(SPECS, (10, 1, 3), strict=True):
+        for scenario in ("S1", "S2"):
+            for value in range(values):
+                for trigger in ("C1", "C2"):
+                    made.append(experiment(value, scenario, Method.GUIDED, trigger, spec))
+                    made.append(experiment(value, scenario, Method.RANDOM, f"random/{trigger}", spec))
+    return made
+
+
+@pytest.mark.parametrize("count", [6, 12, 24])
+def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count: int) -> None:
+    """A sample shows each variant, method, scenario and trigger as often, however many values each has."""
+    picked = pick(many, count, seed=1)
+    assert len(picked) == count
+    assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
+    assert set(Counter(e.method for e in picked).values()) == {count // 2}
+    for counts in (Counter(e.scenario for e in picked), Counter(e.trigger.name for e in picked)):
+        assert max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_a_rare_variant_gives_way(many: list[Experiment]) -> None:
+    """When a variant has no more experiments the others fill up, and no experiment is picked twice."""
+    picked = pick(many, 60, seed=1)
+    counts = Counter(e.fault.spec for e in picked)
+    assert counts["radar/jamming/no_data"] == 8
+    assert len({e.id for e in picked}) == 60
+
+
+def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> None:
+    """The same seed picks the same, in the order they came; another seed picks others."""
+    picked = pick(many, 10, seed=1)
+    assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
+    assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
+    assert pick(many, 10, seed=2) != picked
+
+
+def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
+    """A sample as large as the whole is the whole."""
+    assert pick(many, 1000, seed=1) == tuple(many)
+
+
+@pytest.mark.parametrize(
+    ("count", "wanted", "indices"),
+    [(10, 1, [5]), (10, 2, [2, 7]), (3, 3, [0, 1, 2]), (2, 5, [0, 1]), (1, 1, [0])],
+)
+def test_values_are_spread(count: int, wanted: int, indices: list[int]) -> None:
+    """Some of a variant's values are taken evenly from its range, never one twice."""
+    assert spread(count, wanted) == indices
+
+
+def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experiment]) -> None:
+    """Half of all: half of each fault type in each scenario, every guided experiment with its partner."""
+    picked = pick_in_proportion(many, 56, seed=1)
+    assert len(picked) == len({e.id for e in picked}) == 56
+    assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
+    keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
+    assert keys[Method.GUIDED] == keys[Method.RANDOM]
+    assert pick_in_proportion(many, 56, seed=1) == picked
+    assert pick_in_proportion(many, 56, seed=2) != picked
+
+
+def key(experiment: Experiment) -> tuple[str, str, str]:
+    return experiment.scenario, experiment.fault.id, experiment.trigger.name.removeprefix("random/")
+
+
+@pytest.mark.parametrize("count", [10, 57])
+def test_in_proportion_refuses_what_does_not_come_out(many: list[Experiment], count: int) -> None:
+    """A number that is odd, or too small for a pair of each type in each scenario, is refused."""
+    with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
+        pick_in_proportion(many, count, seed=1)

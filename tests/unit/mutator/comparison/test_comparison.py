@@ -1,0 +1,199 @@
+"""Two run folders compared, and the comparison written down."""
+
+import csv
+import json
+import shutil
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.comparison import pages
+from mutator.comparison.comparison import Comparison, Gate, compare, findings
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Experiment, Outcome, Status
+from mutator.store.run_folder import HEAD
+from mutator.workspace import Workspace
+
+Write = Callable[..., Path]
+HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),)}
+
+
+def lane_is_left(e: Experiment) -> dict[str, Any]:
+    """Faults of the lane lead out of it, a crash among them says <so>; nothing else does anything."""
+    if e.fault.fault_type != "lane":
+        return {}
+    if e.fault.value == 0.8:
+        return {"status": Status.CRASHED, "outcome": None, "detail": "a <b>crash</b>"}
+    return HAZARD
+
+
+@pytest.fixture(scope="module")
+def runs(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
+) -> tuple[Path, Path]:
+    """Two runs of the toy: in `before` nothing happens, in `after` the target is another one and worse."""
+    place = tmp_path_factory.mktemp("runs")
+    toycar = copy_toycar(place)
+    before = write_run(toycar, place / "before")
+    driver = toycar.library.parent / "tree" / "toycar" / "driver.py"
+    driver.write_text(driver.read_text().replace("-0.6 * offset", "-0.1 * offset"))
+    return before, write_run(toycar, place / "after", lane_is_left)
+
+
+@pytest.fixture(scope="module")
+def found(runs: tuple[Path, Path]) -> Comparison:
+    return compare(*runs)
+
+
+def lanes(found: Comparison) -> int:
+    return sum(p.b.fault.fault_type == "lane" for p in found.pairs)
+
+
+def test_what_differs_is_told(found: Comparison) -> None:
+    """Of the sources only those that changed differ, and the changed file is named."""
+    assert [fact.name for fact in found.facts if fact.differs] == ["digest of target"]
+    assert pages.files_text(found) == "Files of the target changed: toycar/driver.py."
+    assert found.remarks == ()
+
+
+def test_a_run_planned_before_files_were_written_down(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    """Runs whose head has no list of files are compared; that it is not known is told."""
+    old = shutil.copytree(runs[0], tmp_path / "old")
+    head = old / HEAD
+    told = json.loads(head.read_text())
+    del told["target_files"]
+    head.write_text(json.dumps(told))
+    assert "is not known" in pages.files_text(compare(old, runs[1]))
+
+
+def test_gates_name_what_is_worse(found: Comparison) -> None:
+    """Each experiment that became hazardous is named once; a gate that nothing fails finds nothing."""
+    new = findings(found, [Gate.NEW_HAZARD])
+    assert 0 < len(new) <= lanes(found)
+    assert all("sensor/lane/shifted" in f.words and "masked -> hazard (H3 2.00 s" in f.words for f in new)
+    assert findings(found, [Gate.UNMATCHED, Gate.LOST_ALERT, Gate.HARNESS_ERROR]) == ()
+    assert found.incomplete == 0
+
+
+def test_the_whole_is_in_the_tables(found: Comparison) -> None:
+    """The tables agree with the pairs, and McNemar's test with the counts."""
+    endings, changes, rates, _, by_type, _ = found.sheets
+    assert sum(sum(line[1:]) for line in endings.lines) == len(found.pairs) == 24  # type: ignore[arg-type]
+    total = dict(zip(changes.heads, changes.lines[-1], strict=True))
+    new = len(findings(found, [Gate.NEW_HAZARD]))
+    assert (total["pairs"], total["new-hazard"]) == (24, new)
+    [hazard] = [line for line in rates.lines if line[0] == "hazard"]
+    line = dict(zip(rates.heads, hazard, strict=True))
+    assert (line["only before"], line["only after"]) == (0, new)
+    assert line["p"] == pytest.approx(2 * 0.5**new)
+    kinds = [dict(zip(by_type.heads, line, strict=True)) for line in by_type.lines if line[0] == "hazard"]
+    assert {kind["fault type"]: kind["only after"] for kind in kinds} == {
+        "sensor/distance": 0,
+        "sensor/lane": new,
+        "sensor/silence": 0,
+    }
+    assert {kind["p, Holm"] for kind in kinds} == {1.0, min(1.0, 3 * 2 * 0.5**new)}
+
+
+def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
+    """A run compared with itself has no change, no fact that differs, and passes every gate."""
+    found = compare(runs[1], runs[1])
+    assert found.changed == ()
+    assert not any(fact.differs for fact in found.facts)
+    assert findings(found, list(Gate)) == ()
+    assert "None of them changed" in pages.summary(found)
+
+
+def test_only_some(runs: tuple[Path, Path]) -> None:
+    """A filter chooses among the experiments of both runs."""
+    found = compare(*runs, only='fault_type == "lane"')
+    assert len(found.pairs) == lanes(found) > 0
+    assert found.unmatched == ()
+
+
+def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
+    """Two runs without a pair are refused, with their numbers."""
+    with pytest.raises(MutatorError, match="has a partner"):
+        compare(*runs, only="value == -1")
+
+
+def test_a_failed_proof_is_not_compared(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    """A run whose engine was proved wrong is refused."""
+    after = shutil.copytree(runs[1], tmp_path / "after")
+    (after / "proof").mkdir()
+    lines = (after / "records" / "0001-a.jsonl").read_text().replace('"outcome":"masked"', '"outcome":"sdc"')
+    (after / "proof" / "0001-a.jsonl").write_text(lines)
+    with pytest.raises(CheckFailed, match="reference engine"):
+        compare(runs[0], after)
+
+
+def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
+    """Harness errors and experiments not run are told, and are in no rate."""
+    broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None, "detail": "no disk"}
+    a = write_run(toycar, tmp_path / "a", lambda e: HAZARD)
+    b = write_run(
+        toycar, tmp_path / "b", lambda e: {"lane": broken, "silence": None}.get(e.fault.fault_type, HAZARD)
+    )
+    found = compare(a, b)
+    kinds = [e.fault.fault_type for e in found.b.experiments]
+    assert found.incomplete == kinds.count("lane") + kinds.count("silence") > 0
+    assert dict(pages.reasons(found)) == {"no result in b": kinds.count("silence")}
+    assert len(findings(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
+    rates = found.sheets[2]
+    assert {line[1] for line in rates.lines} == {kinds.count("distance")}
+    assert "say nothing of their fault" in pages.summary(found)
+
+
+class Page(HTMLParser):
+    """What a page loads from elsewhere, its texts, and its tags."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loaded: list[str] = []
+        self.tags: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        named = dict(attributes)
+        self.loaded += [v for k, v in named.items() if v and (k == "src" or (k == "href" and tag == "link"))]
+
+
+def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
+    """Page, Markdown and CSV have every pair that changed; the page needs nothing else and escapes texts."""
+    written = pages.write(found, tmp_path / "out")
+    pairs = list(csv.DictReader(written.pairs.open()))
+    assert len(pairs) == 24
+    assert sum(p["changes"] == "new-hazard;worse" for p in pairs) == len(findings(found, [Gate.NEW_HAZARD]))
+    text = written.page.read_text()
+    page = Page(text)
+    assert page.loaded == []
+    assert page.tags.count("b") == 0
+    for pair in found.changed:
+        assert pair.b.id in text
+        assert pair.b.id in written.markdown.read_text()
+    assert {p.name for p in (tmp_path / "out" / "tables").iterdir()} == {
+        f"{sheet.name}.csv" for sheet in found.sheets
+    }
+
+
+def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, Path], tmp_path: Path) -> None:
+    """The same runs give the same bytes."""
+    one, two = (pages.write(c, tmp_path / name) for c, name in ((found, "a"), (compare(*runs), "b")))
+    for a, b in ((one.page, two.page), (one.markdown, two.markdown), (one.pairs, two.pairs)):
+        assert a.read_bytes() == b.read_bytes()
+
+
+def test_a_page_of_many_changes_shows_the_first(
+    found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also without scripts no more rows than the limit are seen, and the page says so; none is left out."""
+    monkeypatch.setattr(pages, "SHOWN", 3)
+    text = pages.write(found, tmp_path / "out").page.read_text()
+    rows = [line for line in text.splitlines() if line.startswith("<tr data-changes=")]
+    assert len(rows) == len(found.changed) > 3
+    assert ["hidden>" in row for row in rows] == [False] * 3 + [True] * (len(rows) - 3)
+    assert f"At most 3 of the {len(rows)} are seen at once" in text

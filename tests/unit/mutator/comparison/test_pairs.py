@@ -1,0 +1,147 @@
+"""Experiments of two runs matched, and what is said to have changed."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.comparison.pairs import Change, Pair, match
+from mutator.comparison.sides import Side, drive, words
+from mutator.model import Experiment, Method, Outcome, Status
+from mutator.outcomes.rows import Row
+from mutator.store.run_folder import RunFolder
+
+Make = Callable[..., Experiment]
+
+
+def row(experiment_id: str = "e", **given: Any) -> Row:
+    """The row of a run that went well and whose fault was masked, but for what is given."""
+    fields: dict[str, Any] = {
+        "experiment_id": experiment_id,
+        **dict.fromkeys(("module", "fault_type", "variant", "value", "unit", "scenario"), "x"),
+        **dict.fromkeys(("method", "trigger"), "x"),
+        "status": Status.OK,
+        "outcome": Outcome.MASKED,
+        "t_activation": 2.0,
+        "t_manifest": None,
+        "checked": ("H1", "H2"),
+        "hazards": (),
+        "alerts": (),
+        "t_alert": None,
+        "reaction_time": None,
+        "detail": "",
+    }
+    return Row(**fields | given)
+
+
+def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side:
+    """A run of these experiments; those `without` have not run."""
+    rows = {e.id: row(e.id) for e in experiments if e not in without}
+    return Side(folder=RunFolder(Path("run")), experiments=experiments, rows=rows)
+
+
+def test_experiments_are_matched_whatever_their_ids(experiment: Make) -> None:
+    """The same fault, scenario and trigger is a pair in another reading, setting, time and seed."""
+    one = experiment(method=Method.RANDOM, trigger="random/C1")
+    other = dataclasses.replace(
+        one,
+        fault=dataclasses.replace(one.fault, reading="as_coded"),
+        trigger=dataclasses.replace(one.trigger, condition="t >= 3.0", armed_after_s=0.0),
+        scenario_digest="e" * 64,
+        seed=8,
+        setting=("pictures",),
+    )
+    assert one.id != other.id
+    [pair] = match(side(one), side(other)).pairs
+    assert (pair.a, pair.b) == (one, other)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"value": 2.0},
+        {"scenario": "S2"},
+        {"trigger": "C2"},
+        {"method": Method.RANDOM},
+        {"spec": "radar/chaff/other"},
+    ],
+    ids=str,
+)
+def test_another_experiment_is_no_partner(experiment: Make, other: dict[str, Any]) -> None:
+    """What differs in fault, value, scenario, method or trigger is told as being in one run only."""
+    a, b = experiment(), experiment(**other)
+    found = match(side(a), side(b))
+    assert (found.pairs, found.only_a, found.only_b) == ((), (a,), (b,))
+
+
+def test_what_has_not_run_is_told(experiment: Make) -> None:
+    """An experiment that one run has planned and not run is in no pair, and named."""
+    a, b = experiment(value=1.0), experiment(value=2.0)
+    found = match(side(a, b, without=(a,)), side(a, b, without=(b,)))
+    assert (found.pairs, found.no_result_a, found.no_result_b) == ((), (a,), (b,))
+
+
+def test_doubles_are_not_guessed_at(experiment: Make) -> None:
+    """Where several experiments have one name, none of them is matched, but for the very same one."""
+    a = experiment()
+    twin = dataclasses.replace(a, seed=8)
+    third = dataclasses.replace(a, seed=9)
+    found = match(side(a, twin), side(third))
+    assert (found.pairs, found.ambiguous) == ((), (a, twin, third))
+    found = match(side(a, twin), side(twin, third))
+    assert [(p.a, p.b) for p in found.pairs] == [(a, third), (twin, twin)]
+    assert match(side(a, twin), side(a, twin)).ambiguous == ()
+
+
+HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 5.0),)}
+LATER = {"outcome": Outcome.HAZARD, "hazards": (("H1", 6.0),)}
+OTHER = {"outcome": Outcome.HAZARD, "hazards": (("H1", 5.0), ("H2", 7.0))}
+ALERT = {"alerts": ("fcw",), "t_alert": 3.0}
+IDLE = {"outcome": Outcome.NOT_ACTIVATED, "t_activation": None}
+CRASH = {"status": Status.CRASHED, "outcome": None}
+TIMEOUT = {"status": Status.TIMEOUT, "outcome": None}
+BROKEN = {"status": Status.HARNESS_ERROR, "outcome": None, "t_activation": None}
+REFUSED = {"status": Status.INVALID_MUTANT, "outcome": None, "t_activation": None}
+SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "changes"),
+    [
+        ({}, {}, ""),
+        ({}, SDC, "worse"),
+        (SDC, {}, "better"),
+        ({}, IDLE, "otherwise"),
+        (IDLE, HAZARD, "new-hazard worse"),
+        (HAZARD, SDC, "hazard-gone better"),
+        (HAZARD, LATER, "later-hazard"),
+        (LATER, HAZARD, "earlier-hazard"),
+        (HAZARD, LATER | {"t_activation": 3.0}, ""),
+        (HAZARD, OTHER, "other-hazard"),
+        (OTHER, HAZARD, ""),
+        (ALERT, {}, "lost-alert"),
+        ({}, ALERT, "new-alert"),
+        (ALERT, ALERT | {"t_alert": 4.0}, ""),
+        ({}, CRASH, "new-crash"),
+        (CRASH, {}, "crash-gone"),
+        (CRASH, TIMEOUT, "otherwise"),
+        (HAZARD, CRASH, "new-crash hazard-gone"),
+        ({}, BROKEN, "harness-error"),
+        (REFUSED, HAZARD, "mended"),
+        (BROKEN, REFUSED, ""),
+    ],
+)
+def test_changes(experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str) -> None:
+    """Every kind of change is told where it is one, and nothing else; times count from the activation."""
+    e = experiment()
+    pair = Pair(e, e, row(**a), row(**b))
+    assert pair.changes == {Change(name) for name in changes.split()}
+    assert pair.usable == (not {"harness-error", "mended"} & set(changes.split()) and a != BROKEN)
+
+
+def test_an_experiment_in_words(experiment: Make) -> None:
+    """An experiment is named by its fault, value, scenario and trigger, each once."""
+    assert words(experiment(value=35)) == "radar/chaff/distance 35 m, S1, guided C1"
+    assert drive(experiment(method=Method.RANDOM, trigger="random/C2")) == "S1, random C2"

@@ -1,0 +1,132 @@
+"""Strict YAML: every mistake is answered with file, line, what was got, what was expected, and a remedy."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import Field
+
+from mutator.config import yaml_files as yamlio
+from mutator.errors import MutatorError
+
+
+class Wheel(yamlio.StrictModel):
+    """A part of the file."""
+
+    radius: float
+    spokes: int = 5
+
+
+class Car(yamlio.StrictModel):
+    """A whole file."""
+
+    name: str
+    wheels: dict[str, Wheel] = Field(default_factory=dict)
+    spare: Wheel | None = None
+    tags: list[str] = Field(default_factory=list)
+
+
+def read(tmp_path: Path, text: str | bytes) -> Car:
+    path = tmp_path / "car.yaml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return yamlio.read(path, Car, "car/2")[0]
+
+
+def test_a_good_file_is_read(tmp_path: Path) -> None:
+    """Types are kept, words that YAML 1.1 takes for booleans or times are words."""
+    car = read(
+        tmp_path, "schema: car/2\nname: on\nwheels: {left: {radius: 3}}\ntags: ['1', 1:30, no, 1_0, 0x1]\n"
+    )
+    assert car.name == "on"
+    assert car.wheels["left"].radius == 3.0
+    assert car.tags == ["1", "1:30", "no", "1_0", "0x1"]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "pieces"),
+    [
+        (
+            "schema: car/2\nname: x\nname: y\n",
+            3,
+            ["'name' stands here a second time", "line 2", "remove one"],
+        ),
+        (
+            "schema: car/2\nname: x\nnmae: y\n",
+            3,
+            ["unknown key 'nmae'", "one of name, wheels", "mean 'name'"],
+        ),
+        (
+            "schema: car/2\nname: x\nwheels:\n  left:\n    radius: 1\n    radios: 2\n",
+            6,
+            ["unknown key 'radios'", "one of radius, spokes", "mean 'radius'"],
+        ),
+        ("schema: car/2\nname: x\nspare: {radius: 1, a: 2}\n", 3, ["unknown key 'a'", "radius, spokes"]),
+        ("schema: car/2\nname: 3\n", 2, ["3 for 'name'", "expected text", "quotes"]),
+        ("schema: car/2\nname: true\n", 2, ["true for 'name'", "expected text"]),
+        (
+            "schema: car/2\nname: x\nspare:\n  radius: 3 m\n",
+            4,
+            ["'3 m' for 'radius'", "expected a number", "without quotes or unit"],
+        ),
+        ("schema: car/2\nname: x\nspare:\n  radius:\n", 4, ["nothing for 'radius'", "a number"]),
+        (
+            "schema: car/2\nname: x\nspare: {radius: 1, spokes: 1.5}\n",
+            3,
+            ["1.5 for 'spokes'", "whole number"],
+        ),
+        ("schema: car/2\nname: x\nspare: [1]\n", 3, ["[1] for 'spare'", "expected a mapping"]),
+        ("schema: car/2\nname: x\ntags: a\n", 3, ["'a' for 'tags'", "expected a list"]),
+        ("schema: car/2\nspare: {radius: 1}\n", 1, ["key 'name' is missing", "add `name: ...`"]),
+        ("schema: car/3\nname: x\n", 1, ["'car/3'", "expected car/2", "newer version"]),
+        ("schema: car/1\nname: x\n", 1, ["'car/1'", "expected car/2", "bring the file up to car/2"]),
+        ("schema: bus/2\nname: x\n", 1, ["'bus/2'", "expected car/2", "start the file with"]),
+        ("name: x\n", 1, ["no schema key", "`schema: car/2`"]),
+        ("schema: car/2\nname: &a x\nspare: *a\n", 2, ["an anchor or alias", "write the value out"]),
+        ("schema: car/2\nname: !!python/object:os.system x\n", 2, ["a tag", "plain values"]),
+        ("schema: car/2\nname: x\n<<: {a: 1}\n", 3, ["unknown key '<<'"]),
+        ("schema: car/2\n1: x\n", 2, ["key '1'", "expected text"]),
+        ("schema: car/2\nname: x\n\ttags: []\n", 3, ["not valid YAML", "tab"]),
+        ("schema: car/2\nname: 'x\n", 3, ["not valid YAML"]),
+        ("schema: car/2\nname: x\n---\nname: y\n", 3, ["not valid YAML", "another document"]),
+    ],
+)
+def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int, pieces: list[str]) -> None:
+    """The error names file and line and shows the offending value."""
+    with pytest.raises(MutatorError) as caught:
+        read(tmp_path, text)
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'car.yaml'}:{line}: ")
+    for piece in pieces:
+        assert piece in message
+
+
+@pytest.mark.parametrize("text", ["", "- a\n", "word\n"])
+def test_a_file_that_is_no_mapping(tmp_path: Path, text: str) -> None:
+    """An empty file, a list or a word is not a mapping of keys."""
+    with pytest.raises(MutatorError, match="expected a mapping of keys to values"):
+        read(tmp_path, text)
+
+
+def test_bytes_that_are_no_text(tmp_path: Path) -> None:
+    """A file that is not UTF-8 is refused with the offset of the bad byte."""
+    with pytest.raises(MutatorError, match="not UTF-8 \\(byte 0xff at offset 6\\)"):
+        read(tmp_path, b"name: \xff\n")
+
+
+def test_a_file_made_to_hurt(tmp_path: Path) -> None:
+    """Very deep nesting and very large files are refused, not suffered."""
+    with pytest.raises(MutatorError):
+        read(tmp_path, "[" * 20_000)
+    with pytest.raises(MutatorError, match="at most 1000000 bytes"):
+        read(tmp_path, "#" * 1_000_001)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    """A missing file is an error of the user, not a traceback."""
+    with pytest.raises(MutatorError, match="cannot be read"):
+        yamlio.load(tmp_path / "none.yaml")
+
+
+def test_several_mistakes_are_counted(tmp_path: Path) -> None:
+    """The first is shown, and how many more there are."""
+    with pytest.raises(MutatorError, match="1 more mistake after this one"):
+        read(tmp_path, "schema: car/2\nname: 1\ntags: 2\n")

@@ -1,0 +1,157 @@
+"""Putting code into loaded modules: every way to hold a function, and every reason to leave it."""
+
+import sys
+import types
+from collections.abc import Callable, Iterator
+from functools import lru_cache, wraps  # noqa: F401 - used in LOADED
+
+import pytest
+
+from mutator.engines.code_swap import _changed
+from mutator.engines.in_target import swap as transplant
+
+LOADED = """
+from functools import lru_cache, wraps
+
+def traced(function):
+    @wraps(function)
+    def call(*arguments):
+        return function(*arguments)
+    return call
+
+def plain():
+    return "old plain"
+
+@traced
+def wrapped():
+    return "old wrapped"
+
+@lru_cache
+def cached(x):
+    return ("old cached", x)
+
+class Car:
+    def method(self):
+        return "old method"
+
+    @staticmethod
+    def static():
+        return "old static"
+
+    @classmethod
+    def of(cls):
+        return "old of"
+
+    @property
+    def speed(self):
+        return self._speed, "old speed"
+
+    @speed.setter
+    def speed(self, value):
+        self._speed = ("old setter", value)
+
+    def __private(self):
+        return "old private"
+
+    def private(self):
+        return self.__private()
+
+    def itself(self):
+        return super().__repr__() and "old itself"
+
+def twice():
+    return "old twice"
+again = types.FunctionType(twice.__code__, globals())
+
+def walk():
+    return work(), "old walk"
+"""
+PROBE = types.SimpleNamespace()
+
+
+@pytest.fixture
+def loaded() -> Iterator[types.ModuleType]:
+    module = types.ModuleType("some_loaded_car")
+    vars(module)["types"] = types
+    exec(compile(LOADED, "car.py", "exec", dont_inherit=True), vars(module))
+    sys.modules[module.__name__] = module
+    yield module
+    del sys.modules[module.__name__]
+
+
+def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.CodeType, types.CodeType]]:
+    """The functions that differ, where a text is replaced in the module's source."""
+    before = compile(LOADED, "car.py", "exec", dont_inherit=True)
+    after = compile(LOADED.replace(old, new), "car.py", "exec", dont_inherit=True)
+    return [
+        ("some_loaded_car", path, one, other) for path, one, other in _changed(before, after, (), "car.py")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("word", "call"),
+    [
+        ("plain", lambda m: m.plain()),
+        ("wrapped", lambda m: m.wrapped()),
+        ("cached", lambda m: m.cached(1)[0]),
+        ("method", lambda m: m.Car().method()),
+        ("static", lambda m: m.Car.static()),
+        ("of", lambda m: m.Car.of()),
+        ("private", lambda m: m.Car().private()),
+        ("itself", lambda m: m.Car().itself()),
+        ("setter", lambda m: setattr(car := m.Car(), "speed", 1) or car.speed[0][0]),
+    ],
+)
+def test_everyone_who_holds_a_function_gets_the_new_code(
+    loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
+) -> None:
+    """Plain, wrapped, cached, static, class, private functions, methods and properties do as their new code,
+    after they ran hot with the old."""
+    kept = call
+    for _ in range(200):
+        if word != "cached":
+            assert kept(loaded) == f"old {word}"
+    transplant.exchange(functions(f'"old {word}"', f'"new {word}"'), PROBE)
+    assert kept(loaded) == f"new {word}"
+    assert vars(loaded)["_fi"] is PROBE
+
+
+def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType) -> None:
+    """A name imported elsewhere and a bound method are the same function as ever, with new code."""
+    plain, method = loaded.plain, loaded.Car().method
+    transplant.exchange(functions('"old plain"', '"new plain"'), PROBE)
+    transplant.exchange(functions('"old method"', '"new method"'), PROBE)
+    assert (plain(), method()) == ("new plain", "new method")
+
+
+def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -> None:
+    """What is not what it was when it was loaded is not exchanged, and neither is anything else."""
+    vars(loaded)["plain"] = lambda: "mine"
+    changed = functions('"old', '"new')
+    with pytest.raises(transplant.Unfit, match=r"some_loaded_car\.plain is not found"):
+        transplant.exchange(changed, PROBE)
+    assert loaded.Car.static() == "old static"
+
+
+def test_a_function_that_there_are_two_of_is_left_alone(loaded: types.ModuleType) -> None:
+    """A code that a second function has, too, is not exchanged in one of them."""
+    with pytest.raises(transplant.Unfit, match="several of it"):
+        transplant.exchange(functions('"old twice"', '"new twice"'), PROBE)
+
+
+def test_a_function_at_work_is_left_alone(loaded: types.ModuleType) -> None:
+    """A function on the stack would go on with its old code, so it is not exchanged."""
+
+    def work() -> None:
+        transplant.exchange(functions('"old walk"', '"new walk"'), PROBE)
+
+    vars(loaded)["work"] = work
+    with pytest.raises(transplant.Unfit, match="at work"):
+        loaded.walk()
+
+
+def test_a_module_that_is_not_loaded(loaded: types.ModuleType) -> None:
+    """A module that was not imported yet cannot be changed."""
+    changed = [("car_nobody_loaded", path, old, new) for _, path, old, new in functions('"old', '"new')]
+    with pytest.raises(transplant.Unfit, match="car_nobody_loaded is not loaded"):
+        transplant.exchange(changed, PROBE)

@@ -1,0 +1,118 @@
+"""Where a mutant leaves its golden run: asked of its own probe."""
+
+import math
+import random
+import types
+
+import pytest
+
+from mutator.engines.activation import Observed, Start, first_active
+from mutator.model import Hold, Trigger
+from mutator.mutants import building as mutant
+from mutator.triggers.conditions import always, at_time
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def probe(toycar: Workspace):
+    """The code of the null mutant's probe with a trigger."""
+    manifest, models = toycar.manifest("toycar"), toycar.fault_models()
+
+    def make(trigger: Trigger) -> types.CodeType:
+        return compile(
+            mutant.build(manifest, models, None, trigger).files[manifest.probe_path], "_fi", "exec"
+        )
+
+    return make
+
+
+GAPS = (50.0, 40.0, 30.0, 20.0, 30.0, 40.0)
+SEEN = Observed(
+    values=tuple((0.05 * i, gap, 10.0, 10.0) for i, gap in enumerate(GAPS)), before=(0, 1, 2, 3, 4, 5)
+)
+
+
+@pytest.mark.parametrize(
+    ("trigger", "step"),
+    [
+        (always(), 0),
+        (always(armed_after_s=0.1), 2),
+        (at_time(0.07), 2),
+        (at_time(9.0), None),
+        (Trigger(name="x", condition="d_rel <= 30.0"), 2),
+        (Trigger(name="x", condition="hwt < 2.5", hold=Hold.FOR, hold_s=0.1), 3),
+        (Trigger(name="x", condition="d_rel <= 30.0", armed_after_s=0.19), 4),
+        (Trigger(name="x", condition="d_rel < 0.0 or rs > 0.0"), None),
+    ],
+)
+def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
+    """The step is the one in which the probe itself first says active; none when it never does."""
+    start = first_active(probe(trigger), SEEN)
+    assert (start.step if start else None) == step
+    if start:
+        assert start.observed == step
+        assert start.t == (SEEN.values[step - 1][0] if step else None)
+
+
+@pytest.mark.parametrize("hold", [Hold.WHILE, Hold.TO_END])
+@pytest.mark.parametrize("armed_after_s", [0.0, 0.1, 1.0])
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "t >= 0.4 and v_ego > 0.0",
+        "hwt < 1.5",
+        "rs > 2.0 and d_rel / v_lead < 3.0",
+        "d_rel < 0.0 or hwt > 9.0",
+    ],
+)
+def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: float, hold: Hold) -> None:
+    """For whatever a car does, standing still among it, the step is the first that `observe` calls active."""
+    draw = random.Random(condition)
+    code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
+    for _ in range(10):
+        truth = [tuple(draw.choice((0.0, draw.uniform(0, 40))) for _ in range(3)) for _ in range(40)]
+        values = tuple((0.05 * i, *others) for i, others in enumerate(truth))
+        module: dict = {}
+        exec(code, module)
+        active = []
+        for one in values:
+            module["observe"](*one)
+            active.append(module["_run"].active)
+        start = first_active(code, Observed(values=values, before=tuple(range(40))))
+        assert (start.step if start else None) == (active.index(True) if True in active else None)
+
+
+def test_several_observations_in_a_step(probe) -> None:
+    """Steps that observe never or often are told apart: the run is left before that of the observation."""
+    seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
+    starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
+    assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
+    assert starts[4] == Start(step=3, observed=3, t=SEEN.values[2][0])
+
+
+@pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
+def test_a_probe_that_is_told_is_as_one_that_saw(probe, trigger: Trigger) -> None:
+    """A probe that is told how much was observed is in the state of one that observed it all."""
+    start = first_active(probe(trigger), SEEN)
+    saw: dict = {}
+    told: dict = {}
+    for module in (saw, told):
+        exec(probe(trigger), module)
+    for values in SEEN.values[: start.observed]:
+        saw["observe"](*values)
+    told["_run"].observed, told["_run"].t = start.observed, start.t
+    state = [
+        {name: getattr(module["_run"], name) for name in module["_Run"].__slots__} for module in (saw, told)
+    ]
+    assert state[0] == state[1]
+    assert not math.isinf(state[0]["t"])
+
+
+def test_probes_of_one_trigger_are_asked_once(probe) -> None:
+    """Mutants that differ in their ids share the answer; what holds later has an answer of its own."""
+    one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
+    assert one != other
+    assert first_active(one, SEEN) is first_active(other, SEEN)
+    assert first_active(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != first_active(
+        one, SEEN
+    )

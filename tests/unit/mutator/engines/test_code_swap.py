@@ -1,0 +1,125 @@
+"""What a mutant changes in a loaded program, and what keeps it from being put there."""
+
+import re
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import pytest
+
+from mutator.engines.code_swap import Exchange, NotExchangeable, exchange
+from mutator.targets.source_tree import SourceTree
+
+PROBE = b"def observe(): pass\n"
+PRISTINE = """
+import math
+from functools import wraps
+
+class Car:
+    def __init__(self, speed):
+        self.speed = speed
+
+    def go(self, x):
+        y = x * math.pi
+        return [value + y for value in (1.0, 2.0)]
+
+    def way(self):
+        yield self.speed
+
+def outer():
+    def inner(x):
+        y = x
+        return y
+    return inner
+
+def reads():
+    return limit
+
+limit = 3.0
+"""
+Changes = Callable[..., Exchange]
+
+
+@pytest.fixture
+def changes() -> Changes:
+    """The exchange for PRISTINE with lines put before those that hold a text."""
+
+    def make(*inserted: tuple[str, str], reads_itself: tuple[str, ...] = ()) -> Exchange:
+        text = "from car import _fi  # fi:probe\n" + PRISTINE
+        for before, lines in inserted:
+            (line,) = re.findall(rf"^.*{re.escape(before)}.*\n", text, re.MULTILINE)
+            indent = line[: len(line) - len(line.lstrip())]
+            new = "".join(f"{indent}{one}  # fi:abc\n" for one in lines.split("\n"))
+            text = text.replace(line, new + line)
+        tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
+        manifest = SimpleNamespace(probe_path="car/_fi.py", reads_itself=reads_itself, tree=tree)
+        return exchange(manifest, {"car/car.py": text.encode(), "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+
+    return make
+
+
+GUARDED = 'if _fi.active("abc"):\n    y = y + 1.0'
+
+
+def test_functions_that_changed_are_found(changes: Changes) -> None:
+    """Each changed function is named by module and path, with the code it has and the code it gets."""
+    found = changes(
+        ("return [value", GUARDED), ("self.speed = speed", 'if not _fi.active("abc"):\n    speed = 0.0')
+    )
+    assert [(f.module, f.path) for f in found.functions] == [
+        ("car.car", ("Car", "__init__")),
+        ("car.car", ("Car", "go")),
+    ]
+    go = found.functions[1]
+    assert (go.old.co_filename, go.new.co_filename) == ("/tree/car/car.py", "/tree/car/car.py")
+    assert "_fi" in go.new.co_names and "_fi" not in go.old.co_names
+    assert found.imports == ()
+
+
+def test_imports_of_injected_lines_are_told(changes: Changes) -> None:
+    """Modules that injected lines import can be loaded beforehand."""
+    lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
+    assert changes(("return [value", lines)).imports == ("car.rain",)
+
+
+@pytest.mark.parametrize(
+    ("before", "lines", "why"),
+    [
+        ("return [value", "y = y + 1.0", "does not ask the probe first"),
+        ("return [value", 'if _fi.active("abc") or y:\n    y = 1.0', "does not ask the probe first"),
+        ("return [value", GUARDED + "\nelse:\n    y = 2.0", "does not ask the probe first"),
+        ("return [value", GUARDED + "\ny = 2.0", "does not ask the probe first"),
+        ("yield self.speed", 'if _fi.active("abc"):\n    self.speed = 0.0', "may be suspended"),
+        ("return y", GUARDED, "has a function in it that is changed"),
+        ("return limit", 'if _fi.active("abc"):\n    limit = 0.0', "reads 'limit' from outside"),
+        ("limit = 3.0", 'if _fi.active("abc"):\n    limit = 0.0', None),
+    ],
+)
+def test_what_cannot_be_exchanged(changes: Changes, before: str, lines: str, why: str | None) -> None:
+    """A statement that acts without its trigger, a generator, an inner function, a hidden name: each is
+    told; nothing is exchanged for what stands outside functions."""
+    if why is None:
+        assert changes((before, lines)).functions == ()
+        return
+    with pytest.raises(NotExchangeable, match=re.escape(why)):
+        changes((before, lines))
+
+
+def test_files_that_are_read_by_the_run(changes: Changes) -> None:
+    """A mutant of a file that the run digests must be on the disk."""
+    with pytest.raises(NotExchangeable, match="read by the run itself"):
+        changes(reads_itself=("car/*.py",))
+
+
+def test_more_than_inserted_lines(changes: Changes) -> None:
+    """A file that is another one altogether is not exchanged."""
+    manifest = SimpleNamespace(
+        probe_path="car/_fi.py",
+        reads_itself=(),
+        tree=SimpleNamespace(files={"car/car.py": b"x = 1\n"}),
+    )
+    with pytest.raises(NotExchangeable, match="more than inserted lines"):
+        exchange(manifest, {"car/car.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+    with pytest.raises(NotExchangeable, match="new file"):
+        exchange(manifest, {"car/new.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+    with pytest.raises(NotExchangeable, match="no probe"):
+        exchange(manifest, {"car/car.py": b"x = 1\n"}, "/tree")  # type: ignore[arg-type]

@@ -1,0 +1,153 @@
+"""The fork engine: its server's processes, where they start, and what a kill leaves."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.activation import Observed
+from mutator.engines.reference import How
+from mutator.model import Status, Trigger
+from mutator.triggers.conditions import at_time
+from mutator.workspace import Workspace
+
+from ..fork_on_toy import LIMITS, Edit, Fork
+
+
+def gone(pid: int) -> bool:
+    """Whether the process is gone within some seconds."""
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
+    """Every process that forks has one OS thread; when the engine is closed, none is left, and no scratch."""
+    for time_s in (2.0, 4.0, 3.0):
+        assert fork.run(fork.job(at_time(time_s))).how is How.FORK
+    pids = fork.processes()
+    assert len(pids) >= 3, "the server, a golden run at its start, and some further on"
+    for pid in pids:
+        status = Path(f"/proc/{pid}/status").read_text()
+        assert "\nThreads:\t1\n" in status
+    fork.close()
+    assert all(map(gone, pids))
+    assert [path.name for path in (fork.folder / "work").iterdir() if "server" in path.name] == []
+
+
+def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
+    """The golden run drives the steps before the activation, and the waiting processes are few."""
+    starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
+    assert starts == [40, 41, 90, 10, 100, 0]
+    for step in range(3, 100, 9):
+        fork.run(fork.job(at_time(0.05 * step)))
+    assert len(fork.processes()) <= 10
+
+
+def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
+    """What a run imports on its way to its end is found, and is there in each process that waits."""
+    fork.run(fork.job(at_time(2.0)))
+    (seen,) = fork.engine._seen.values()
+    assert isinstance(seen, Observed)
+    assert "zipfile" in seen.libraries  # with which it writes its trace
+    assert not any(name.startswith("toycar") for name in seen.libraries)
+    assert all(set(seen.libraries) <= waiting.loaded for waiting in fork.pool._waiting if waiting.step)
+
+
+def test_a_never_active_fault_is_not_run(fork: Fork) -> None:
+    """An experiment whose trigger never holds has golden's files as its own, and costs nothing."""
+    execution = fork.run(fork.job(at_time(100.0)))
+    assert (execution.how, execution.status, execution.cpu_s) == (How.GOLDEN, Status.OK, 0.0)
+    assert execution.out == fork.golden
+
+
+def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
+    """Killing server or waiting processes is told as the harness's failure; the next job has new ones."""
+    job = fork.job(at_time(2.0))
+    for place in (0, -1):  # the first process, and one that waits
+        assert fork.run(job).status is Status.OK
+        victims = fork.processes()
+        os.kill(victims[place], signal.SIGKILL)
+        assert gone(victims[place])
+        time.sleep(0.1)
+        execution = fork.run(job)
+        if execution.status is Status.OK:  # a process that waits had been left in peace
+            assert place == 0
+            execution = fork.run(fork.job(Trigger(name="x", condition="t >= 0.01")))
+        assert execution.status is Status.HARNESS_ERROR
+        assert "fork server" in execution.detail
+        assert fork.run(job).status is Status.OK
+        assert all(map(gone, victims)), "nothing is left of the server that was killed"
+
+
+@pytest.mark.slow
+def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
+    """All that waits ends when the first process is killed."""
+    fork.run(fork.job(at_time(2.0)))
+    first, *waiting = fork.processes()
+    assert first == fork.pool._process.pid
+    assert waiting
+    os.kill(first, signal.SIGKILL)
+    assert all(map(gone, waiting))
+
+
+ENGINE = """
+import sys, time
+from pathlib import Path
+from mutator.workspace import Workspace
+sys.path.insert(0, sys.argv[4])
+from fork_on_toy import Fork
+from mutator.triggers.conditions import at_time
+toy = Workspace(library=Path(sys.argv[1]), templates=Path(sys.argv[2]))
+fork = Fork(toy, Path(sys.argv[3]))
+print(fork.run(fork.job(at_time(2.0))).how, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.slow
+def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> None:
+    """Killing the process of the engine ends the server and all that waits."""
+    arguments = [toycar.library, toycar.templates, tmp_path, Path(__file__).parents[1]]
+    engine = subprocess.Popen(
+        [sys.executable, "-c", ENGINE, *map(str, arguments)], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert engine.stdout is not None
+        assert engine.stdout.readline() == "fork\n"
+        pids = [pid for pid in Fork(toycar, tmp_path).processes() if pid != engine.pid]
+        assert len(pids) >= 2
+    finally:
+        engine.kill()
+        engine.communicate()
+    assert all(map(gone, pids))
+
+
+@pytest.mark.slow
+def test_the_cpu_limit_is_a_childs_own(fork: Fork, edit: Edit) -> None:
+    """A child's limit of CPU time counts from its fork, not what the processes before it took."""
+    edit(
+        "tree/toycar/world.py",
+        "        now = self.frame",
+        "        sum(range(1_500_000))\n        now = self.frame",
+    )
+    assert fork.run(fork.job(at_time(5.5))).how is How.FORK
+    fork.pool.close()
+    fork.engine._pool, fork.engine._limits = None, replace(LIMITS, cpu_s=1)
+    execution = fork.run(fork.job(at_time(5.5)))
+    assert (execution.how, execution.status) == (How.FORK, Status.OK)
+    execution = fork.run(fork.job(at_time(0.5)))
+    assert (execution.how, execution.status) == (How.FORK, Status.TIMEOUT)
+    assert execution.detail == "CPU time limit of 1 s"

@@ -1,0 +1,125 @@
+"""What the fork engine leaves to the reference engine, and why it says so."""
+
+from dataclasses import replace
+
+import pytest
+
+from mutator.engines.reference import How
+from mutator.model import Status
+from mutator.triggers.conditions import always, at_time
+
+from ..fork_on_toy import LIMITS, Edit, Fork
+
+
+def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """A target that starts a thread when it is loaded is run by the reference engine, and told why."""
+    edit(
+        "tree/toycar/go.py",
+        "class Drive:",
+        "import threading\nthreading.Thread(target=threading.Event().wait, daemon=True).start()\n"
+        "class Drive:",
+    )
+    execution = fork.run(fork.job(at_time(2.0)))
+    assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+    assert "2 threads" in execution.why
+
+
+def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
+    """A target that cannot be imported outside its command is run by the reference engine, and told why."""
+    edit(
+        "tree/toycar/go.py",
+        "class Drive:",
+        "if __name__ != '__main__':\n    raise ValueError(3)\n\n\nclass Drive:",
+    )
+    execution = fork.run(fork.job(at_time(2.0)))
+    assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+    assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
+
+
+@pytest.mark.slow
+def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> None:
+    """A stepwise golden run with other bytes than the command's disqualifies the engine for it."""
+    edit(
+        "tree/toycar/go.py",
+        "    drive = begin(arguments)\n",
+        "    drive = begin(arguments)\n    drive.steps -= 1\n",
+    )
+    execution = fork.run(fork.job(at_time(2.0)))
+    assert execution.how is How.REFERENCE
+    assert "log.npz is another one" in execution.why
+
+
+@pytest.mark.slow
+def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
+    """A run that leaves a thread behind would not have ended by itself: the reference engine says so."""
+    fork.limits = replace(LIMITS, wall_s=3)
+    edit(
+        "tree/toycar/sensing.py",
+        "        self.publish((gap",
+        "        if gap > 45.0:\n            import threading, time\n"
+        "            threading.Thread(target=time.sleep, args=(100,)).start()\n        self.publish((gap",
+    )
+    execution = fork.run(fork.job(at_time(5.9)))
+    assert (execution.status, execution.how) == (Status.TIMEOUT, How.REFERENCE)
+    assert execution.why == "it leaves threads behind"
+
+
+@pytest.mark.slow
+def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
+    """A run that writes into its tree does not reach the next one, and the reference engine judges it."""
+    edit(
+        "tree/toycar/sensing.py",
+        "        self.publish((gap",
+        "        if gap > 45.0:\n            open(__file__, 'a').write('x')\n        self.publish((gap",
+    )
+    execution = fork.run(fork.job(at_time(5.9)))
+    assert (execution.status, execution.how) == (Status.HARNESS_ERROR, How.REFERENCE)
+    assert execution.why == "it writes into its own tree"
+    assert "toycar/sensing.py in the tree that ran" in execution.detail
+
+
+def test_what_cannot_be_exchanged_is_told(fork: Fork, edit: Edit) -> None:
+    """A fault in a function that is suspended between steps is run by the reference engine, and told why."""
+    edit(
+        "tree/toycar/sensing.py",
+        "    def publish(self",
+        "    def walk(self):\n        gap = 0.0\n        yield gap\n\n    def publish(self",
+    )
+    execution = fork.run(fork.job(at_time(2.0), function="Sensor.walk"))
+    assert (execution.status, execution.how) == (Status.OK, How.REFERENCE)
+    assert execution.why == "Sensor.walk in toycar/sensing.py may be suspended between two steps"
+
+
+@pytest.mark.slow
+def test_a_golden_run_that_does_not_end_well(fork: Fork, edit: Edit) -> None:
+    """Where the stepwise golden run breaks down, the reference engine runs, and it is told why."""
+    edit(
+        "tree/toycar/go.py",
+        "    return Drive(case)",
+        "    return Drive(case if __name__ == '__main__' else {})",
+    )
+    execution = fork.run(fork.job(at_time(2.0)))
+    assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+    assert execution.why.startswith("its golden run cannot be driven step by step: KeyError: ")
+
+
+EARLY = """
+        self.steps = int(case["steps"])
+        self.look()
+
+    def look(self):
+        world = self.world
+        now = -1.0
+        self.seen = now
+"""
+
+
+def test_a_target_that_observes_before_its_first_step(fork: Fork, edit: Edit) -> None:
+    """What is observed while a run is begun no fork of it has seen: the reference engine runs, whether the
+    fault is active then or later, and it is told why."""
+    edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
+    edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
+    for trigger in (always(armed_after_s=-2.0), at_time(2.0)):
+        execution = fork.run(fork.job(trigger))
+        assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+        assert execution.why == "it observes before its first step"

@@ -1,0 +1,321 @@
+"""The reference engine: isolation, limits, and how each way to end is named."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator._common.files import DiskFull
+from mutator.campaigns.campaign_files import Limits
+from mutator.engines.reference import Execution, Job, ReferenceEngine, prepare_base
+from mutator.model import Status
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
+Run = Callable[..., Execution]
+
+
+@pytest.fixture
+def manifest(toycar: Workspace) -> TargetManifest:
+    return toycar.manifest("toycar")
+
+
+@pytest.fixture
+def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
+    """Runs scenario A on a tree with changed files; `limits` as given."""
+    work = tmp_path / "work"
+    work.mkdir()
+    base = prepare_base(manifest, tmp_path / "base")
+
+    def execute(files: Mapping[str, str] | None = None, limits: Limits = LIMITS, **job: object) -> Execution:
+        engine = ReferenceEngine(manifest, base, work, limits)
+        changed = {name: text.encode() for name, text in (files or {}).items()}
+        wanted = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=changed, **job)  # type: ignore[arg-type]
+        shutil.rmtree(work / "job", ignore_errors=True)
+        return engine.execute(wanted, work / "job")
+
+    return execute
+
+
+def entry(body: str) -> dict[str, str]:
+    """The target with another entry module."""
+    return {"toycar/go.py": body}
+
+
+def test_a_good_run_leaves_its_files(run: Run) -> None:
+    """A run that ends well has trace and record in its output folder, and its cost is known."""
+    execution = run()
+    assert (execution.status, execution.detail) == (Status.OK, "")
+    assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
+    assert 0.0 < execution.cpu_s < 20.0
+    assert execution.probe is None
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "detail"),
+    [
+        ("raise ValueError('no')", Status.CRASHED, "ValueError: no (toycar/go.py:1)"),
+        ("raise ValueError", Status.CRASHED, "ValueError (toycar/go.py:1)"),
+        ("import sys; sys.exit(3)", Status.CRASHED, "exit status 3 (toycar/go.py:1)"),
+        ("raise SystemExit", Status.OK, ""),
+        ("raise KeyboardInterrupt", Status.CRASHED, "KeyboardInterrupt (toycar/go.py:1)"),
+        (
+            "raise ValueError(object())",
+            Status.CRASHED,
+            "ValueError: <object object at 0x...> (toycar/go.py:1)",
+        ),
+        (r"raise ValueError('\udc80 \n')", Status.CRASHED, r"ValueError: \udc80 \n (toycar/go.py:1)"),
+        ("import os; os._exit(0)", Status.CRASHED, "left with status 0 without a report"),
+        ("import ctypes; ctypes.string_at(0)", Status.CRASHED, "killed by SIGSEGV"),
+        ("import os; os.abort()", Status.CRASHED, "killed by SIGABRT"),
+        ("x = bytearray(1 << 40)", Status.CRASHED, "MemoryError (toycar/go.py:1)"),
+        ("import os; os.kill(os.getpid(), 9)", Status.HARNESS_ERROR, "killed from outside by SIGKILL"),
+        ("import os; os.kill(os.getpid(), 15)", Status.HARNESS_ERROR, "killed from outside by SIGTERM"),
+    ],
+)
+def test_ways_to_end(run: Run, body: str, status: Status, detail: str) -> None:
+    """Each way to end badly has its status and words that are the same each time."""
+    execution = run(entry(body))
+    assert (execution.status, execution.detail) == (status, detail)
+
+
+def test_a_target_that_does_not_parse_crashes(run: Run) -> None:
+    """A syntax error in what is run is the tree's failure, told with its place."""
+    execution = run(entry("if :"))
+    assert execution.status is Status.CRASHED
+    assert "go.py" in execution.detail
+
+
+def test_endless_loop_hits_the_cpu_limit(run: Run) -> None:
+    """A loop without end is a timeout after the CPU time it was given."""
+    execution = run(entry("while True: pass"), replace(LIMITS, cpu_s=1))
+    assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
+
+
+def test_who_ignores_the_cpu_limit_is_killed(run: Run) -> None:
+    """Ignoring the signal of the CPU limit does not help."""
+    body = "import signal; signal.signal(signal.SIGXCPU, signal.SIG_IGN)\nwhile True: pass"
+    execution = run(entry(body), replace(LIMITS, cpu_s=1))
+    assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
+
+
+def test_sleeping_hits_the_wall_limit(run: Run) -> None:
+    """A run that waits for ever is a timeout after the wall time it was given."""
+    execution = run(entry("import time; time.sleep(100)"), replace(LIMITS, wall_s=1))
+    assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 1 s")
+
+
+def test_who_does_not_end_after_its_work_is_a_timeout(run: Run) -> None:
+    """A run that did its work but leaves a thread behind, and so never ends, did not end well."""
+    body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
+    execution = run(entry(body), replace(LIMITS, wall_s=2))
+    assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
+
+
+def test_steps_are_limited(run: Run) -> None:
+    """More observed steps than allowed are a timeout, the same on every machine."""
+    probe = (
+        "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
+        "def limit(n): global most; most = n\n"
+        "def report(): return {'mutant': MUTANT, 'triggered': None, 'injections': {}}\n"
+        "def observe(n):\n    if n > most: raise StepLimit\n"
+    )
+    body = "from toycar import _fi\nfor n in range(1000): _fi.observe(n)"
+    files = {"toycar/_fi.py": probe, **entry(body)}
+    execution = run(files, replace(LIMITS, steps=100), mutant="m")
+    assert (execution.status, execution.detail) == (Status.TIMEOUT, "limit of 100 simulation steps")
+    assert run(files, replace(LIMITS, steps=2000), mutant="m").status is Status.OK
+    other = run(files, replace(LIMITS, steps=2000), mutant="another")
+    assert other.status is Status.HARNESS_ERROR
+    assert "not the one of this mutant" in other.detail
+
+
+def test_a_huge_file_is_refused(run: Run) -> None:
+    """A run cannot fill the disk with one file."""
+    body = "f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()"
+    execution = run(entry(body))
+    assert execution.status is Status.CRASHED
+    assert "File too large" in execution.detail
+
+
+def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManifest) -> None:
+    """A run that finds the package anywhere but in its own tree is a harness error."""
+    body = (
+        f"import sys; sys.path.insert(0, {str(manifest.root)!r})\n"
+        "for name in [n for n in sys.modules if n.startswith('toycar')]: del sys.modules[name]\n"
+        "import toycar.world\n"
+    )
+    execution = run(entry(body))
+    assert execution.status is Status.HARNESS_ERROR
+    assert "imported from" in execution.detail
+
+
+def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
+    """A run whose files were other than the job's is a harness error, not a result."""
+    body = "import toycar.world, pathlib\npathlib.Path(toycar.world.__file__).write_text('STEP = 1')"
+    execution = run(entry(body))
+    assert execution.status is Status.HARNESS_ERROR
+    assert "toycar/world.py" in execution.detail
+    assert run().status is Status.OK, "the next run has its own tree again"
+
+
+def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
+    """A source file that belongs to no tree of this job makes a harness error; a cache of data does not."""
+    body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
+    execution = run(entry(body))
+    assert execution.status is Status.HARNESS_ERROR
+    assert "toycar/left.py" in execution.detail
+    assert run(entry(body.replace("left.py", "left.json"))).status is Status.OK
+
+
+def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
+    """A changed file of the same size and time as the original runs changed."""
+    pristine = manifest.tree.files["toycar/world.py"].decode()
+    changed = pristine.replace("STEP = 0.05", "STEP = 0.06")
+    body = "from toycar.world import STEP\nraise ValueError(STEP)"
+    execution = run({"toycar/world.py": changed, **entry(body)})
+    assert execution.detail.startswith("ValueError: 0.06")
+    cached = list((tmp_path / "base" / "toycar" / "__pycache__").glob("world.*.pyc"))
+    assert cached, "the pristine tree has bytecode that could have been stale"
+    assert int.from_bytes(cached[0].read_bytes()[4:8], "little") == 0b11, "checked by hash"
+
+
+def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PYTHONPATH and the like do not reach a run; the hash seed is the job's; threads are one."""
+    monkeypatch.setenv("PYTHONPATH", "/nowhere")
+    monkeypatch.setenv("MUTATOR_SECRET", "x")
+    body = (
+        "import os, sys\n"
+        "assert 'MUTATOR_SECRET' not in os.environ and '/nowhere' not in sys.path\n"
+        "raise ValueError(os.environ['PYTHONHASHSEED'], os.environ['OMP_NUM_THREADS'])"
+    )
+    assert run(entry(body), hash_seed=42).detail.startswith("ValueError: ('42', '1')")
+
+
+def test_what_a_run_printed_is_kept(run: Run) -> None:
+    """The end of what a run printed is at hand for people."""
+    assert "hello" in run(entry("print('hello')")).log
+
+
+def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
+    """What a run left behind in the background is killed when the run is over."""
+    note = tmp_path / "pid"
+    body = (
+        "import subprocess, pathlib\n"
+        f"pathlib.Path({str(note)!r}).write_text(str(subprocess.Popen(['sleep', '60']).pid))"
+    )
+    assert run(entry(body)).status is Status.OK
+    assert ended(int(note.read_text()))
+
+
+def ended(pid: int) -> bool:
+    """Whether the process is gone, or gone but for being reaped, within some seconds."""
+    deadline = time.monotonic() + 5.0
+    while time.monotonic() < deadline:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.05)
+    return False
+
+
+SLEEPER = """
+import sys
+from pathlib import Path
+from mutator.campaigns.campaign_files import Limits
+from mutator.engines.reference import Job, ReferenceEngine
+from mutator.workspace import Workspace
+library, templates, folder, note = map(Path, sys.argv[1:])
+toycar = Workspace(library=library, templates=templates)
+engine = ReferenceEngine(toycar.manifest("toycar"), folder / "base", folder / "work", Limits())
+body = f"import os, pathlib, time; pathlib.Path({str(note)!r}).write_text(str(os.getpid())); time.sleep(60)"
+job = Job(name="x", scenario=toycar.scenario("A"), seed=1, files={"toycar/go.py": body.encode()})
+engine.execute(job, folder / "work" / "x")
+"""
+
+
+def test_a_run_dies_with_its_engine(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
+    """Killing the process of the engine kills the run: no orphan goes on computing."""
+    note = tmp_path / "pid"
+    (tmp_path / "work").mkdir()
+    prepare_base(manifest, tmp_path / "base")
+    arguments = [toycar.library, toycar.templates, tmp_path, note]
+    engine = subprocess.Popen([sys.executable, "-c", SLEEPER, *map(str, arguments)])
+    try:
+        deadline = time.monotonic() + 30.0
+        while not (note.exists() and note.read_text()) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        pid = int(note.read_text())
+        assert not ended_now(pid)
+    finally:
+        engine.send_signal(signal.SIGKILL)
+        engine.wait()
+    assert ended(pid)
+
+
+def ended_now(pid: int) -> bool:
+    return not Path(f"/proc/{pid}").exists()
+
+
+def test_a_full_disk_is_not_the_targets_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that fails for want of room raises DiskFull instead of being a crash."""
+    with pytest.raises(DiskFull):
+        run(entry("import errno; raise OSError(errno.ENOSPC, 'No space left on device')"))
+    real = os.statvfs
+
+    def full(path: object) -> os.statvfs_result:
+        fields = list(real(path))  # type: ignore[call-overload]
+        fields[4] = 0
+        return os.statvfs_result(fields)
+
+    monkeypatch.setattr(os, "statvfs", full)
+    with pytest.raises(DiskFull):
+        run(entry("raise SystemExit('cannot write')"))
+    assert run().status is Status.OK
+
+
+def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
+    """`run` yields each job with its execution and leaves no scratch behind."""
+    work = tmp_path / "work"
+    work.mkdir()
+    engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
+    jobs = [Job(name=name, scenario=toycar.scenario(name), seed=1) for name in ("A", "B")]
+    names = []
+    for job, execution in engine.run(jobs):
+        assert (execution.out / "said.json").is_file()
+        names.append(job.name)
+    assert names == ["A", "B"]
+    assert list(work.iterdir()) == []
+
+
+def test_engines_run_side_by_side(
+    run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
+) -> None:
+    """Two threads may use one engine at once, each in a folder of its own."""
+    work = tmp_path / "side"
+    work.mkdir()
+    engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
+    found: list[Status] = []
+
+    def one(name: str) -> None:
+        job = Job(name=name, scenario=toycar.scenario("A"), seed=1)
+        found.append(engine.execute(job, work / name).status)
+
+    threads = [threading.Thread(target=one, args=(name,)) for name in ("x", "y")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [Status.OK, Status.OK]

@@ -1,0 +1,168 @@
+"""From executions to records: what is believed, and what is a harness error."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mutator.campaigns.plans import make_plan
+from mutator.engines.reference import Execution, Job
+from mutator.execution.runner import Goldens, Runner, activation_of
+from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.workspace import Workspace
+
+T = np.arange(20) * 0.05
+Outputs = dict[str, Any]
+
+
+class PlayedEngine:
+    """An engine that runs nothing: every job leaves the outputs it is given."""
+
+    def __init__(self, out: Path, status: Status, outputs: Outputs) -> None:
+        self.out = out
+        self.status = status
+        self.outputs = outputs
+
+    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+        for job in jobs:
+            self.out.mkdir(exist_ok=True)
+            write(self.out, **self.outputs.get("trace", {}))
+            if "said" in self.outputs:
+                (self.out / "said.json").write_text(json.dumps(self.outputs["said"]))
+            probe = {"mutant": job.mutant, "triggered": None, "injections": self.outputs.get("ran", {})}
+            yield (
+                job,
+                Execution(
+                    status=self.status,
+                    detail="" if self.status is Status.OK else "why",
+                    out=self.out,
+                    probe=probe,
+                    cpu_s=1.0,
+                    wall_s=2.0,
+                ),
+            )
+
+
+def write(out: Path, **channels: np.ndarray) -> None:
+    if channels or not out.name.startswith("faulty"):
+        quiet = {name: np.zeros(20) for name in ("gas", "brake", "wheel_turn")}
+        np.savez(out / "log.npz", **{"time": T, **quiet, **channels})
+
+
+@pytest.fixture
+def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
+    """The record of an experiment whose run left the given outputs."""
+    manifest = toycar.manifest("toycar")
+    experiment = make_plan(toycar, "small", only='fault_type == "distance"', limit=1).experiments[0]
+    (tmp_path / "golden").mkdir()
+    write(tmp_path / "golden")
+
+    def judge(status: Status = Status.OK, **outputs: Any) -> Record:
+        outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}} | outputs
+        engine = PlayedEngine(tmp_path / "faulty", status, outputs)
+        goldens = Goldens(manifest, lambda scenario, changes: tmp_path / "golden")
+        runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
+        (finished,) = runner.run([experiment])
+        assert finished.experiment == experiment
+        assert finished.record.experiment_id == experiment.id
+        assert finished.mutant is not None
+        assert finished.record.tree == finished.mutant.tree_digest
+        return finished.record
+
+    return judge
+
+
+def stepped(row: int, height: float = 1.0) -> np.ndarray:
+    """Zeros, and `height` from a row on."""
+    return np.where(np.arange(20) >= row, height, 0.0)
+
+
+RAN = {"a": {"first": 0.25, "last": 0.5, "count": 3}, "b": {"first": 0.2, "last": 0.4, "count": 2}}
+NEVER = {"a": {"first": None, "last": None, "count": 0}}
+
+
+def test_masked(judged: Callable[..., Record]) -> None:
+    """Activated without any difference: masked, with the activation of all injections together."""
+    record = judged(ran=RAN)
+    assert (record.status, record.outcome) == (Status.OK, Outcome.MASKED)
+    assert record.activation == Activation(first=0.2, last=0.5, count=5)
+    assert record.max_dev == (("gas", 0.0), ("brake", 0.0), ("wheel_turn", 0.0))
+
+
+def test_sdc_from_the_moment_of_activation(judged: Callable[..., Record]) -> None:
+    """A difference in the very step of the activation is the fault's."""
+    record = judged(ran=RAN, trace={"brake": stepped(4, 0.5)})
+    assert (record.outcome, record.t_manifest) == (Outcome.SDC, T[4])
+    assert dict(record.max_dev)["brake"] == 0.5
+
+
+def test_hazards_and_alerts(judged: Callable[..., Record]) -> None:
+    """Hazards and counted alerts at or after the activation are kept, in the order of time."""
+    said = {
+        "hazards": {"H1": 0.9, "H3": 0.3, "TOO_FAST": None},
+        "alert_events": [{"name": "brake_hard", "t": t} for t in (0.1, 0.6, 0.7)] + [{"name": "x", "t": 0.5}],
+    }
+    record = judged(ran=RAN, trace={"gas": stepped(5)}, said=said)
+    assert record.outcome is Outcome.HAZARD
+    assert record.hazards == (("H3", 0.3), ("H1", 0.9))
+    assert record.alerts == (("brake_hard", 0.6),)
+
+
+def test_never_active(judged: Callable[..., Record]) -> None:
+    """A mutant that never ran its fault and equals golden is not_activated."""
+    assert judged(ran=NEVER).outcome is Outcome.NOT_ACTIVATED
+
+
+@pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
+def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], ran: dict, told: str) -> None:
+    """A difference before the activation, or without one, is the harness's failure, not a result."""
+    record = judged(ran=ran, trace={"gas": stepped(3)})
+    assert (record.status, record.outcome) == (Status.HARNESS_ERROR, None)
+    assert told in record.detail
+
+
+@pytest.mark.parametrize("outputs", [{"trace": {}}, {"said": []}, {"trace": {"gas": np.zeros(3)}}])
+def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs) -> None:
+    """A run that ended without a usable trace and record broke down, if its fault was active; if it was not,
+    the harness did."""
+    record = judged(ran=RAN, **outputs)
+    assert (record.status, record.outcome) == (Status.CRASHED, None)
+    assert record.activation is not None
+    assert record.detail.startswith(("log.npz: ", "said.json: "))
+    assert "/" not in record.detail
+    assert judged(ran=NEVER, **outputs).status is Status.HARNESS_ERROR
+
+
+@pytest.mark.parametrize(
+    ("status", "kept"), [(Status.CRASHED, True), (Status.TIMEOUT, False), (Status.HARNESS_ERROR, False)]
+)
+def test_other_statuses(judged: Callable[..., Record], status: Status, kept: bool) -> None:
+    """A crash keeps its activation; a time-out does not, since its count depends on the machine's speed."""
+    record = judged(status, ran=RAN)
+    assert (record.status, record.outcome, record.detail) == (status, None, "why")
+    assert (record.activation is not None) == kept
+
+
+def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Path) -> None:
+    """A mutant that does not compile is invalid, an anchor that is gone a harness error; the others run."""
+    manifest = toycar.manifest("toycar")
+    experiments: tuple[Experiment, ...] = make_plan(toycar, "hostile").experiments
+    engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {})
+    goldens = Goldens(manifest, lambda scenario, changes: tmp_path)
+    runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
+    records = {f.experiment.fault.fault_type: f.record for f in runner.run(experiments)}
+    assert len(records) == len(experiments)
+    assert records.pop("unsound").status is Status.INVALID_MUTANT
+    assert {record.status for record in records.values()} == {Status.CRASHED}
+    del manifest.tree.files["toycar/sensing.py"]  # type: ignore[attr-defined]
+    statuses = [f.record.status for f in runner.run(experiments[:1])]
+    assert statuses == [Status.HARNESS_ERROR]
+
+
+@pytest.mark.parametrize("report", [{}, {"injections": {}}, {"injections": NEVER}, {"injections": None}])
+def test_no_activation(report: dict) -> None:
+    """Reports without an executed injection have no activation."""
+    assert activation_of(report) is None

@@ -1,0 +1,119 @@
+"""Fault models: templates, schemas, and examples that are tests."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import SnippetKind, load_fault_models
+from mutator.verification.library import check_examples, run_example
+from mutator.workspace import Workspace
+
+NAMES = [
+    "bit_flip",
+    "delay",
+    "drift",
+    "ghost_object",
+    "image_effect",
+    "noise",
+    "offset",
+    "omission",
+    "scale",
+    "stuck",
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, clone: Workspace) -> Path:
+    """A copy of the templates that a test may break."""
+    return Path(shutil.copytree(clone.templates, tmp_path / "templates"))
+
+
+def broken(folder: Path, name: str, old: str, new: str) -> str:
+    path = folder / name
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        load_fault_models(folder)
+    return str(caught.value).replace(f"{path}:", "")
+
+
+def test_the_models_that_ship(clone: Workspace) -> None:
+    """Nine models, one of them a guard, each with at least one example."""
+    models = clone.fault_models()
+    assert list(models.models) == NAMES
+    assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission"]
+    assert all(m.examples and m.about for m in models)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_examples_hold(clone: Workspace, name: str) -> None:
+    """Each model's examples give exactly what they say, and un-splice."""
+    models = clone.fault_models()
+    model = models.get(name)
+    for example in model.examples:
+        assert run_example(model, models, example) == example.after
+
+
+def test_an_example_that_does_not_hold(folder: Path) -> None:
+    """A template that gives something else than its example says is a problem with file and line."""
+    path = folder / "scale.py.j2"
+    path.write_text(path.read_text().replace(" * ", " / "))
+    (problem,) = check_examples(load_fault_models(folder))
+    assert problem.where == str(folder / "scale.yaml") and problem.line == 9
+    assert "self.yaw_rate / -0.5" in str(problem) and "self.yaw_rate * -0.5" in str(problem)
+
+
+def test_an_example_that_fails(folder: Path) -> None:
+    """A template that does not parse is a problem of its examples, not a traceback."""
+    (folder / "scale.py.j2").write_text("if {{ target:\n")
+    (problem,) = check_examples(load_fault_models(folder))
+    assert "scale.yaml:9: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
+        problem
+    )
+
+
+def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
+    """Whatever a mutant's text depends on changes the digest."""
+    before = load_fault_models(folder).digest
+    for name in ("offset.py.j2", "_fi.py.j2"):
+        (folder / name).write_text((folder / name).read_text() + "\n")
+        after = load_fault_models(folder).digest
+        assert after != before
+        before = after
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("scale.yaml", "name: scale", "name: times", "2: 'times'; expected 'scale', as the file is named"),
+        ("scale.yaml", "kind: insert", "kind: wrap", "3: 'wrap' for 'kind'; expected one of 'insert' or"),
+        ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
+        ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
+        ("offset.yaml", "unit: target", "unit: feet", "7: 'feet'; expected target or one of m, mps"),
+        ("scale.yaml", "examples:", "samples:", "8: unknown key 'samples'"),
+        (
+            "scale.yaml",
+            "before: |",
+            "befor: |",
+            "unknown key 'befor'; expected one of about, injection, before",
+        ),
+    ],
+)
+def test_a_mistake_is_answered(folder: Path, name: str, old: str, new: str, said: str) -> None:
+    """A model's YAML is as strict as any other."""
+    assert said in broken(folder, name, old, new)
+
+
+def test_a_missing_template(folder: Path) -> None:
+    """A YAML without its template is refused by name."""
+    (folder / "scale.py.j2").unlink()
+    with pytest.raises(MutatorError, match=r"scale.py.j2: cannot be read"):
+        load_fault_models(folder)
+
+
+def test_an_empty_folder(tmp_path: Path) -> None:
+    """A folder without models is no templates folder."""
+    with pytest.raises(MutatorError, match="no fault model"):
+        load_fault_models(tmp_path)

@@ -1,0 +1,72 @@
+"""Names that injected statements import."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.faults.imports import check_import
+from mutator.workspace import Workspace
+
+SPEC = """schema: fault_spec/1
+module: sensor
+fault_type: weather
+about: Something is in the way.
+variants:
+  level:
+    aim: H1
+    about: More of it with each level.
+    draw:
+      level: {values: [1, 2]}
+    as_described:
+      injections:
+        - at: {file: toycar/sensor.py, function: Sensor.measure, after_assign: gap}
+          model: image_effect
+          unit: '1'
+          params: {effect: toycar.sensor.NAME, amount: level, camera: self, scene: truth}
+"""
+
+
+def answer(toy: Workspace, name: str) -> str:
+    """What is said of a spec with an effect of that name; empty when it expands."""
+    path = toy.library / "faults" / "sensor" / "weather.yaml"
+    path.write_text(SPEC.replace("toycar.sensor.NAME", name))
+    try:
+        expand(toy.spec(path), 1, models=toy.fault_models(), manifest=toy.manifest("toy"))
+    except MutatorError as error:
+        return str(error).replace(str(path), "weather.yaml")
+    return ""
+
+
+def test_a_name_that_the_target_defines(toy: Workspace) -> None:
+    """A class of a module of the target may be imported."""
+    assert answer(toy, "toycar.sensor.Sensor") == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "toycar.sensor.Senser",
+            "'Senser' is not defined in toycar/sensor.py; expected one of Sensor; correct the name; "
+            "did you mean 'Sensor'?",
+        ),
+        ("toycar.weather.Rain", "no module 'toycar.weather' in target toy; expected a module of the target"),
+        ("os.system", "no module 'os' in target toy"),
+        ("Sensor", "no module '' in target toy"),
+        ("toycar.sensor.Sensor()", "'Sensor()' is not defined in toycar/sensor.py"),
+    ],
+)
+def test_a_name_that_is_not_there(toy: Workspace, name: str, said: str) -> None:
+    """Anything but a name that a module of the target defines is answered at its line."""
+    assert answer(toy, name).startswith(f"weather.yaml:16: {said}")
+
+
+@pytest.mark.parametrize(
+    "line", ["from toycar.road import Rain", "import x as Rain", "Rain = Snow", "def Rain(): 0"]
+)
+def test_names_are_defined_in_many_ways(toy: Workspace, line: str) -> None:
+    """A package that only passes a name on defines it too."""
+    (Path(toy.manifest("toy").root) / "toycar" / "sky.py").write_text(f"{line}\n")
+    check_import(toy.manifest("toy"), "toycar.sky.Rain")

@@ -1,0 +1,240 @@
+"""Fault specs: read strictly, expanded with a seed, every mistake answered at its line."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.faults.expansion import draw_values, expand
+from mutator.faults.specs import AS_CODED, AS_DESCRIBED, Draw, load_spec
+from mutator.model import Fault, Hold
+from mutator.workspace import Workspace
+
+NAME = "sensor/distance"
+
+
+def faults(workspace: Workspace, seed: int = 3, reading: str = AS_DESCRIBED) -> tuple[Fault, ...]:
+    return expand(
+        workspace.spec(NAME),
+        seed,
+        reading,
+        models=workspace.fault_models(),
+        manifest=workspace.manifest("toy"),
+    )
+
+
+def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
+    return [fault for fault in found if fault.spec == f"{NAME}/{variant}"]
+
+
+def test_a_spec_is_read(toy: Workspace) -> None:
+    """Variants keep their order; the number of faults is known before any is made."""
+    spec = toy.spec(NAME)
+    assert [v.name for v in spec] == ["longer", "silent", "both"]
+    assert [v.count for v in spec] == [3, 1, 2]
+    assert spec.count == 6 == len(faults(toy))
+    assert spec.path == toy.library / "faults" / "sensor" / "distance.yaml"
+
+
+def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
+    """Integers from whole ranges stay integers, in the order of the ranges, with the unit of the key."""
+    found = of(faults(toy), "longer")
+    assert [f.value // 10 for f in found] == [1, 2, 3]
+    assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
+    assert [dict(f.injections[0].params) for f in found] == [
+        {"by": float(f.value), "target": "gap"} for f in found
+    ]
+
+
+def test_expansion_converts_units(toy: Workspace) -> None:
+    """A value in km/h reaches a variable in m/s as m/s, its sign as the spec says; the table keeps km/h."""
+    for fault in of(faults(toy), "both"):
+        by = dict(fault.injections[1].params)["by"]
+        assert by == pytest.approx(-float(fault.value) / 3.6)
+        assert fault.unit == "km/h"
+        assert fault.value == round(float(fault.value), 1)
+
+
+def test_both_readings_share_their_draws(toy: Workspace) -> None:
+    """As coded the same number is taken for one of another unit; without an own part nothing differs."""
+    described, coded = faults(toy), faults(toy, reading=AS_CODED)
+    assert [f.value for f in described] == [f.value for f in coded]
+    assert all(f.reading == AS_CODED for f in coded)
+    for fault in of(coded, "both"):
+        assert dict(fault.injections[1].params)["by"] == -float(fault.value)
+    assert of(coded, "longer")[0].injections == of(described, "longer")[0].injections
+
+
+def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
+    """A fault that latches, or needs another scenario, says so itself."""
+    (silent,) = of(faults(toy), "silent")
+    assert silent.hold is Hold.TO_END
+    assert silent.changes == ("alone",)
+    assert (silent.value, silent.unit) == (None, "-")
+
+
+def test_ids_are_contents(toy: Workspace) -> None:
+    """The same seed gives the same ids, another seed others, and no two faults share one."""
+    again = [f.id for f in faults(toy)]
+    assert again == [f.id for f in faults(toy)]
+    assert len(set(again)) == 6
+    other = [f.id for f in faults(toy, seed=4)]
+    assert other != again and other[3] == again[3], "only the fault without a value stays the same"
+
+
+def test_a_cap_is_kept_and_keys_share_draws() -> None:
+    """The cap cuts what is above it; equal keys and ranges give equal values, other keys others."""
+    ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
+    draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
+    same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
+    other = Draw(key="l", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
+    assert draw_values(draw, 1)[-1] == 60
+    assert draw_values(draw, 1) == draw_values(same, 1)
+    assert {draw_values(draw, i) == draw_values(other, i) for i in range(20)} == {False}
+
+
+def edited(workspace: Workspace, old: str, new: str) -> str:
+    """What loading and expanding says after one edit of the spec, without the file's name."""
+    path = workspace.library / "faults" / "sensor" / "distance.yaml"
+    text = path.read_text()
+    assert text.count(old) >= 1
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        faults(workspace)
+    return str(caught.value).replace(f"{path}:", "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "params: {by_m: error}",
+            "params: {by_m: error, bye_m: 3}",
+            "17: unknown parameter 'bye_m' of model offset; expected one of `target`, `by_m`, "
+            "`low_m`, `high_m`; correct or remove it; did you mean 'by_m'?",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {by_deg: error}",
+            "17: 'by_deg' (a unit of angle); expected `by_m`; end the key in the number's unit",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {by: error}",
+            "17: 'by' (no unit); expected `by_m`; end the key in the number's unit",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {by_m: '35 m'}",
+            "17: '35 m' for 'by_m'; expected a number, or 'error', the draw; correct the value",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {low_m: 0}",
+            "17: parameter 'by' of model offset is missing; expected what is added; add `by_m`",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {by_m: error, target: d rel}",
+            "17: 'd rel' for 'target'; expected a name as in the source; correct the value",
+        ),
+        (
+            "model: offset\n          unit: m\n          params: {by_m: error}",
+            "model: bit_flip\n          params: {bit: 64}",
+            "16: 64 for 'bit'; expected at least 0 and at most 63; correct the value",
+        ),
+        (
+            "model: offset\n          unit: m\n          params: {by_m: error}",
+            "model: delay\n          params: {delay_ms: -100}",
+            "16: -100 for 'delay_ms'; expected at least 0 s; correct the value",
+        ),
+        (
+            "          unit: m\n",
+            "",
+            "14: model offset without `unit`; expected the changed variable's unit, one of m, mps, kph, mph, "
+            "mps2, rad, deg, s, ms, mmph, lx, px, or '1'; add `unit: m` (or what it is in the source) beside "
+            "`model`",
+        ),
+        (
+            "          unit: m\n",
+            "          unit: feet\n",
+            "16: unit 'feet'; expected one of m, mps, kph, mph, mps2, rad, deg, s, ms, mmph, lx, px, or "
+            "'1' for a plain number; give the unit that the variable has in the source",
+        ),
+        (
+            "by_kph: -error",
+            "by_kph: -errror",
+            "42: '-errror' for 'by_kph'; expected a number, or 'error', the draw; correct the value",
+        ),
+        (
+            "error_kph:",
+            "error_deg:",
+            "42: '-error' for 'by_kph'; expected the same dimension: deg is no unit of speed; "
+            "correct the value",
+        ),
+        (
+            "model: offset",
+            "model: ofset",
+            "unknown fault model 'ofset'; expected one of bit_flip, delay, drift, ghost_object, image",
+        ),
+        ("aim: H1", "aim: H9", "7: aim 'H9'; expected one of H1, as in toy.yaml; correct it"),
+        (
+            "changes: [alone]",
+            "changes: [no_lead]",
+            "22: change 'no_lead'; expected one of alone, as in toy.yaml; correct it",
+        ),
+        (
+            "file: toycar/sensor.py",
+            "file: ../toycar/sensor.py",
+            "14: path '../toycar/sensor.py' leads out of the target; expected a path relative to the "
+            "target's root, without `..`; name a file inside the target",
+        ),
+        ("file: toycar/sensor.py", "file: /etc/passwd", "14: path '/etc/passwd' leads out"),
+        ("file: toycar/sensor.py", "file: toycar/none.py", "14: no Python file 'toycar/none.py'"),
+        ("file: toycar/sensor.py", "file: ./toycar/sensor.py", "no Python file './toycar/sensor.py'"),
+        ("file: toycar/sensor.py", "file: toycar/judge.py", "file 'toycar/judge.py' is forbidden to faults"),
+        ("after_assign: gap", "after_assign: 'gap = 1'", "14: 'gap = 1'; expected a dotted name"),
+        ("after_assign: gap", "after_assign: _fi", "14: '_fi'; expected a dotted name"),
+        ("after_assign: gap", "afterassign: gap", "14: unknown key 'afterassign'; expected one of file"),
+        ("after_assign: gap", "after_assign: gap, nth: 0", "14: 0 for 'nth'; expected greater than"),
+        (
+            "after_assign: gap",
+            "after_assign: gap, before_call: self.send",
+            "14: 2 anchors (after_assign, before_call); expected exactly one of after_assign",
+        ),
+        ("last: [30, 39]", "last: [31, 40]", "for 'integers_from'; expected a last range"),
+        ("integers_from", "integers_form", "11: unknown key 'integers_form'; expected one of integers_"),
+        ("first: [10, 19], step: 10", "first: [10.5, 19.5], step: 0.5", "a range with fractions"),
+        ("error_m:\n", "error_m:\n        decimals: 1\n", "11: 1 decimals; expected them with reals"),
+        ("error_m:\n", "error_m:\n        values: [1]\n", "10: 2 ways to draw"),
+        ("error_m:\n", "other_m: {values: [1]}\n      error_m:\n", "9: 2 draws; expected one"),
+        ("module: sensor", "module: Sensor", "2: 'Sensor'; expected small letters"),
+        ("hold: to_end", "hold: forever", "21: 'forever' for 'hold'; expected one of 'while' or 'to_"),
+        (
+            "written_in: kph",
+            "written_in: knots",
+            "51: 'knots' for 'written_in'; expected one of m, mps",
+        ),
+        (
+            "read_as: mps",
+            "readas: mps",
+            "expected a number, a name, or {draw: ..., written_in: ..., read_as: ...}",
+        ),
+    ],
+)
+def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
+    """The message has file and line, the offending value, what was expected, and a remedy."""
+    assert said in edited(toy, old, new)
+
+
+def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:
+    """A file anywhere is a spec like any other."""
+    path = tmp_path / "mine.yaml"
+    path.write_text((toy.library / "faults" / "sensor" / "distance.yaml").read_text())
+    assert load_spec(path).count == toy.spec(path).count == 6
+
+
+def test_an_unknown_reading(toy: Workspace) -> None:
+    """There are two readings."""
+    with pytest.raises(MutatorError, match="reading 'as_built'; expected one of as_described, as_coded"):
+        faults(toy, reading="as_built")

@@ -1,0 +1,94 @@
+"""Plots of golden against faulty."""
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.figures.run_plot import Mark, MarkKind, marks_of, plot_run
+from mutator.model import Activation, Outcome, Record, Status
+from mutator.targets.manifest import Channel
+
+TIME = np.arange(300) * 0.01
+
+
+@pytest.fixture
+def manifest() -> SimpleNamespace:
+    """As much of a manifest as a plot asks for."""
+    gas, speed = Channel(name="gas", unit="0..1"), Channel(name="v_ego", unit="m/s")
+    gone = Channel(name="not_recorded", unit="m")
+    return SimpleNamespace(compared=(gas,), plotted=(speed, gone), time_channel="t", path=Path("m.yaml"))
+
+
+def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
+    speed = np.full_like(TIME, 26.8)
+    speed[-10:] = np.inf
+    return {"t": TIME, "gas": np.sin(TIME) + offset, "v_ego": speed}
+
+
+def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
+    """Every channel both runs have is a panel with its unit; every mark stands there with its time."""
+    mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
+    plot_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark], paths=[tmp_path / "p.svg"])
+    root = ET.parse(tmp_path / "p.svg").getroot()
+    text = " ".join("".join(e.itertext()) for e in root.iter("{http://www.w3.org/2000/svg}text"))
+    for wanted in (
+        "chaff 35 m",
+        "gas",
+        "[0..1]",
+        "v_ego",
+        "[m/s]",
+        "H1 1.50",
+        "golden",
+        "faulty",
+        "time [s]",
+    ):
+        assert wanted in text
+    assert "not_recorded" not in text
+
+
+def test_the_same_run_draws_the_same_svg(tmp_path: Path, manifest: SimpleNamespace) -> None:
+    """A plot made again is the same file, byte for byte."""
+    for name in ("a.svg", "b.svg"):
+        plot_run(trace(), trace(0.1), manifest, title="x", paths=[tmp_path / name])
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+
+
+def test_a_png_is_a_png(tmp_path: Path, manifest: SimpleNamespace) -> None:
+    """The suffix decides the format."""
+    plot_run(trace(), trace(), manifest, title="x", paths=[tmp_path / "p.png"])
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
+    """Nothing to draw is an error that names the manifest, not an empty picture."""
+    with pytest.raises(MutatorError, match=re.escape("m.yaml")):
+        plot_run(trace(), {"t": TIME}, manifest, title="x", paths=[tmp_path / "p.svg"])
+
+
+def test_marks_come_from_the_record_in_order_of_time() -> None:
+    """Activation, manifestation, alerts and hazards of a record are its marks, earliest first."""
+    record = Record(
+        experiment_id="0" * 16,
+        status=Status.OK,
+        outcome=Outcome.HAZARD,
+        detail="",
+        tree="",
+        activation=Activation(first=6.94, last=20.0, count=12),
+        t_manifest=7.0,
+        max_dev=(),
+        hazards=(("H1", 18.0),),
+        alerts=(("fcw", 16.0),),
+        trace_digest="",
+    )
+    kinds = [(m.kind, m.t) for m in marks_of(record)]
+    assert kinds == [
+        (MarkKind.TRIGGER, 6.94),
+        (MarkKind.MANIFEST, 7.0),
+        (MarkKind.ALERT, 16.0),
+        (MarkKind.HAZARD, 18.0),
+    ]

@@ -1,0 +1,174 @@
+"""Anchors: one statement, or an error that lists the candidates."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants.anchors import ParsedFile, parse_file
+
+SOURCE = '''\
+"""Doc."""
+import os
+
+
+class A:
+    @property
+    def width(self): return self._width
+
+    @width.setter
+    def width(self, value):
+        self._width = value
+
+    async def run(self, x):
+        """Run it."""
+        a = b = await self.fetch(x)
+        (c, self.d), *e = a
+        self.total += len(a)
+        f: int = 3
+        g: int
+        for i in range(3):
+            a = i
+        with open(x) as h:
+            pass
+        if a: b = 1
+        u = 1; v = 2
+        print(max(u, v))
+        def inner():
+            a = 5
+            return a
+        if (w := u):
+            return inner()
+        return a
+
+
+def empty():
+    """Only this."""
+'''
+
+
+def parsed(text: str = SOURCE) -> ParsedFile:
+    return parse_file("m.py", text.encode(), Path("root"))
+
+
+def lines(kind: AnchorKind, name: str, function: str = "A.run", nth: int | None = None) -> tuple[int, int]:
+    site = parsed().resolve(
+        FaultLocation(path="m.py", function=function, anchor=Anchor(kind=kind, name=name, nth=nth))
+    )
+    return site.first + 1, site.last
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "nth", "line"),
+    [
+        (AnchorKind.AFTER_ASSIGN, "c", None, 16),
+        (AnchorKind.AFTER_ASSIGN, "self.d", None, 16),
+        (AnchorKind.AFTER_ASSIGN, "e", None, 16),
+        (AnchorKind.BEFORE_ASSIGN, "self.total", None, 17),
+        (AnchorKind.AFTER_ASSIGN, "f", None, 18),
+        (AnchorKind.AFTER_ASSIGN, "a", 1, 15),
+        (AnchorKind.AFTER_ASSIGN, "a", 2, 21),
+        (AnchorKind.AFTER_ASSIGN, "v", None, 25),
+        (AnchorKind.BEFORE_ASSIGN, "u", None, 25),
+        (AnchorKind.AFTER_CALL, "self.fetch", None, 15),
+        (AnchorKind.BEFORE_CALL, "print", None, 26),
+        (AnchorKind.BEFORE_CALL, "inner", None, 31),
+        (AnchorKind.BEFORE_RETURN, "inner", None, 31),
+        (AnchorKind.BEFORE_RETURN, "a", None, 32),
+        (AnchorKind.BEFORE_RETURN, "", 2, 32),
+    ],
+)
+def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line: int) -> None:
+    """Assignments of every form, calls that are a statement's value, and returns are anchors."""
+    assert lines(kind, name, nth=nth) == (line, line)
+
+
+def test_functions_are_found_by_qualified_name() -> None:
+    """Nested functions have their own statements, with `<locals>` or without."""
+    assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
+    assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.<locals>.inner") == (28, 28)
+    assert lines(AnchorKind.AFTER_ASSIGN, "self._width", "A.width") == (11, 11)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "function", "nth", "pieces"),
+    [
+        (
+            AnchorKind.AFTER_ASSIGN, "x", "A.run", None,
+            ["m.py:13: no assignment to 'x' in A.run", "'a' (line 15)", "'self.d' (line 16)"],
+        ),
+        (
+            AnchorKind.AFTER_ASSIGN, "a", "A.run", None,
+            ["m.py:15: assignment to 'a' matches 2 statements", "lines 15, 21", "give `nth`, from 1 to 2"],
+        ),
+        (AnchorKind.AFTER_ASSIGN, "a", "A.run", 3, ["`nth` is 3: give from 1 to 2"]),
+        (AnchorKind.AFTER_ASSIGN, "g", "A.run", None, ["no assignment to 'g'"]),
+        (AnchorKind.AFTER_ASSIGN, "i", "A.run", None, ["m.py:20:", "it is the target of a `for`"]),
+        (AnchorKind.AFTER_ASSIGN, "h", "A.run", None, ["m.py:22:", "it is bound by `as`"]),
+        (AnchorKind.AFTER_ASSIGN, "w", "A.run", None, ["it is bound by `:=` inside an expression"]),
+        (AnchorKind.BEFORE_CALL, "max", "A.run", None, ["m.py:26:", "the call is part of an expression"]),
+        (AnchorKind.BEFORE_CALL, "nothing", "A.run", None, ["no call of 'nothing'", "'print' (line 26)"]),
+        (AnchorKind.BEFORE_RETURN, "", "A.run", None, ["return matches 2 statements", "lines 31, 32"]),
+        (AnchorKind.AFTER_CALL, "inner", "A.run", None, ["m.py:31:", "returns, so nothing after it runs"]),
+        (AnchorKind.AFTER_ASSIGN, "u", "A.run", None, ["m.py:25:", "its line with statements after it"]),
+        (AnchorKind.BEFORE_ASSIGN, "v", "A.run", None, ["shares its line with statements before it"]),
+        (AnchorKind.AFTER_ASSIGN, "b", "A.run", 2, ["m.py:24:", "stands on the line of its `if`"]),
+        (AnchorKind.BEFORE_RETURN, "self._width", "A.width", None, ["m.py:7:", "`if`, `for` or `def`"]),
+        (AnchorKind.AFTER_ASSIGN, "a", "A.runn", None, ["no function 'A.runn'", "A.run,", "mean 'A.run'"]),
+        (AnchorKind.ENTRY, "", "A.width", None, ["2 functions 'A.width'", "line 7, line 10", "from 1 to 2"]),
+        (AnchorKind.ENTRY, "", "A.width", 1, ["no line of its own to insert at"]),
+        (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another anchor: there is none of this kind"]),
+    ],
+)  # fmt: skip
+def test_no_hit_or_several_is_an_error(
+    kind: AnchorKind, name: str, function: str, nth: int | None, pieces: list[str]
+) -> None:
+    """The error names the place, the candidates or the reason, and what to do."""
+    with pytest.raises(MutatorError) as caught:
+        lines(kind, name, function, nth)
+    for piece in pieces:
+        assert piece in str(caught.value)
+
+
+def test_entry_goes_below_the_docstring() -> None:
+    """The first place in a function is after its docstring, also when that is all there is."""
+    assert lines(AnchorKind.ENTRY, "") == (15, 14)
+    assert lines(AnchorKind.ENTRY, "", "empty") == (37, 36)
+    assert lines(AnchorKind.ENTRY, "", "A.width", 2) == (11, 10)
+
+
+@pytest.mark.parametrize(
+    ("source", "line"),
+    [
+        ('"""Doc."""\nfrom __future__ import annotations\nimport os\n', 3),
+        ("#!/usr/bin/env python\n# coding: utf-8\n\nimport os\n", 4),
+        ('"""Doc."""\n\n\ndef f():\n    pass\n', 2),
+        ("# a comment\n@deco\n@other(1)\ndef f():\n    pass\n", 2),
+        ('"""Two\nlines."""; from __future__ import division\nx = 1\n', 3),
+        ("from __future__ import (\n    annotations,\n)\nx = 1\n", 4),
+        ("x = 1\n", 1),
+        ("", 1),
+    ],
+)
+def test_where_an_import_goes(source: str, line: int) -> None:
+    """After docstring and `from __future__` imports, below a head of comments, above decorators."""
+    assert parsed(source).import_line + 1 == line
+
+
+@pytest.mark.parametrize(
+    ("source", "piece"),
+    [
+        (b"def f(:\n    pass\n", "m.py:1: not valid Python"),
+        (b"# coding: latin-9x\nx = 1\n", "unknown encoding"),
+        (b"x = '\xff'\n", "not valid Python"),
+        (b"x = 1\ry = 2\r", "line ends of CR alone"),
+        (b"import os\nfrom p import _fi\n", "m.py:2: the name _fi"),
+        (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the name _fi or a `# fi:` tag is in use"),
+    ],
+)
+def test_a_file_that_cannot_be_a_target(source: bytes, piece: str) -> None:
+    """What does not parse, or was instrumented before, is refused by name."""
+    with pytest.raises(MutatorError) as caught:
+        parse_file("m.py", source, Path("root"))
+    assert piece in str(caught.value)

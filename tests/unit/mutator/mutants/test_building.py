@@ -1,0 +1,195 @@
+"""Mutants: built, compiled, diffed, identified, written, and run."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
+from mutator.mutants import building as mutant
+from mutator.mutants.building import InvalidMutant
+from mutator.targets.source_tree import read_tree
+from mutator.triggers.conditions import always, at_time
+from mutator.workspace import Workspace
+
+GOLDEN = Path(__file__).parents[1] / "toy" / "golden"
+CLOSING = Trigger(name="closing", condition="hwt <= 3.0 and rs > 0.0", armed_after_s=0.5)
+
+
+def toy_faults(toy: Workspace, reading: str = "as_described") -> dict[str, Fault]:
+    """One fault of each variant."""
+    found = expand(
+        toy.spec("sensor/distance"), 3, reading, models=toy.fault_models(), manifest=toy.manifest("toy")
+    )
+    return {fault.spec.rpartition("/")[2]: fault for fault in reversed(found)}
+
+
+def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> mutant.Mutant:
+    return mutant.build(toy.manifest("toy"), toy.fault_models(), fault, trigger)
+
+
+def one(**location: object) -> Fault:
+    """A fault by hand: `gap = 3.0`, somewhere."""
+    anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
+    values = {"path": "toycar/sensor.py", "function": "Sensor.measure", "anchor": anchor, **location}
+    params = (("target", "gap"), ("value", 3.0))
+    injection = Injection(location=FaultLocation(**values), model="stuck", params=params)
+    return Fault(
+        spec="s",
+        module="m",
+        fault_type="f",
+        reading="r",
+        value=None,
+        unit="-",
+        aim="H1",
+        injections=(injection,),
+    )
+
+
+@pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
+def test_golden_diffs(toy: Workspace, variant: str) -> None:
+    """The diff of each kind of fault is, to the letter, the one on file (probe apart, but for its head)."""
+    fault = None if variant == "null" else toy_faults(toy)[variant]
+    made = build(toy, fault)
+    patch = made.patch.replace(made.id, "<id>")
+    head, _, rest = patch.partition("+_TINY = 1e-9\n")
+    shown = head + "...\n" + rest[rest.index("diff --git") :]
+    path = GOLDEN / f"{variant}.patch"
+    if os.environ.get("UPDATE_GOLDEN"):
+        path.write_text(shown)
+    assert shown == path.read_text()
+
+
+@pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
+def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
+    """Changed files un-splice to the original bytes; the probe is the one new file; everything compiles."""
+    manifest = toy.manifest("toy")
+    made = build(toy, None if variant == "null" else toy_faults(toy)[variant])
+    assert set(made.files) - set(manifest.tree.files) == {"toycar/_fi.py"}
+    for path, data in made.files.items():
+        compile(data, path, "exec")
+        if path != "toycar/_fi.py":
+            assert data != manifest.tree.files[path]
+            assert mutant.unsplice(data) == manifest.tree.files[path]
+
+
+def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
+    """The patched copy, the written tree and the digest agree, and the target itself is untouched."""
+    manifest = toy.manifest("toy")
+    before = manifest.tree.digest
+    made = build(toy, toy_faults(toy)["both"])
+    files = (*manifest.files, manifest.probe_path)
+    mutant.write_tree(manifest, made, tmp_path / "tree")
+    assert read_tree(tmp_path / "tree", files).digest == made.tree_digest != before
+    if shutil.which("patch"):
+        shutil.copytree(manifest.root, tmp_path / "copy")
+        subprocess.run(["patch", "-p1", "-s"], cwd=tmp_path / "copy", input=made.patch_bytes, check=True)
+        assert read_tree(tmp_path / "copy", files).digest == made.tree_digest
+    assert toy.manifest("toy").tree.digest == before
+
+
+def test_ids_say_what_a_mutant_is(toy: Workspace) -> None:
+    """Same fault, trigger, target and templates: same id and bytes; any other: another id."""
+    faults = toy_faults(toy)
+    first = build(toy, faults["longer"])
+    assert first == build(toy, faults["longer"])
+    others = [
+        build(toy, faults["both"]),
+        build(toy, None),
+        build(toy, faults["longer"], always()),
+        build(toy, faults["longer"], at_time(3.0)),
+    ]
+    target = toy.manifest("toy").root / "toycar" / "judge.py"
+    target.write_text(target.read_text() + "\n")
+    others.append(build(toy, faults["longer"]))
+    assert len({first.id, *(m.id for m in others)}) == 6
+    assert len({first.tree_digest, *(m.tree_digest for m in others)}) == 6
+
+
+def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
+    """The fault's own hold goes before the trigger's."""
+    assert b'HOLD = "while"' in build(toy, toy_faults(toy)["longer"]).files["toycar/_fi.py"]
+    assert b'HOLD = "to_end"' in build(toy, toy_faults(toy)["silent"]).files["toycar/_fi.py"]
+
+
+def run(toy: Workspace, made: mutant.Mutant, place: Path, steps: int = 100) -> dict[str, object]:
+    """Drive the mutated toy; its positions and the probe's report."""
+    mutant.write_tree(toy.manifest("toy"), made, place / "tree")
+    program = (
+        "import json; from toycar.world import World; from toycar import _fi; w = World(); gaps = []\n"
+        f"for _ in range({steps}): w.step(); gaps.append(w.gap)\n"
+        "print(json.dumps({'gaps': gaps, 'report': _fi.report()}))"
+    )
+    environment = {"PYTHONPATH": str(place / "tree"), "PATH": os.environ["PATH"]}
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", program], env=environment, capture_output=True, check=True, text=True
+    )
+    return dict(json.loads(done.stdout))
+
+
+def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
+    """The null mutant changes nothing and sees its trigger; faults act from their trigger on."""
+    null = run(toy, build(toy, None), tmp_path / "null")
+    assert null["report"]["injections"] == {}
+    assert null["report"]["triggered"]["first"] == 0.5
+    for name in ("longer", "silent", "both"):
+        made = build(toy, toy_faults(toy)[name], at_time(2.0))
+        result = run(toy, made, tmp_path / name)
+        gaps, golden = result["gaps"], null["gaps"]
+        assert gaps[:20] == golden[:20] and gaps != golden
+        report = result["report"]
+        assert report["mutant"] == made.id
+        assert set(report["injections"]) == set(made.injections)
+        assert all(i["first"] == 2.0 and i["count"] == 80 for i in report["injections"].values())
+
+
+@pytest.mark.parametrize(
+    ("location", "said"),
+    [
+        ({"path": "../toycar/sensor.py"}, "leads out of the target"),
+        ({"path": "toycar/judge.py"}, "is forbidden to faults"),
+        ({"function": "Sensor.mesure"}, "did you mean 'Sensor.measure'?"),
+        ({"anchor": Anchor(kind=AnchorKind.AFTER_ASSIGN, name="rate", nth=2)}, "matches 1 statements"),
+        (
+            {"function": "Sensor.send", "anchor": Anchor(kind=AnchorKind.ENTRY)},
+            "'gap' is not known in Sensor.send",
+        ),
+    ],
+)
+def test_locations_are_checked_again(toy: Workspace, location: dict[str, object], said: str) -> None:
+    """A fault that did not come through expansion gets no further than one that did."""
+    with pytest.raises(MutatorError) as caught:
+        build(toy, one(**location))
+    assert said in str(caught.value)
+
+
+def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
+    """Valid lines in a place where they are not allowed make an invalid mutant, which names line and file."""
+    templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
+    (templates / "stuck.py.j2").write_text("nonlocal {{ target }}\n")
+    broken = Workspace(library=toy.library, templates=templates)
+    with pytest.raises(
+        InvalidMutant, match=r"sensor.py.*does not compile: .*nonlocal.*at `nonlocal gap  # fi:"
+    ):
+        build(broken, one())
+
+
+def test_triggers_are_checked_again(toy: Workspace) -> None:
+    """A condition that is no condition does not get into a probe, nor a time without its length."""
+    with pytest.raises(MutatorError, match="is no truth value"):
+        build(toy, None, Trigger(name="x", condition="__import__('os')"))
+    with pytest.raises(MutatorError, match="expected hold_s with it"):
+        build(toy, None, Trigger(name="x", condition="True", hold=Hold.FOR))
+
+
+def test_a_target_with_a_probe_of_its_own(toy: Workspace) -> None:
+    """A tree that has a file where the probe goes is refused."""
+    (toy.manifest("toy").root / "toycar" / "_fi.py").write_text("x = 1\n")
+    with pytest.raises(MutatorError, match=r"the target has a file toycar/_fi.py"):
+        build(toy, None)

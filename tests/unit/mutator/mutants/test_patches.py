@@ -1,0 +1,80 @@
+"""Patches apply with `patch -p1` and undo with `-R`."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants import patches as patch
+from mutator.mutants import splicing as splice
+from mutator.mutants.anchors import parse_file
+
+LONG = "".join(f"y{i} = {i}\n" for i in range(20))
+BODY = "".join(f"    y{i} = {i}\n" for i in range(10))
+
+
+def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
+    """(patch, new bytes) for insertions after assignments to `names`, and an import of the probe."""
+    file = parse_file("pack/m.py", data, Path("root"))
+    edits = [splice.probe_import(file, "pack")]
+    for name in names:
+        kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
+        site = file.resolve(
+            FaultLocation(path="pack/m.py", function="f", anchor=Anchor(kind=kind, name=name))
+        )
+        maker = splice.guard if guard else splice.insertion
+        edits.append(maker(file, site, ["if 1:"] if guard else ["x = 1"], "ab"))
+    pieces = splice.apply(file, edits)
+    return patch.changed_file("pack/m.py", pieces), splice.joined(pieces)
+
+
+@pytest.mark.parametrize("guard", [False, True])
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("def f():\n    x = 1\n", ["x"]),
+        ("def f():\n    x = 1", ["x"]),
+        ("def f():\r\n    x = 1\r\n    return x\r\n", ["x"]),
+        ("def f():\r\n    x = 1", ["x"]),
+        (f"{LONG}def f():\n    x = 1\n{BODY}    z = 3\n{LONG}", ["x", "z"]),
+        (f"{LONG}def f():\n    x = 1\n    y = 2\n    z = 3\n{LONG}", ["x", "z"]),
+        ("# coding: latin-1\ndef f():\n    x = '\xe9'\n", ["x"]),
+    ],
+)
+def test_patch_applies_and_reverses(tmp_path: Path, text: str, names: list[str], guard: bool) -> None:
+    """GNU patch turns the original into exactly the mutated bytes, and back."""
+    if shutil.which("patch") is None:
+        pytest.skip("no patch on this machine")
+    data = text.encode("latin-1" if "latin" in text else "utf-8")
+    text_patch, mutated = make(data, names, guard)
+    source = tmp_path / "pack" / "m.py"
+    source.parent.mkdir()
+    source.write_bytes(data)
+    raw = text_patch.encode("utf-8", "surrogateescape")
+    command = ["patch", "-p1", "--no-backup-if-mismatch", "--fuzz=0", "-s"]
+    subprocess.run(command, cwd=tmp_path, input=raw, check=True)
+    assert source.read_bytes() == mutated
+    subprocess.run([*command, "-R"], cwd=tmp_path, input=raw, check=True)
+    assert source.read_bytes() == data
+
+
+def test_hunks_are_joined_when_close() -> None:
+    """Changes with up to six lines between them share a hunk."""
+    far, _ = make(f"{LONG}def f():\n    x = 1\n{BODY}    z = 3\n{LONG}".encode(), ["x", "z"], False)
+    near, _ = make(f"{LONG}def f():\n    x = 1\n    y = 2\n    z = 3\n{LONG}".encode(), ["x", "z"], False)
+    assert far.count("@@ -") == 3
+    assert near.count("@@ -") == 2
+
+
+def test_names_with_spaces() -> None:
+    """A file name with a space ends in a tab, as patch wants it."""
+    assert "+++ b/a file.py\t\n" in patch.new_file("a file.py", "x = 1\n")
+
+
+@pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
+def test_a_new_file(end: str, told: str) -> None:
+    """Every line is an added one, an empty one too; a missing line end is told."""
+    head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
+    assert patch.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

@@ -1,0 +1,74 @@
+"""Texts of one skeleton compile together or not at all."""
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from mutator.mutants.skeletons import compiles, skeleton
+
+NUMBERS = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False).map(lambda x: repr(abs(x))), st.integers(0).map(str)
+)
+AROUND = ["x = {}", "x{} = 1", "x = '{}'", "x = -{}", "x = {}.5", "x = 1{}", "x = 0x{}", "x = {}j", "x[{}]"]
+AROUND += ["x = '\\{}'", "x = f'{{{}}}'", "x = {} if {} else 0", "é{} = 1", "x = {}_0", "x = {}.real"]
+IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("x + 35.0", "x + 0.0"),
+        ("x - 1e-09", "x - 0.0"),
+        ("min(7, 1.5e+300)", "min(0, 0.0)"),
+        ("x5 = a[12]", "x5 = a[0]"),
+        ("float('nan')", "float('nan')"),
+        ("007", "007"),
+        ("123456789012345678901", "123456789012345678901"),
+        ("5. + .5 + 5j + 0x5 + 5_0", "5. + .5 + 5j + 0x5 + 5_0"),
+        ("'\\1'", "'\\1'"),
+        ("é5 = 5", "é5 = 0"),
+    ],
+)
+def test_what_counts_as_a_number(text: str, kept: str) -> None:
+    """Whole decimal literals of a usual length give way to a zero of their kind, and nothing else does."""
+    assert skeleton(text, ()) == kept
+
+
+def test_ids_stay_apart() -> None:
+    """Equal ids stay equal and different ones different, whatever they are."""
+    ids = ("00000001", "deadbeef")
+    text = "a('00000001'); b('deadbeef', '00000001')"
+    assert skeleton(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
+    assert skeleton(text, ids) != skeleton("a('00000001'); b('00000001', 'deadbeef')", ids)
+
+
+def test_what_no_skeleton_can_prove() -> None:
+    """Where it matters which id or number stands there, the skeleton does not compile."""
+    assert compiles(b"x = 12345678")
+    assert not compiles(skeleton("x = 12345678", ["12345678"]).encode())
+    assert not compiles(skeleton("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
+    assert not compiles(skeleton(r"x = '\U0000abcd'", ["0000abcd"]).encode())
+
+
+@pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
+@settings(deadline=None)
+@given(st.sampled_from(AROUND), NUMBERS)
+@example("x = {}", "07")
+def test_numbers(around: str, number: str) -> None:
+    """Where the skeleton of a text compiles, the text does."""
+    text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
+    if compiles(skeleton(text, ()).encode()):
+        compile(text, "x", "exec")
+
+
+@pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
+@settings(deadline=None)
+@given(st.sampled_from(AROUND), IDS)
+@example("x = {}", "12345678")
+@example("x = {}", "abcdefab")
+@example("x = 1{}", "00000000")
+def test_ids(around: str, name: str) -> None:
+    """The same for ids: with this one in a place, or with any other."""
+    text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
+    if compiles(skeleton(text, [name]).encode()):
+        compile(text, "x", "exec")

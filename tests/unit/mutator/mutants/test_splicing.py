@@ -1,0 +1,202 @@
+"""The splicer on the shapes of source that real trees have."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants import splicing as splice
+from mutator.mutants.anchors import ParsedFile, parse_file
+
+CODE = ('if _fi.active("ab12"):', "    x = x + 1.0")
+GUARD = ('if not _fi.active("ab12"):',)
+
+
+def parsed(text: str | bytes) -> ParsedFile:
+    return parse_file("m.py", text if isinstance(text, bytes) else text.encode(), Path("root"))
+
+
+def edit(
+    file: ParsedFile, kind: AnchorKind, name: str = "x", *, guard: bool = False, nth: int | None = None
+) -> splice.Edit:
+    location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name=name, nth=nth))
+    make, code = (splice.guard, GUARD) if guard else (splice.insertion, CODE)
+    return make(file, file.resolve(location), code, "ab12")
+
+
+def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
+    """The mutated bytes; they must compile and un-splice."""
+    file = parsed(text)
+    result = splice.joined(splice.apply(file, [edit(file, kind, name, guard=guard)]))
+    compile(result, "m.py", "exec")
+    assert splice.unsplice(result.splitlines(keepends=True)) == file.data
+    return result
+
+
+def test_after_and_before() -> None:
+    """Lines go directly after or before the statement, at its indentation, each with its tag."""
+    text = "def f(x):\n    # why\n    x = 1  # set\n    # then\n    return x\n"
+    assert spliced(text, AnchorKind.AFTER_ASSIGN).decode() == (
+        "def f(x):\n    # why\n    x = 1  # set\n"
+        '    if _fi.active("ab12"):  # fi:ab12\n        x = x + 1.0  # fi:ab12\n'
+        "    # then\n    return x\n"
+    )
+    assert spliced(text, AnchorKind.BEFORE_RETURN).decode() == (
+        "def f(x):\n    # why\n    x = 1  # set\n    # then\n"
+        '    if _fi.active("ab12"):  # fi:ab12\n        x = x + 1.0  # fi:ab12\n'
+        "    return x\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("def f(x):\r\n    x = 1\r\n    return x\r\n", id="CRLF"),
+        pytest.param("def f(x):\n    x = 1", id="no newline at the end"),
+        pytest.param("def f(x):\r\n    x = 1", id="CRLF, no newline at the end"),
+        pytest.param("def f(x):\n\tif x:\n\t\tx = 1\n\treturn x\n", id="tabs"),
+        pytest.param("def f(x):\n  if x:\n  \tx = 1\n  return x\n", id="spaces, then tabs"),
+        pytest.param("def f(x):\n  x = 1\n  return x\n", id="two spaces"),
+        pytest.param("def f(x):\n    x = (1 +\n 2\n    )  # why\n    return x\n", id="brackets over lines"),
+        pytest.param("def f(x):\n    x = 1 + \\\n  2\n    return x\n", id="backslash"),
+        pytest.param("def f(x):\n    x = 1 \\\n\n    return x\n", id="backslash at the end"),
+        pytest.param('def f(x):\n    x = """a\nb\n  """\n    return x\n', id="string over lines"),
+        pytest.param("def f(x):\n    y = 2; x = 1\n    return x\n", id="last after a semicolon"),
+        pytest.param("def f(x):\n    x = 1;\n    return x\n", id="a semicolon too many"),
+        pytest.param("@d\n@e(1)\nasync def f(x):\n    x = await g()\n    return x\n", id="decorated, async"),
+        pytest.param("def f(x):\n    try:\n        x = 1\n    finally:\n        pass\n", id="in try"),
+        pytest.param("def f(x):\n    if 1:\n        x = 1\n    else:\n        pass\n", id="before else"),
+        pytest.param("def f(x):\n    match x:\n        case 1:\n            x = 1\n", id="in match"),
+        pytest.param("def f(x):\n    x = 1\n\x0c\n    return x\n", id="form feed"),
+        pytest.param(
+            "# -*- coding: latin-1 -*-\ndef f(x):\n    x = '\xe9'\n".encode("latin-1"), id="latin-1"
+        ),
+        pytest.param(b"\xef\xbb\xbfdef f(x):\n    x = 1\n", id="byte order mark"),
+        pytest.param("def f(x):\n    x = 'a\x0bb\x1cc\x85d\u2028e'\n    return x\n", id="odd separators"),
+        pytest.param("def f(x):\n    x = 1\n    \n", id="blank line with spaces"),
+    ],
+)
+def test_shapes_of_source(text: str | bytes) -> None:
+    """After the assignment the new lines stand, nothing else changed, and it un-splices."""
+    result = spliced(text, AnchorKind.AFTER_ASSIGN)
+    data = text if isinstance(text, bytes) else text.encode()
+    added = [line for line in result.splitlines() if b"fi:ab12" in line]
+    assert len(added) == 2
+    assert added[0].endswith(b'if _fi.active("ab12"):  # fi:ab12')
+    assert sorted(set(result.splitlines()) - set(added)) == sorted(set(data.splitlines()))
+    assert (b"\r\n" in data) == (b"# fi:ab12\r\n" in result)
+    assert result.endswith((b"\n", b"\r")) == data.endswith((b"\n", b"\r"))
+
+
+def test_a_guard_indents_the_statement_it_wraps() -> None:
+    """All lines of the statement move one level in, blank ones stay blank."""
+    text = "def f(x):\n    g(\n        1,\n\n  2)  # why\n    return x\n"
+    assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
+        'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:4\n'
+        "        g(\n            1,\n\n      2)  # why\n    return x\n"
+    )
+
+
+def test_a_guard_leaves_strings_alone() -> None:
+    """Where a string spans lines only the first line moves, or the string would change."""
+    text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
+    assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
+        'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
+        '        g("""a\n    b""", f"""{x}\n""")\n'
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f(x):\n\tg(1,\n\t  2)\n",
+        "def f(x):\n  if x:\n  \tg(1)\n",
+        "def f(x):\r\n    g(1)",
+        "def f(x):\n    g(1, \\\n 2)\n",
+        "def f(x):\n    x = g(1)\n",
+        "def f(x):\n    return g(1)\n",
+    ],
+)
+def test_guards_in_all_shapes(text: str) -> None:
+    """Tabs, mixed indentation, CRLF and missing newlines come back exactly."""
+    assert b"guard:" in spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("def f(x):\n    a(); g(1)\n", AnchorKind.AFTER_CALL),
+        ("def f(x):\n    g(1); a()\n", AnchorKind.BEFORE_CALL),
+        ("def f(x):\n    g(1)\n", AnchorKind.AFTER_CALL),
+        ("def f(x):\n    g(1)\n", AnchorKind.ENTRY),
+    ],
+)
+def test_a_guard_needs_its_statement_alone(text: str, kind: AnchorKind) -> None:
+    """A statement that shares its line, or is no statement, cannot be wrapped."""
+    file = parsed(text)
+    with pytest.raises(MutatorError, match="a guard needs a statement to wrap"):
+        edit(file, kind, "" if kind is AnchorKind.ENTRY else "g", guard=True)
+
+
+def test_edits_at_one_boundary() -> None:
+    """What follows a statement comes before what precedes the next; a guard stays at its statement."""
+    file = parsed("def f(x):\n    if x:\n        x = 1\n    g(1)\n    return x\n")
+    edits = [
+        edit(file, AnchorKind.BEFORE_CALL, "g", guard=True),
+        edit(file, AnchorKind.BEFORE_CALL, "g"),
+        edit(file, AnchorKind.AFTER_ASSIGN),
+        edit(file, AnchorKind.AFTER_CALL, "g"),
+    ]
+    result = splice.joined(splice.apply(file, edits))
+    compile(result, "m.py", "exec")
+    assert splice.unsplice(result.splitlines(keepends=True)) == file.data
+    margins = [len(line) - len(line.lstrip()) for line in result.decode().splitlines()[3:]]
+    assert margins == [8, 12, 4, 8, 4, 8, 4, 8, 4]
+    assert b"guard:1\n        g(1)\n" in result
+
+
+def test_two_guards_around_one_statement() -> None:
+    """The second omission of a statement is refused."""
+    file = parsed("def f(x):\n    g(1)\n")
+    guard = edit(file, AnchorKind.BEFORE_CALL, "g", guard=True)
+    with pytest.raises(MutatorError, match="two guards around one statement"):
+        splice.apply(file, [guard, guard])
+
+
+def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
+    """The last line of the result has no newline either, whichever edit it comes from."""
+    file = parsed("def f(x):\n    x = g(1)")
+    edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
+    result = splice.joined(splice.apply(file, edits))
+    assert result.count(b"# fi:ab12\n") == 3 and result.endswith(b"# fi:ab12")
+    assert splice.unsplice(result.splitlines(keepends=True)) == file.data
+
+
+def test_names_that_the_encoding_lacks() -> None:
+    """A snippet that cannot be written in the file's encoding is refused."""
+    file = parsed("# coding: ascii\ndef f(x):\n    x = 1\n")
+    site = file.resolve(
+        FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
+    )
+    with pytest.raises(MutatorError, match="cannot be written in ascii"):
+        splice.insertion(file, site, ["gr\xf6\xdfe = 1"], "ab12")
+
+
+def test_the_probe_is_imported() -> None:
+    """The import goes below docstring and future imports and carries the probe's tag."""
+    file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
+    result = splice.joined(splice.apply(file, [splice.probe_import(file, "pack")]))
+    assert result.decode() == (
+        '"""Doc."""\nfrom __future__ import annotations\nfrom pack import _fi  # fi:probe\n\nimport os\n'
+    )
+
+
+def test_a_byte_order_mark_stays_first() -> None:
+    """Nothing goes before the mark: below a docstring the import is fine, otherwise it is refused."""
+    file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
+    result = splice.joined(splice.apply(file, [splice.probe_import(file, "pack")]))
+    compile(result, "m.py", "exec")
+    assert result.startswith(b"\xef\xbb\xbf'Doc.'\nfrom pack")
+    with pytest.raises(MutatorError, match="a byte order mark right before"):
+        splice.probe_import(parsed(b"\xef\xbb\xbfx = 1\n"), "pack")

@@ -1,0 +1,153 @@
+"""Comparison with golden, and reading what a target wrote."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mutator.outcomes.golden import (
+    BadOutput,
+    alerts_of,
+    compare,
+    golden_key,
+    hazards_of,
+    load_record,
+    load_trace,
+)
+from mutator.targets.manifest import Channel
+
+T = np.arange(5) * 0.1
+GAS = Channel(name="gas", unit="-")
+BRAKE = Channel(name="brake", unit="-")
+MANIFEST: Any = SimpleNamespace(trace_file="trace.npz", record_file="record.json", time_channel="t")
+
+
+def trace(**channels: list[float]) -> dict[str, np.ndarray]:
+    arrays = {name: np.array(values) for name, values in channels.items()}
+    return {"t": T[: len(next(iter(arrays.values())))], **arrays}
+
+
+def test_equal_traces_do_not_differ() -> None:
+    """Equal numbers, infinities and NaNs are no difference."""
+    same = trace(gas=[0.0, -0.0, np.nan, np.inf, -np.inf])
+    difference = compare(same, trace(gas=[-0.0, 0.0, np.nan, np.inf, -np.inf]), [GAS], "t")
+    assert difference.t_first is None
+    assert difference.max_dev == (("gas", 0.0),)
+
+
+def test_first_and_largest_difference() -> None:
+    """The time of the first difference in any channel, the largest difference of each."""
+    golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
+    faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])
+    difference = compare(golden, faulty, [GAS, BRAKE], "t")
+    assert difference.t_first == T[2]
+    assert difference.max_dev == (("gas", 2.0), ("brake", 0.25))
+
+
+@pytest.mark.parametrize(("step", "first"), [(1e-12, T[3]), (0.5, T[3])])
+def test_exact_by_default(step: float, first: float) -> None:
+    """Without a tolerance the smallest difference counts."""
+    difference = compare(trace(gas=[1, 1, 1, 1, 1]), trace(gas=[1, 1, 1, 1 + step, 1]), [GAS], "t")
+    assert difference.t_first == first
+
+
+def test_tolerance() -> None:
+    """A difference within the channel's tolerance is none, but its size is kept."""
+    channel = Channel(name="gas", unit="-", tolerance=0.1)
+    difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
+    assert difference.t_first is None
+    assert difference.max_dev[0][1] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_no_number_against_a_number_is_infinitely_different(value: float) -> None:
+    """NaN or infinity where golden has a number differs without bound, whatever the tolerance."""
+    channel = Channel(name="gas", unit="-", tolerance=100.0)
+    difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
+    assert difference.t_first == T[1]
+    assert difference.max_dev == (("gas", np.inf),)
+
+
+@pytest.mark.parametrize(("golden", "faulty"), [(3, 5), (5, 3)])
+def test_other_length_differs_where_one_ends(golden: int, faulty: int) -> None:
+    """A run that ends early, or late, differs from the first step that only one of them has."""
+    difference = compare(trace(gas=[0] * golden), trace(gas=[0] * faulty), [GAS], "t")
+    assert difference.t_first == T[3]
+
+
+def test_flags_and_integers_compare_too() -> None:
+    """Channels of whole numbers or flags are compared as numbers."""
+    golden = {"t": T[:2], "gas": np.array([True, False])}
+    faulty = {"t": T[:2], "gas": np.array([True, True])}
+    assert compare(golden, faulty, [GAS], "t").t_first == T[1]
+
+
+def test_key_of_a_golden_run() -> None:
+    """Scenario and changes name a golden run."""
+    assert golden_key("S1", ()) == "S1"
+    assert golden_key("S1", ("no_lead",)) == "S1+no_lead"
+
+
+def test_trace_is_read(tmp_path: Path) -> None:
+    """The asked channels and time come back as written."""
+    np.savez(tmp_path / "trace.npz", t=T, gas=T * 2, other=T)
+    found = load_trace(MANIFEST, tmp_path, ["gas"])
+    assert set(found) == {"t", "gas"}
+    assert (found["gas"] == T * 2).all()
+    assert set(load_trace(MANIFEST, tmp_path)) == {"t", "gas", "other"}
+
+
+def test_bad_traces_are_told(tmp_path: Path) -> None:
+    """A trace that is missing, torn, without a channel, or of unequal lengths is BadOutput."""
+    path = tmp_path / "trace.npz"
+    with pytest.raises(BadOutput):
+        load_trace(MANIFEST, tmp_path)
+    np.savez(path, t=T, gas=T[:3])
+    for channels in (["nosuch"], ["gas"]):
+        with pytest.raises(BadOutput):
+            load_trace(MANIFEST, tmp_path, channels)
+    path.write_bytes(path.read_bytes()[:-30])
+    with pytest.raises(BadOutput):
+        load_trace(MANIFEST, tmp_path)
+    np.savez(path, t=T, gas=np.array([{}] * 5, dtype=object))
+    with pytest.raises(BadOutput):
+        load_trace(MANIFEST, tmp_path, ["gas"])
+    for values in (np.array(["a"] * 5), np.zeros((5, 2))):
+        np.savez(path, t=np.zeros(values.shape), gas=values)
+        with pytest.raises(BadOutput):
+            load_trace(MANIFEST, tmp_path, ["gas"])
+
+
+def test_record_is_read(tmp_path: Path) -> None:
+    """Hazards that occurred and counted alerts, every raise of them, are found in a target's record."""
+    said = {
+        "hazards": {"H1": None, "H2": 3.5},
+        "alerts": [{"name": "fcw", "t": 1.0}],
+        "alert_events": [{"name": "fcw", "t": 1.0}, {"name": "chime", "t": 1.5}, {"name": "fcw", "t": 2.0}],
+    }
+    (tmp_path / "record.json").write_text(json.dumps(said))
+    record = load_record(MANIFEST, tmp_path)
+    assert hazards_of(record, ["H1", "H2"]) == [("H2", 3.5)]
+    assert hazards_of(record, ["H1"]) == []
+    assert alerts_of(record, ["fcw"]) == [("fcw", 1.0), ("fcw", 2.0)]
+    assert alerts_of(record | {"alert_events": []}, ["fcw"]) == [("fcw", 1.0)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[]", "{}", '{"hazards": []}', '{"hazards": {"H1": "soon"}}', '{"hazards": {"H1": NaN}}'),
+        *(
+            f'{{"hazards": {{}}, "alerts": {alerts}}}'
+            for alerts in ('{"x": 1}', '["fcw"]', '[{"name": "fcw"}]')
+        ),
+    ],
+)
+def test_bad_record_is_told(tmp_path: Path, text: str) -> None:
+    """A record that does not say when which hazards and alerts came is BadOutput."""
+    (tmp_path / "record.json").write_text(text)
+    with pytest.raises(BadOutput):
+        load_record(MANIFEST, tmp_path)

@@ -1,0 +1,185 @@
+"""The results table: its columns, its cells, its bytes."""
+
+import csv
+import os
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.model import Experiment, Method, Outcome, Record, Status
+from mutator.outcomes import results
+from mutator.outcomes.columns import COLUMNS
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+PUBLISHED = (
+    "experiment_id, fault_id, module, fault_type, reading, value, unit, scenario, method, trigger, seed, "
+    "status, outcome, activated, t_activation, activations, manifested, t_manifest, h1, t_h1, h2, t_h2, "
+    "h3, t_h3, alerts, t_alert, reaction_time, max_dev_gas, max_dev_brake, max_dev_steer"
+)
+MakeRecord = Callable[..., Record]
+
+
+def test_columns_are_these_in_this_order() -> None:
+    """The first columns of every table are fixed."""
+    assert ", ".join(COLUMNS) == PUBLISHED
+
+
+def test_a_hazard_row(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
+    """A run that ended in a hazard: flags, times of simulation, alerts in their order, reaction time."""
+    one = experiment(24, method=Method.RANDOM, trigger="random/C2")
+    kept = record(
+        one.id,
+        outcome=Outcome.HAZARD,
+        t_manifest=0.35000000000000003,
+        hazards=(("H3", 5.13), ("H1", 7.0)),
+        alerts=(("steer_saturated", 3.02), ("fcw", 6.0)),
+        max_dev=(("gas", 0.1), ("brake", 0.0), ("steer_torque", 1.5)),
+    )
+    cells = results.row(one, kept)
+    expected = {
+        "value": 24,
+        "unit": "m",
+        "method": "random",
+        "trigger": "random/C2",
+        "status": "ok",
+        "outcome": "hazard",
+        "activated": 1,
+        "t_activation": 2.0,
+        "activations": 5,
+        "manifested": 1,
+        "t_manifest": 0.35,
+        "h1": 1,
+        "t_h1": 7.0,
+        "h2": 0,
+        "t_h2": None,
+        "h3": 1,
+        "t_h3": 5.13,
+        "alerts": "steer_saturated;fcw",
+        "t_alert": 3.02,
+        "reaction_time": 2.11,
+        "max_dev_gas": 0.1,
+        "max_dev_brake": 0.0,
+        "max_dev_steer": 1.5,
+        "condition": "t >= 2.0",
+        "variant": "distance",
+        "aim": "H1",
+        "detail": None,
+    }
+    assert {name: cells[name] for name in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ("status", "activation", "activated"),
+    [
+        (Status.CRASHED, True, 1),
+        (Status.CRASHED, False, None),
+        (Status.TIMEOUT, False, None),
+        (Status.INVALID_MUTANT, False, None),
+        (Status.HARNESS_ERROR, False, None),
+    ],
+)
+def test_rows_of_what_did_not_end_well(
+    experiment: Callable[..., Experiment],
+    record: MakeRecord,
+    status: Status,
+    activation: bool,
+    activated: int | None,
+) -> None:
+    """What is not known of a run that did not end well is empty, never 0."""
+    given = {} if activation else {"activation": None}
+    cells = results.row(experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given))
+    assert (cells["status"], cells["activated"], cells["detail"]) == (status.value, activated, "why")
+    for name in ("outcome", "manifested", "t_manifest", "h1", "h2", "h3", "alerts", "reaction_time"):
+        assert cells[name] is None
+
+
+def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
+    """A run that ended well without activation says 0, not nothing."""
+    cells = results.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None))
+    assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
+    assert cells["t_activation"] is None
+
+
+@pytest.mark.parametrize(
+    ("channels", "columns"),
+    [
+        (["gas", "brake", "steer_torque"], ["max_dev_gas", "max_dev_brake", "max_dev_steer"]),
+        (["gas_left", "gas_right", "horn"], ["max_dev_gas_left", "max_dev_gas_right", "max_dev_horn"]),
+    ],
+)
+def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
+    """A channel's column is named by its first word where that is enough."""
+    assert list(results.deviation_columns(channels).values()) == columns
+
+
+@pytest.fixture
+def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
+    """A run with records of all its experiments but two, in two files."""
+    plan = make_plan(toycar, "toy")
+    folder = freeze(plan, tmp_path / "run", toycar)
+    for i in (0, 1):
+        writer = LineWriter(folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA})
+        timings = LineWriter(folder.path / "timings" / f"0001-gw{i}.jsonl", {"schema": TIMINGS_SCHEMA})
+        for experiment in plan.experiments[i:22:2]:
+            writer.append(asdict(record(experiment.id, max_dev=(("gas", 0.5), ("wheel_turn", 0.25)))))
+            timings.append(
+                {"experiment_id": experiment.id, "cpu_s": 1.0, "wall_s": 2.0, "host": "h", "worker": "gw"}
+            )
+        writer.close()
+        timings.close()
+    return folder
+
+
+def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
+    """One row per experiment that has a record, sorted by id, in CSV and Parquet alike; the target's own
+    hazards and channels come after the fixed columns."""
+    rows = list(csv.DictReader(results.build(folder.path).open()))
+    assert (len(rows), folder.planned) == (22, 24)
+    ids = [row["experiment_id"] for row in rows]
+    assert ids == sorted(ids)
+    table = pq.read_table(folder.path / "results.parquet")
+    assert table.column_names == list(rows[0])
+    assert tuple(table.column_names[: len(COLUMNS)]) == COLUMNS
+    assert {"too_fast", "t_too_fast", "max_dev_wheel"} < set(table.column_names)
+    assert table.column("experiment_id").to_pylist() == ids
+    for name in ("value", "t_activation", "max_dev_wheel", "activated"):
+        texts = [row[name] for row in rows]
+        assert [float(text) if text else None for text in texts] == table.column(name).to_pylist()
+    assert rows[0]["h2"] == rows[0]["max_dev_steer"] == ""
+    timings = pq.read_table(folder.path / "timings.parquet")
+    assert timings.column("experiment_id").to_pylist() == ids
+
+
+def test_tables_are_the_same_bytes_each_time(folder: RunFolder) -> None:
+    """Made again, or from records in other files, the tables have the same bytes."""
+    tables = results.build(folder.path), folder.path / "results.parquet"
+    before = [table.read_bytes() for table in tables]
+    one, two = sorted((folder.path / "records").iterdir())
+    one.rename(one.with_name("0003-x.jsonl"))
+    two.rename(two.with_name("0002-x.jsonl"))
+    results.build(folder.path)
+    assert [table.read_bytes() for table in tables] == before
+
+
+@pytest.mark.parametrize("changed", ["records/0001-main.jsonl", "run.json", "results.parquet", None])
+def test_tables_are_built_when_they_are_old_or_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str | None
+) -> None:
+    """Derived files newer than what they are made from stay as they are; else they are built."""
+    monkeypatch.setattr(results, "build", lambda run: run / "built")
+    (tmp_path / "records").mkdir()
+    names = ("run.json", "records/0001-main.jsonl", "results.csv", "results.parquet", "timings.parquet")
+    for second, name in enumerate(names, start=1):
+        (tmp_path / name).write_text("")
+        os.utime(tmp_path / name, (second, second))
+    if changed == "results.parquet":
+        (tmp_path / changed).unlink()
+    elif changed is not None:
+        os.utime(tmp_path / changed, (3, 3))
+    assert results.ensure(tmp_path) == tmp_path / ("built" if changed else "results.csv")

@@ -1,0 +1,128 @@
+"""Counting the results table."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Outcome, Status
+from mutator.outcomes.results import COLUMNS
+from mutator.outcomes.rows import (
+    by_fault_type,
+    count_table,
+    counts_by,
+    hazard_names,
+    outcome_counts,
+    read_results,
+)
+
+SEEN = {
+    "module": "radar",
+    "fault_type": "chaff",
+    "scenario": "S1",
+    "method": "guided",
+    "status": "ok",
+    "outcome": "sdc",
+    "t_activation": "7.0",
+    "t_manifest": "7.1",
+    "h1": "0",
+    "h2": "0",
+    "h3": "0",
+}
+
+
+def write_table(path: Path, *lines: dict[str, str]) -> Path:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
+        table.writeheader()
+        for i, line in enumerate(lines):
+            table.writerow({"experiment_id": f"{i:016x}"} | line)
+    return path
+
+
+def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
+    """Each experiment adds to exactly the numbers that its row supports."""
+    hazard = SEEN | {"outcome": "hazard", "h1": "1", "t_h1": "18.3", "alerts": ""}
+    warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
+    idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
+    masked = SEEN | {"outcome": "masked", "t_manifest": ""}
+    rows = read_results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked))
+
+    [chaff, total] = counts_by(rows, by_fault_type)
+
+    assert (chaff.injected, chaff.activated, chaff.manifested) == (5, 4, 3)
+    assert chaff.hazards == (2, 0, 1)
+    assert (chaff.any_hazard, chaff.alerts, chaff.hazards_without_alert) == (2, 1, 1)
+    assert total.injected == 5
+    assert outcome_counts(rows) == {"not_activated": 1, "masked": 1, "sdc": 1, "hazard": 2}
+
+
+@pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
+def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Path, status: Status) -> None:
+    """A harness error or an invalid mutant is counted as unusable and nowhere else."""
+    bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
+    rows = read_results(write_table(tmp_path / "results.csv", SEEN, bad))
+
+    [count, _] = counts_by(rows, by_fault_type)
+
+    assert (count.injected, count.activated, count.any_hazard, count.alerts) == (1, 1, 0, 0)
+    assert count.unusable == 1
+    assert outcome_counts(rows) == {"sdc": 1, status.value: 1}
+
+
+@pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
+def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
+    """A crashed or hanging controller stays among the injected and has a column of its own."""
+    bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
+    rows = read_results(write_table(tmp_path / "results.csv", SEEN, bad))
+
+    heads, lines = count_table(counts_by(rows, by_fault_type), "fault type", hazard_names(rows))
+
+    assert heads[-1] == status.value
+    assert lines[-1][heads.index("injected")] == "2"
+    assert lines[-1][-1] == "1"
+
+
+def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
+    """A clean campaign's table has no columns of zeros for crashes, timeouts, unusable runs."""
+    rows = read_results(write_table(tmp_path / "results.csv", SEEN))
+    heads, _ = count_table(counts_by(rows, by_fault_type), "fault type", hazard_names(rows))
+    assert heads[-1] == "hazard, no alert"
+
+
+def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
+    """A hazard that was looked for is named though it never came; one that nobody looked for is not."""
+    seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
+    assert hazard_names(read_results(write_table(tmp_path / "results.csv", seen, seen))) == ("H2",)
+
+
+def test_rows_are_typed(tmp_path: Path) -> None:
+    """Empty cells become None, times become numbers, alerts a tuple, hazards are sorted by time."""
+    line = SEEN | {
+        "outcome": "hazard",
+        "h1": "1",
+        "t_h1": "18.5",
+        "h3": "1",
+        "t_h3": "11.25",
+        "alerts": "fcw;can_error",
+    }
+    [row] = read_results(write_table(tmp_path / "results.csv", line))
+    assert row.outcome is Outcome.HAZARD
+    assert row.hazards == (("H3", 11.25), ("H1", 18.5))
+    assert row.alerts == ("fcw", "can_error")
+    assert row.reaction_time is None
+
+
+def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
+    """A missing table is a user's error that names the folder."""
+    with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
+        read_results(tmp_path / "results.csv")
+
+
+def test_a_table_of_another_shape_is_refused(tmp_path: Path) -> None:
+    """A CSV without the columns is a user's error, not a KeyError."""
+    file = tmp_path / "results.csv"
+    file.write_text("a,b\n1,2\n", encoding="utf-8")
+    with pytest.raises(MutatorError, match="not a results table"):
+        read_results(file)

@@ -1,0 +1,73 @@
+"""The verdict: its whole truth table, and which events count."""
+
+from itertools import product
+
+import pytest
+
+from mutator.model import Activation, Outcome
+from mutator.outcomes.verdicts import first_events, judge, reaction_time
+
+ACTIVE = Activation(first=2.0, last=4.0, count=3)
+
+# activated, manifested, a hazard at or after the activation -> outcome
+TRUTH = {
+    (False, False, False): Outcome.NOT_ACTIVATED,
+    (False, False, True): Outcome.NOT_ACTIVATED,
+    (False, True, False): Outcome.NOT_ACTIVATED,
+    (False, True, True): Outcome.NOT_ACTIVATED,
+    (True, False, False): Outcome.MASKED,
+    (True, False, True): Outcome.HAZARD,
+    (True, True, False): Outcome.SDC,
+    (True, True, True): Outcome.HAZARD,
+}
+
+
+@pytest.mark.parametrize("case", list(product((False, True), repeat=3)), ids=str)
+def test_truth_table(case: tuple[bool, bool, bool]) -> None:
+    """Every combination of activated, manifested and hazard has the outcome that the table says."""
+    activated, manifested, hazard = case
+    outcome = judge(
+        activation=ACTIVE if activated else None,
+        t_manifest=2.5 if manifested else None,
+        hazards=(("H1", 3.0),) if hazard else (),
+    )
+    assert outcome is TRUTH[case]
+
+
+@pytest.mark.parametrize(
+    ("time", "counts"), [(0.0, False), (1.99, False), (2.0, True), (2.01, True), (9.0, True)]
+)
+def test_events_before_the_activation_do_not_count(time: float, counts: bool) -> None:
+    """An event counts from the moment of the activation on, that moment included."""
+    assert first_events([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
+
+
+def test_no_event_counts_without_activation() -> None:
+    """Without activation nothing is the fault's doing."""
+    assert first_events([("H1", 3.0), ("fcw", 0.0)], None) == ()
+
+
+def test_first_of_each_name_sorted_by_time() -> None:
+    """Of each name the first event at or after the activation is kept, in the order of time, then name."""
+    events = [("fcw", 1.0), ("b", 5.0), ("fcw", 4.0), ("fcw", 3.0), ("a", 5.0)]
+    assert first_events(events, ACTIVE) == (("fcw", 3.0), ("a", 5.0), ("b", 5.0))
+
+
+HAZARDS = (("H3", 5.0), ("H1", 7.0))
+
+
+@pytest.mark.parametrize(
+    ("hazards", "alerts", "expected"),
+    [
+        ((), (), None),
+        (HAZARDS, (), None),
+        ((), (("fcw", 3.0),), None),
+        (HAZARDS, (("fcw", 3.0), ("can_error", 6.0)), 2.0),
+        (HAZARDS, (("fcw", 5.0),), None),
+        (HAZARDS, (("fcw", 6.0),), None),
+    ],
+    ids=["neither", "no alert", "no hazard", "alert first", "at once", "hazard first"],
+)
+def test_reaction_time(hazards: tuple, alerts: tuple, expected: float | None) -> None:
+    """Reaction time is first hazard minus first alert, and nothing unless the alert came strictly before."""
+    assert reaction_time(hazards, alerts) == expected

@@ -1,0 +1,217 @@
+"""The published observations: their queries on the published counts, and every verdict of every rule."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.paper import observations, observations_page
+from mutator.paper.measures import Found, median_time, of_difference, of_share
+from mutator.paper.observations import Judged, Rule, Summed, Verdict, judge, together
+from mutator.paper.published import load_paper
+from mutator.statistics.share import share
+from mutator.statistics.tally import Tally
+
+from ..statistics.results_frame import results
+
+REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
+FILE = REFERENCES / observations.FILE
+HOLDS, FAILS, UNTOLD = Verdict
+ACTIVATED = {"t_activation": 1.0}
+EVENTS = {  # by count of a tally: what happened in such a run
+    "manifested": {"t_manifest": 2.0},
+    "alerts": {"alerts": "steer_saturated", "t_alert": 3.0},
+    "hazards": {"h3": 1, "t_h3": 9.0},
+}
+
+
+def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
+    """As many runs as a tally has, each with what was counted of it."""
+    warned = tally.hazards - (tally.hazards_no_alerts or 0)
+    kinds = [
+        (warned, ("manifested", "alerts", "hazards")),
+        (tally.hazards_no_alerts or 0, ("manifested", "hazards")),
+        (tally.alerts_no_hazards or 0, ("manifested", "alerts")),
+    ]
+    kinds.append(((tally.manifested or tally.activated) - sum(n for n, _ in kinds), ("manifested",)))
+    kinds.append((tally.activated - sum(n for n, _ in kinds), ()))
+    lines = [(n, group | ACTIVATED | {k: v for e in what for k, v in EVENTS[e].items()}) for n, what in kinds]
+    lines.append((tally.injected - tally.activated, group))
+    one_each = results(*(line for _, line in lines))
+    return one_each.loc[one_each.index.repeat([n for n, _ in lines])]
+
+
+def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """One frame of them, each run with an id, a partner of the other method, one of 40 faults, and an end."""
+    frame = pd.concat(parts, ignore_index=True)
+    number = frame.groupby("method").cumcount()
+    ids = {"experiment_id": frame.index.astype(str), "seed": number.astype(str)}
+    return frame.assign(**ids, fault_id=(number % 40).astype(str), t_end=30.0)
+
+
+def of_rows(*rows: dict[str, Any]) -> pd.DataFrame:
+    """A frame of guided chaff runs in S1 that say what is unlike one that was not activated."""
+    return frame_of([results(*rows)])
+
+
+@pytest.fixture(scope="module")
+def table_2() -> dict[str, Judged]:
+    """The claims, put to runs as the paper's table II counts them."""
+    counts = load_paper(REFERENCES).summary
+    frame = frame_of(runs_of(t, method=method, scenario=s) for (method, s), t in counts.items())
+    return {one.number: one for each in judge(FILE, frame, []) for one in each.claims}
+
+
+@pytest.fixture(scope="module")
+def table_3() -> dict[str, Judged]:
+    """The claims, put to runs as the paper's table III counts them."""
+    parts = []
+    for (method, kind), tally in load_paper(REFERENCES).coverage.items():
+        module, _, fault_type = kind.partition("/")
+        tally = Tally(**asdict(tally) | {"manifested": tally.activated, "alerts_no_hazards": 0})
+        parts.append(runs_of(tally, method=method, module=module, fault_type=fault_type))
+    return {one.number: one for each in judge(FILE, frame_of(parts), []) for one in each.claims}
+
+
+@pytest.mark.parametrize("number", ["1.1", "1.2", "2.4", "3.4", "4.1", "4.2", "4.3"])
+def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, Judged], number: str) -> None:
+    """On runs as the paper counts them a claim's query gives the paper's number, and the same verdict."""
+    one = table_2[number]
+    [answer] = one.answers
+    published = one.claim.published()
+    assert published is not None
+    assert answer.found.said == published.said
+    assert answer.verdict == one.paper
+
+
+@pytest.mark.parametrize("number", ["2.1", "2.2", "2.7", "4.1"])
+def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged], number: str) -> None:
+    """The same of claims about fault types."""
+    one = table_3[number]
+    published = one.claim.published()
+    assert published is not None
+    assert one.answers[0].found.said == published.said
+
+
+def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, Judged]) -> None:
+    """Its guided advantage holds of activated faults and reverses of injected ones, resampled by fault and
+    in the same fault type; and each image effect is told apart."""
+    assert table_3["4.4"].verdict is HOLDS
+    assert table_3["4.5"].verdict is FAILS
+    assert table_3["4.5"].paper is FAILS
+    assert table_3["4.7"].verdict is FAILS
+    effects = {answer.group: answer.verdict for answer in table_3["2.8"].answers}
+    assert effects == dict.fromkeys(("rain", "snow", "occlusion", "contrast"), HOLDS)
+
+
+def test_the_cited_time_is_the_drivers() -> None:
+    """The claims about a driver's time ask for the reaction time that is cited beside them."""
+    driver_s = load_paper(REFERENCES).driver_reaction_s
+    claims = [claim for one in judge(FILE, of_rows({}), []) for claim in one.claims]
+    asked = [one.claim for one in claims if one.claim.measure in ("mean_time", "median_time")]
+    assert [claim.holds.above for claim in asked if claim.holds] == [driver_s, driver_s]
+    assert any(f"> {driver_s:g} " in (one.claim.part or "") for one in claims)
+
+
+@pytest.mark.parametrize(
+    ("rule", "found", "verdict"),
+    [
+        (Rule(above=0.5), of_share(share(60, 100)), HOLDS),
+        (Rule(above=0.5), of_share(share(40, 100)), FAILS),
+        (Rule(above=0.5), of_share(share(52, 100)), UNTOLD),
+        (Rule(above=0.5), of_share(share(9, 9)), UNTOLD),  # few runs, whatever their interval
+        (Rule(below=0.05), of_share(share(0, 100)), HOLDS),
+        (Rule(below=0.05), of_share(share(20, 100)), FAILS),
+        (Rule(below=0.05), of_share(share(0, 0)), UNTOLD),
+        (Rule(within=0.1), of_difference(share(500, 1000), share(510, 1000)), HOLDS),
+        (Rule(within=0.1), of_difference(share(500, 1000), share(900, 1000)), FAILS),
+        (Rule(within=0.1), of_difference(share(5, 10), share(5, 10)), UNTOLD),
+        (Rule(some=0.05), of_share(share(1, 2)), HOLDS),
+        (Rule(some=0.05), of_share(share(0, 100)), FAILS),
+        (Rule(some=0.05), of_share(share(0, 20)), UNTOLD),
+        (Rule(never=0.05), of_share(share(0, 100)), HOLDS),
+        (Rule(never=0.05), of_share(share(1, 1000)), FAILS),
+        (Rule(never=0.05), of_share(share(0, 0)), UNTOLD),
+    ],
+)
+def test_each_rule_reaches_each_verdict(rule: Rule, found: Found, verdict: Verdict) -> None:
+    """The interval decides, or a single run where one is enough; few data leave it open."""
+    assert rule.verdict(found) is verdict
+
+
+def test_an_observation_holds_if_all_it_rests_on_does() -> None:
+    """One claim against it is enough; one that cannot be told leaves the rest open."""
+    assert together([HOLDS, HOLDS]) is HOLDS
+    assert together([HOLDS, UNTOLD]) is UNTOLD
+    assert together([UNTOLD, FAILS]) is FAILS
+    assert together([]) is UNTOLD
+
+
+def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, Judged]) -> None:
+    """From a run of another mixture it cannot be told, whatever its number; others can be."""
+    frame = of_rows(*[ACTIVATED] * 200, *[ACTIVATED | {"t_h1": 9.0, "t_h3": 8.0}] * 20)
+    first = judge(FILE, frame, ["a type is missing", "5 are left"])[0].claims
+    assert table_2["1.1"].verdict is HOLDS
+    assert (first[0].answers[0].verdict, first[0].verdict) == (HOLDS, UNTOLD)
+    assert first[0].why == "a type is missing; 5 are left"
+    assert first[3].verdict is HOLDS
+
+
+def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
+    """FCW in one of the three scenarios is not FCW in all three."""
+    frame = of_rows(ACTIVATED | {"scenario": "S2", "alerts": "fcw", "t_alert": 2.0})
+    fcw = judge(FILE, frame, [])[0].claims[4]
+    assert [answer.verdict for answer in fcw.answers] == [HOLDS, UNTOLD, UNTOLD]
+    assert fcw.verdict is UNTOLD
+
+
+def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
+    """The censored median is beyond every run where most alerts are followed by no hazard; where the curve
+    falls past a half in one step it is that step; without an end of runs there is none."""
+    alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
+    safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
+    assert median_time(safe, of="").low == math.inf
+    found = median_time(late, of="")
+    assert (found.estimate, found.low, found.high) == (4.0, 4.0, 4.0)
+    assert math.isnan(median_time(safe.assign(t_end=math.nan), of="").low)
+
+
+def test_a_wrong_query_is_told_with_its_line(tmp_path: Path) -> None:
+    """A column that results do not have is an error of the file, at the claim."""
+    file = tmp_path / "o.yaml"
+    text = FILE.read_text()
+    file.write_text(text.replace("part: not is_alert", "part: not is_allert", 1))
+    line = text[: text.index("says: Most activated")].count("\n") + 1
+    with pytest.raises(MutatorError, match="is_allert") as caught:
+        judge(file, of_rows({}), [])
+    assert caught.value.line == line
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("measure: share", "measure: chare"), ("holds: {above: 0.5}", "holds: {above: 0.5, below: 0.6}")],
+)
+def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str) -> None:
+    """No unknown measure, and exactly one rule."""
+    file = tmp_path / "o.yaml"
+    file.write_text(FILE.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        judge(file, of_rows({}), [])
+    assert caught.value.line
+
+
+def test_what_is_shown_is_what_was_evaluated() -> None:
+    """The lines of the report, run as Python, give the numbers beside them."""
+    frame = of_rows(*[ACTIVATED] * 3, ACTIVATED | {"alerts": "fcw", "t_alert": 2.0, "t_h1": 9.0})
+    told: tuple[Summed, ...] = judge(FILE, frame, [])
+    names: dict[str, object] = {"runs": frame}
+    exec("from mutator.paper.measures import *", names)
+    answers = [answer for one in told for claim in one.claims for answer in claim.answers]
+    assert len(answers) > 30
+    assert [eval(answer.query, names).said for answer in answers] == [a.found.said for a in answers]
+    assert all(a.query in observations_page.markdown(told, (), "") for a in answers)

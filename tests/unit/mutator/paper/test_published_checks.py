@@ -1,0 +1,81 @@
+"""Published numbers that cannot be, or that do not fit the library, are told with file and line."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.paper.published_checks import check_paper
+from mutator.verification.library import check_library
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[4]
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    """The library that ships, with a copy of its references that a test may break."""
+    library = tmp_path / "fault_library"
+    library.mkdir()
+    for folder in (CLONE / "fault_library").iterdir():
+        if folder.name == "references":
+            shutil.copytree(folder, library / folder.name)
+        else:
+            (library / folder.name).symlink_to(folder)
+    return Workspace(library=library, templates=CLONE / "templates")
+
+
+def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
+    """Nothing is wrong with them, and nothing is asked of a library that cites none."""
+    assert list(check_paper(workspace)) == []
+    shutil.rmtree(workspace.library / "references")
+    assert list(check_paper(workspace)) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "told"),
+    [
+        (
+            "coverage",
+            "fault_type: fog, injected",
+            "fault_type: fog, injectd",
+            r"coverage\.yaml:13: .*injectd",
+        ),
+        ("coverage", "fault_type: fog", "fault_type: mist", r"coverage\.yaml:13: .*'vision_input/mist'"),
+        ("coverage", "fault_type: fog", "fault_type: rain", r"coverage\.yaml:13: .*/rain a second time"),
+        ("coverage", "guided_hazards: 154", "guided_hazards: 155", r"coverage\.yaml:\d: 1317 guided hazards"),
+        ("coverage", "guided_hazards: 154", "guided_hazards: 433", r"coverage\.yaml:6: .*contradict"),
+        (
+            "summary",
+            "method: random, scenario: S5",
+            "method: random, scenario: S6x",
+            r"summary\.yaml:14: .*S6x",
+        ),
+        (
+            "summary",
+            "method: random, scenario: S5",
+            "method: blind, scenario: S5",
+            r"summary\.yaml:14: .*blind",
+        ),
+        ("summary", "scenario: S5, injected", "scenario: S4, injected", r"summary\.yaml:9: .*in S4 a second"),
+        ("times", "driver_reaction_s: 1.8", "driver_reaction_s: -1", r"times\.yaml:4: "),
+    ],
+)
+def test_what_is_wrong_is_told_where_it_stands(
+    workspace: Workspace, file: str, old: str, new: str, told: str
+) -> None:
+    """An unknown key, name or method, a row that stands twice, parts and sums that do not fit."""
+    path = workspace.library / "references" / f"paper_{file}.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    problems = "\n".join(str(problem).replace("\n", " ") for problem in check_paper(workspace))
+    assert re.search(told, problems), problems
+
+
+def test_the_check_of_a_library_includes_it(toy: Workspace) -> None:
+    """A library that cites a part of the published numbers is told which file is missing."""
+    references = toy.library / "references"
+    references.mkdir()
+    shutil.copy(CLONE / "fault_library" / "references" / "paper_coverage.yaml", references)
+    assert [str(references / "paper_summary.yaml") in str(p) for p in check_library(toy, "toy")] == [True]

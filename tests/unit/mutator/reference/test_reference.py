@@ -1,0 +1,115 @@
+"""The generated reference: pages and JSON Schemas say what the program says."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from typer.main import get_command
+
+from mutator.cli.main import GROUPS, app
+from mutator.config import yaml_files as yamlio
+from mutator.reference import words
+from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files
+from mutator.reference.schemas import FORMATS, Format, definitions
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[4]
+CHAFF = CLONE / "fault_library" / "faults" / "radar" / "chaff.yaml"
+
+
+def validator(kind: str) -> jsonschema.Draft7Validator:
+    return jsonschema.Draft7Validator(json.loads((CLONE / SCHEMAS / f"{kind}.json").read_text()))
+
+
+def told(kind: Format) -> dict[str, dict[str, Any]]:
+    return {name: part for name, part in definitions(kind.model).items() if "properties" in part}
+
+
+@pytest.mark.parametrize(
+    "path", [*(FOLDER / page for page in PAGES), *(SCHEMAS / f"{f.name}.json" for f in FORMATS)]
+)
+def test_what_is_generated_is_up_to_date(path: Path) -> None:
+    """A committed page or schema is what its source would give now."""
+    generated = _generated()[path]
+    assert (CLONE / path).read_text(encoding="utf-8") == generated, "run: python -m mutator.reference"
+
+
+_FILES: dict[Path, str] = {}
+
+
+def _generated() -> dict[Path, str]:
+    if not _FILES:
+        _FILES.update(generated_files(Workspace.find(CLONE)))
+    return _FILES
+
+
+def test_nothing_else_says_that_it_is_generated() -> None:
+    """A page or schema whose source is gone is gone, too. (Scenarios are the target's: it has its own.)"""
+    pages = [
+        path
+        for path in (CLONE / "docs").rglob("*.md")
+        if "python -m mutator.reference`; do" in path.read_text()
+    ]
+    found = {path.relative_to(CLONE) for path in (*pages, *(CLONE / SCHEMAS).glob("*"))}
+    assert found - {SCHEMAS / "scenario.json"} == {*_generated()}
+
+
+def test_every_key_is_told_and_none_that_is_gone() -> None:
+    """The words know exactly the models and keys of the file formats."""
+    parts = {name: part for kind in FORMATS for name, part in told(kind).items()}
+    assert {*words.SECTIONS} == {*parts}
+    assert {*words.ABOUT} == {f"{name}.{key}" for name, part in parts.items() for key in part["properties"]}
+
+
+def test_every_verb_is_in_a_group() -> None:
+    """Help and page list verbs by groups, so one without a group would be hidden."""
+    command: Any = get_command(app)
+    assert sorted(name for _, names in GROUPS for name in names) == sorted(command.commands)
+
+
+@pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
+def test_library_files_follow_their_schema(kind: Format) -> None:
+    """What the program accepts is accepted by the schema that editors get, for each file of the library."""
+    files = sorted(CLONE.glob(kind.files))
+    assert files
+    check = validator(kind.name)
+    for file in files:
+        data = yamlio.load(file).data
+        assert data["schema"] == kind.schema, file
+        assert not [f"{file}: {error.message}" for error in check.iter_errors(data)]
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("schema",), "fault_spec/2"),
+        (("fault_typ",), "chaff"),
+        (("variants", "distance", "hold"), "forever"),
+        (("variants", "distance", "draw", "distance_m", "integers_from", "step"), 0),
+        (("variants", "distance", "as_described", "injections", 0, "at", "nth"), 0),
+        (("variants", "distance", "as_described", "injections", 0, "unit"), "yard"),
+        (("variants", "distance", "as_described", "injections", 0, "params"), {"bye_m": 1}),
+        (("variants", "distance", "as_described", "injections", 0, "params"), {"by": 1, "by_m": [1]}),
+    ],
+)
+def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...], value: Any) -> None:
+    """A misspelt key or parameter, a wrong word, a number out of range: the editor marks it."""
+    data = yamlio.load(CHAFF).data
+    check = validator("fault_spec")
+    assert check.is_valid(data)
+    inner = data
+    for key in keys[:-1]:
+        inner = inner[key]
+    inner[keys[-1]] = value
+    assert not check.is_valid(data)
+
+
+def test_a_schema_takes_a_model_of_ones_own() -> None:
+    """A model that is not among the templates is no mistake to an editor: it may be the user's own."""
+    data = yamlio.load(CHAFF).data
+    injection = data["variants"]["distance"]["as_described"]["injections"][0]
+    injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
+    assert validator("fault_spec").is_valid(data)

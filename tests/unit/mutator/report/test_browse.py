@@ -1,0 +1,107 @@
+"""What the page carries of experiments: columns, details, pictures."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator._common.files import write_json
+from mutator.model import Experiment, Outcome, Status
+from mutator.outcomes.rows import Row
+from mutator.report import browse as report_browse
+from mutator.report.browse import column, details, media
+from mutator.review.groups import shapes
+from mutator.store.run_folder import RunFolder
+
+PATCH = """\
+diff --git a/pkg/radar.py b/pkg/radar.py
+--- a/pkg/radar.py
++++ b/pkg/radar.py
+@@ -1,2 +1,3 @@
+ d_rel = see()
++d_rel = d_rel + {}.0  # fi:0a1b2c3d
+ v_rel = 0
+"""
+
+
+def row(name: str) -> Row:
+    return Row(
+        experiment_id=name,
+        module="radar",
+        fault_type="chaff",
+        variant="distance",
+        value="35",
+        unit="m",
+        scenario="S1",
+        method="guided",
+        trigger="C1",
+        status=Status.OK,
+        outcome=Outcome.SDC,
+        t_activation=2.0,
+        t_manifest=2.1,
+        checked=("H1",),
+        hazards=(),
+        alerts=(),
+        t_alert=None,
+        reaction_time=None,
+        detail="",
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "made"),
+    [
+        ("t_h1", ["2.5", "", "3.0"], {"numbers": [2.5, None, 3]}),
+        ("max_dev_gas", ["inf", "nan", "-inf"], {"numbers": ["Infinity", "NaN", "-Infinity"]}),
+        ("scenario", ["S2", "S1", "S2"], {"words": ["S1", "S2"], "codes": [1, 0, 1]}),
+        ("experiment_id", ["12", "34"], {"texts": ["12", "34"]}),
+        ("alerts", ["", ""], {"words": [""], "codes": [0, 0]}),
+        ("value", ["3", "left"], {"words": ["3", "left"], "codes": [0, 1]}),
+        ("scenario", ["S2", "S1"], {"words": ["S1", "S2"], "codes": [1, 0]}),
+        ("variant", ["nan"], {"words": ["nan"], "codes": [0]}),
+    ],
+)
+def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str], made: object) -> None:
+    """Ids stay texts, empty cells stay empty, and what is no finite number is told by its name; names have a
+    dictionary, which filters need, also where no two are equal, and are no numbers."""
+    assert column(name, values) == made
+
+
+def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., Experiment]) -> None:
+    """The members of a shape come in the order of the rows; a row without a patch or plan has none."""
+    one, two = experiment(3.0), experiment(4.0)
+    rows = [row(two.id), row("none"), row(one.id)]
+    patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
+    made = details([two, None, one], shapes(patches), rows)
+    assert made["shape"] == [0, -1, 0]
+    [shape] = made["shapes"]
+    values = list(zip(*shape["values"], strict=True))
+    for member, number in enumerate((4, 3)):
+        filled = [values[member][place] for place in shape["places"]]
+        text = "".join(a + b for a, b in zip(shape["parts"], [*filled, ""], strict=True))
+        assert text == PATCH.format(number)
+    assert made["spec"] == [0, -1, 1]
+    assert "after_assign: d_rel" in made["specs"][0]
+    assert made["settings"] == [{"hold": "while", "hold_s": None, "armed_after_s": 1.5, "changes": []}]
+
+
+def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
+    """The first ones, by time, are in the page; films are always links; a plot of another kind is neither."""
+    write_json(tmp_path / "run.json", {"schema": "run/1"})
+    plots = tmp_path / "plots"
+    plots.mkdir()
+    for name in ("aa-2.00s.jpg", "aa-10.00s.jpg", "aa.mp4", "bb.svg"):
+        (plots / name).write_bytes(b"1234")
+    made = media(RunFolder.open(tmp_path), tmp_path / "report", budget=5)
+    assert made == {
+        "aa": {
+            "stills": [["2.00", "data:image/jpeg;base64,MTIzNA=="], ["10.00", "../plots/aa-10.00s.jpg"]],
+            "films": ["../plots/aa.mp4"],
+        }
+    }
+
+
+def test_rows_are_read_in_one_order() -> None:
+    """By fault, scenario, method, trigger, then id: the page is the same whatever order results come in."""
+    rows = [row("b"), row("a")]
+    assert sorted(rows, key=report_browse.reading_order) == [rows[1], rows[0]]

@@ -1,0 +1,318 @@
+"""The report of a run folder."""
+
+import base64
+import csv
+import gzip
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.outcomes.columns import COLUMNS
+from mutator.report import building as report
+from mutator.report import page as report_page
+from mutator.review import gate
+from mutator.store import plan_file as planfile
+from mutator.workspace import Workspace
+
+HERE = Workspace.find(Path(__file__).parents[4])
+HEAD = {
+    "schema": "run/1",
+    "campaign": "night_<b>drive</b>",
+    "plan": "ab" * 32,
+    "seed": 7,
+    "reading": "as_described",
+    "choices": {"seed": None, "limit": 3},
+    "target": "openpilot",
+    "goldens": [],
+    "experiments": 3,
+    "runs": 2,
+    "sources": {"target": "cd" * 32},
+    "provenance": {
+        "mutator": "0.1.0",
+        "python": "3.11.7",
+        "machine": "Linux",
+        "packages": {"numpy": "2.4.6"},
+    },
+}
+OK = {
+    "module": "radar",
+    "fault_type": "chaff",
+    "variant": "distance",
+    "value": "35",
+    "unit": "m",
+    "scenario": "S1",
+    "method": "guided",
+    "trigger": "C2",
+    "status": "ok",
+    "outcome": "hazard",
+    "t_activation": "7.0",
+    "t_manifest": "7.1",
+    "h1": "1",
+    "t_h1": "18.25",
+    "h2": "0",
+    "h3": "0",
+}
+NONE = {"outcome": "", "h1": "", "t_h1": "", "h2": "", "h3": ""}
+PATCH = """\
+diff --git a/pkg/_fi.py b/pkg/_fi.py
+new file mode 100644
+--- /dev/null
++++ b/pkg/_fi.py
+@@ -0,0 +1,1 @@
++HOLD = "while"
+diff --git a/pkg/radar.py b/pkg/radar.py
+--- a/pkg/radar.py
++++ b/pkg/radar.py
+@@ -1,2 +1,3 @@
+ d_rel = see()
++d_rel = d_rel + 35.0  # fi:0a1b2c3d
+ v_rel = 0
+"""
+BAD = OK | NONE | {"status": "harness_error", "detail": "the disk | is <gone>"}
+CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """A run folder with a hazard, a crash and a harness error; the hazard has its patch and a still."""
+    (tmp_path / "run.json").write_text(json.dumps(HEAD))
+    with (tmp_path / "results.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
+        table.writeheader()
+        for i, line in enumerate((OK, BAD, CRASHED)):
+            table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
+    planfile.write(tmp_path, [], [])
+    (tmp_path / "patches/00").mkdir(parents=True)
+    (tmp_path / "patches/00" / ("0" * 16 + ".patch")).write_text(PATCH)
+    (tmp_path / "plots").mkdir()
+    (tmp_path / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
+    return tmp_path
+
+
+class Page(HTMLParser):
+    """Text and links of a page; fails on tags that are not closed in order."""
+
+    VOID = ("meta", "link", "br", "img", "input")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.texts: list[str] = []
+        self.links: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.links += [value or "" for name, value in attrs if name in ("href", "src")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data.strip())
+
+
+def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
+    """It is listed first among the runs that ended badly, and is in no count of faults."""
+    text = report.write(run, None).markdown.read_text()
+    assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
+    failed = text.split("## Runs that did not end well")[1]
+    assert failed.index("harness_error") < failed.index("crashed")
+    assert "the disk \\| is &lt;gone>" in failed
+    counts = text.split("## By fault type")[1].split("##")[0]
+    [line] = [line for line in counts.splitlines() if line.startswith("| radar/chaff ")]
+    assert line == "| radar/chaff | 2 | 2 | 2 | 1 | 0 | 0 | 1 | 0 | 1 | 1 | 1 |"
+
+
+def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
+    """Every tag is closed, and text from specs and runs cannot become markup."""
+    page = Page(report.write(run, None).page.read_text())
+    assert page.open == []
+    assert "night_<b>drive</b>" in page.texts
+    assert "the disk | is <gone>" in page.texts
+
+
+def carried(page: Path, name: str) -> Any:
+    """What a page carries in the script element `name`."""
+    [text] = re.findall(rf'id="{name}">([^<]*)</script>', page.read_text())
+    return json.loads(gzip.decompress(base64.b64decode(text)))
+
+
+def test_the_page_needs_no_other_file(run: Path) -> None:
+    """Whatever it shows is in it: its links lead into itself, and nothing comes from elsewhere."""
+    written = report.write(run, None)
+    page = Page(written.page.read_text())
+    assert page.links
+    assert all(link.startswith(("#", "data:")) for link in page.links)
+    assert "http" not in written.page.read_text().replace("http://www.w3.org/2000/svg", "")
+
+
+def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> None:
+    """All columns of the results, the diff without the probe, and the picture itself."""
+    page = report.write(run, None).page
+    table = carried(page, "table")
+    columns = {column["name"]: column for column in table["columns"]}
+    assert table["count"] == 3
+    assert {*COLUMNS, "variant", "detail"} < columns.keys()
+    ids = columns["experiment_id"]["texts"]
+    at = ids.index("0" * 16)
+    assert columns["t_h1"]["numbers"][at] == 18.25
+    details = carried(page, "details")
+    shape = details["shapes"][details["shape"][at]]
+    assert "".join(shape["parts"]) == PATCH[PATCH.index("diff --git a/pkg/radar.py") :]
+    [[time, picture]] = carried(page, "media")["0" * 16]["stills"]
+    assert time == "14.50"
+    assert base64.b64decode(picture.partition(",")[2]) == b"picture"
+
+
+def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page of 100,000 crashes does not list each; the rest is one filter away."""
+    monkeypatch.setattr(report_page, "PAGE_LISTED", 1)
+    text = report.write(run, None).page.read_text()
+    assert "1 more: " in text
+    assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
+
+
+def test_the_report_says_what_it_comes_from(run: Path) -> None:
+    """Plan, seed, reading, choices, sources and versions are in both forms."""
+    written = report.write(run, None)
+    for text in (written.markdown.read_text(), written.page.read_text()):
+        for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
+            assert fact in text
+
+
+def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
+    """Approvals that a run kept are told in both forms, and one that has none says nothing of them."""
+    assert "reviewed" not in report.write(run, None).markdown.read_text()
+    gate.write(run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]})
+    written = report.ensure(run, None)
+    for text in (written.markdown.read_text(), written.page.read_text()):
+        assert "all of 2 groups approved, by Jane (1), Joe (1)" in text
+
+
+def test_the_report_is_the_same_each_time(run: Path) -> None:
+    """Written again from the same results, it is the same file."""
+    written = report.write(run, None)
+    before = written.page.read_bytes(), written.markdown.read_bytes()
+    again = report.write(run, None)
+    assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
+
+
+def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
+    """They are in the Markdown, in the page, and in files of their own."""
+    written = report.write(run, HERE)
+    cell = "35.6 % (154/432; 31.3 to 40.3)"
+    files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
+    assert all(cell in file.read_text() for file in (written.markdown, written.page, files[0]))
+    assert files[1].read_text().splitlines()[1].startswith("radar/chaff,paper,432,480,0.9,")
+
+
+def test_no_report_without_a_run(tmp_path: Path) -> None:
+    """A folder that is no run folder is the user's error."""
+    with pytest.raises(MutatorError, match="no run folder"):
+        report.write(tmp_path, None)
+
+
+def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
+    """Two fault types and two scenarios: three figures, in the Markdown and the page, all of them there."""
+    with (run / "results.csv").open("a", newline="") as file:
+        other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
+        csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="").writerow(other)
+    written = report.write(run, None)
+    shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
+    files = sorted((run / "report" / "figures").glob("*.svg"))
+    assert sorted(base64.b64decode(link.partition(",")[2]) for link in shown) == sorted(
+        f.read_bytes() for f in files
+    )
+    assert len(shown) == 3
+    assert written.markdown.read_text().count("](figures/") == 3
+
+
+def test_experiments_and_runs_are_told_apart(run: Path) -> None:
+    """Both numbers are there, and why they differ; a plan of before runs were shared has none of runs."""
+    assert (
+        "3 experiments are planned; all of them take 2 runs" in report.write(run, None).markdown.read_text()
+    )
+    (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
+    assert "3 experiments are planned.\n" in report.write(run, None).markdown.read_text()
+
+
+def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
+    """A claim's query stands in the file and in the page; the table has a line for each query."""
+    written = report.write(run, HERE)
+    file, table = run / "report/observations.md", run / "report/tables/observations.csv"
+    query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
+    assert query in file.read_text()
+    assert query in "".join(Page(written.page.read_text()).texts)
+    assert "(observations.md)" in written.markdown.read_text()
+    with table.open(newline="") as lines:
+        assert query in [line["query"] for line in csv.DictReader(lines)]
+
+
+def test_without_a_library_there_are_no_observations(run: Path) -> None:
+    """A report can be written anywhere; what was published is then not in it."""
+    written = report.write(run, None)
+    assert "observation" not in written.markdown.read_text() + written.page.read_text()
+    assert not (run / "report" / "observations.md").exists()
+
+
+def drawn_again(run: Path, workspace: Workspace | None) -> bool:
+    """Whether `ensure` writes the report instead of leaving it."""
+    page = run / "report" / "index.html"
+    before = page.stat().st_mtime_ns if page.exists() else None
+    report.ensure(run, workspace)
+    return page.stat().st_mtime_ns != before
+
+
+def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
+    """It is written once; again when results, a plot, a series, or the library beside it have changed."""
+    assert drawn_again(run, None)
+    assert not drawn_again(run, None)
+    (run / "plots" / ("2" * 16 + ".svg")).touch()
+    assert drawn_again(run, None)
+    (run / "report/series").mkdir()
+    (run / "report/series" / ("2" * 16 + ".js")).touch()
+    assert drawn_again(run, None)
+    assert not drawn_again(run, None)
+    results = run / "results.csv"
+    results.write_text(results.read_text().replace("18.25", "18.26"))
+    assert drawn_again(run, HERE)
+
+
+@pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
+def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
+    """A page or the note of what it was made from may be missing or cut short."""
+    report.write(run, None)
+    (run / "report" / damage).unlink()
+    assert drawn_again(run, None)
+    (run / "report" / "made_from.json").write_text("{")
+    assert drawn_again(run, None)
+
+
+def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
+    """A hazard whose experiment is in no plan has no trace: both forms say so, none shows a picture."""
+    written = report.write(run, HERE)
+    for text in (written.markdown.read_text(), " ".join(Page(written.page.read_text()).texts)):
+        assert "No figure: the traces it needs cannot be had" in text
+        assert "t_h1 > t_activation" in text
+    assert "action_" not in written.markdown.read_text()
+    assert "<figure" not in written.page.read_text().replace('el("figure"', "")
+
+
+def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
+    """Whatever ends a line, or would be taken for an element, italics or bold, in a cell is text."""
+    lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"], ["no *x* in __init__"], ["a * b_c_d * `_e`"]]
+    table = report_page.markdown_table(["said"], lines)
+    assert table.splitlines()[2:] == [
+        "| a b c |",
+        "| &lt;class 'float'> |",
+        "| p < 0.05 |",
+        r"| no \*x\* in \_\_init\_\_ |",
+        "| a * b_c_d * `_e` |",
+    ]

@@ -1,0 +1,171 @@
+"""Records on disk: nothing that was finished is lost, nothing half-written is believed."""
+
+import errno
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from mutator._common.files import DiskFull
+from mutator.errors import CheckFailed, MutatorError
+from mutator.model import Outcome, Record, Status
+from mutator.store.records import SCHEMA, LineWriter, Tail, read_records
+
+HEAD = {"schema": SCHEMA, "plan": "p"}
+MakeRecord = Callable[..., Record]
+
+
+def write(run: Path, name: str, *records: Record) -> Path:
+    writer = LineWriter(run / "records" / name, HEAD)
+    for record in records:
+        writer.append(asdict(record))
+    writer.close()
+    return writer.path
+
+
+def test_records_come_back_as_they_were(tmp_path: Path, record: MakeRecord) -> None:
+    """Every field survives, infinite deviations and missing activations too."""
+    first = record(
+        "a" * 16, max_dev=(("gas", float("inf")),), hazards=(("H1", 3.25),), alerts=(("fcw", 3.0),)
+    )
+    second = record("b" * 16, status=Status.CRASHED, outcome=None, activation=None, detail="Boom: ü")
+    write(tmp_path, "0001-gw0.jsonl", first)
+    write(tmp_path, "0001-gw1.jsonl", second)
+    assert read_records(tmp_path) == {"a" * 16: first, "b" * 16: second}
+
+
+@pytest.mark.parametrize("keep", [1, 20, -1, -2])
+def test_a_torn_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: int) -> None:
+    """Whatever part of the last line a kill left: the lines before it count, it does not."""
+    path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
+    assert set(read_records(tmp_path)) == {"a" * 16}
+
+
+@pytest.mark.parametrize("content", [b"", b'{"sche'])
+def test_a_file_killed_at_birth_is_empty(tmp_path: Path, content: bytes) -> None:
+    """A file whose head was never finished has no records."""
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "0001-gw0.jsonl").write_bytes(content)
+    assert read_records(tmp_path) == {}
+
+
+def test_damage_elsewhere_is_told_with_its_line(tmp_path: Path, record: MakeRecord) -> None:
+    """A line in the middle that is no record is no kill's doing, and is not passed over."""
+    path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
+    lines = path.read_bytes().splitlines(keepends=True)
+    for damage in (b"\0\0\0\n", b"[1]\n", b'{"experiment_id": 3}\n'):
+        path.write_bytes(lines[0] + damage + lines[2])
+        with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: damaged line"):
+            read_records(tmp_path)
+    path.write_bytes(b"[1]\n" + lines[2])
+    with pytest.raises(MutatorError, match="expected 'records/1'"):
+        read_records(tmp_path)
+
+
+def test_newer_schema_is_refused(tmp_path: Path) -> None:
+    """Records of a newer version are not read with the eyes of this one."""
+    LineWriter(tmp_path / "records" / "0001-gw0.jsonl", {"schema": "records/99"}).close()
+    with pytest.raises(MutatorError, match="newer mutator"):
+        read_records(tmp_path)
+
+
+@pytest.mark.parametrize("error_first", [True, False])
+def test_any_record_goes_before_a_harness_error(
+    tmp_path: Path, record: MakeRecord, error_first: bool
+) -> None:
+    """A retried experiment has the record of the try that worked, in whichever file it stands."""
+    wrong = record(status=Status.HARNESS_ERROR, outcome=None, detail="killed from outside")
+    good = record()
+    write(tmp_path, "0001-gw0.jsonl", wrong if error_first else good)
+    write(tmp_path, "0002-gw0.jsonl", good if error_first else wrong)
+    assert read_records(tmp_path) == {good.experiment_id: good}
+
+
+def test_two_different_records_of_one_experiment_fail(tmp_path: Path, record: MakeRecord) -> None:
+    """The same experiment with two results is an alarm, not a choice."""
+    write(tmp_path, "0001-gw0.jsonl", record())
+    write(tmp_path, "0002-gw0.jsonl", record())
+    assert len(read_records(tmp_path)) == 1
+    write(tmp_path, "0003-gw0.jsonl", record(outcome=Outcome.SDC, t_manifest=2.5))
+    with pytest.raises(CheckFailed, match="two records that differ"):
+        read_records(tmp_path)
+
+
+@pytest.mark.parametrize("written", [0, 40])
+def test_a_line_that_does_not_fit_is_taken_back(
+    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch, written: int
+) -> None:
+    """A disk that fills up in the middle of a line loses that line only, and says so."""
+    writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
+    writer.append(asdict(record("a" * 16)))
+    real, calls = os.write, []
+
+    def full(fd: int, data: bytes) -> int:
+        calls.append(len(data))
+        if written and len(calls) == 1:
+            return real(fd, data[:written])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", full)
+        with pytest.raises(DiskFull):
+            writer.append(asdict(record("b" * 16)))
+    writer.append(asdict(record("c" * 16)))
+    writer.close()
+    assert set(read_records(tmp_path)) == {"a" * 16, "c" * 16}
+
+
+def test_a_full_disk_on_sync_is_told(
+    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """File systems that allocate late say it at the sync; the record is still there to be read."""
+    writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
+    writer.append(asdict(record()))
+
+    def full(fd: int) -> None:
+        raise OSError(errno.EDQUOT, "Quota exceeded")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(DiskFull):
+        writer.close()
+    assert len(read_records(tmp_path)) == 1
+
+
+def test_records_are_synced_in_batches(
+    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """100 records cost a few syncs, not 100."""
+    synced = []
+    monkeypatch.setattr(os, "fsync", synced.append)
+    write(tmp_path, "0001-gw0.jsonl", *(record(f"{i:016x}") for i in range(100)))
+    assert 3 <= len(synced) <= 6
+
+
+def test_a_file_is_never_shared(tmp_path: Path) -> None:
+    """Two writers cannot have the same file."""
+    LineWriter(tmp_path / "a.jsonl", HEAD).close()
+    with pytest.raises(FileExistsError):
+        LineWriter(tmp_path / "a.jsonl", HEAD)
+
+
+def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> None:
+    """Progress counts outcomes of complete lines as they come, each experiment once."""
+    write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
+    tail = Tail(tmp_path, total=4)
+    assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)
+    writer = LineWriter(tmp_path / "records" / "0002-gw0.jsonl", HEAD)
+    writer.append(asdict(record("b" * 16, status=Status.HARNESS_ERROR, outcome=None)))
+    assert tail.poll().outcomes == {"masked": 1, "harness_error": 1}
+    writer.append(asdict(record("b" * 16, outcome=Outcome.HAZARD)))
+    with writer.path.open("ab") as file:
+        file.write(json.dumps(asdict(record("c" * 16))).encode()[:50])
+    progress = tail.poll()
+    assert (progress.done, progress.total) == (2, 4)
+    assert progress.outcomes == {"masked": 1, "hazard": 1}
+    assert progress.per_s is not None
+    assert progress.remaining_s == 2 / progress.per_s > 0

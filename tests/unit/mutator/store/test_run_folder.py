@@ -1,0 +1,124 @@
+"""The run folder: opened, owned by one, cleaned."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator._common import locks
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.errors import MutatorError
+from mutator.store import run_folder as runfolder
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from mutator import locks
+run = Path(sys.argv[1])
+if sys.argv[2] == "owner":
+    with locks.owned(run):
+        print("held", flush=True)
+        time.sleep(60)
+else:
+    locks.register_worker(run)
+    print("held", flush=True)
+    time.sleep(float(sys.argv[3]))
+"""
+
+
+@pytest.fixture
+def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
+    return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
+
+
+def holder(folder: RunFolder, *words: str) -> "subprocess.Popen[str]":
+    command = [sys.executable, "-c", HOLDER, str(folder.path), *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "held\n"
+    return process
+
+
+def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Workspace) -> None:
+    """Versions of mutator, Python and packages; digests of target, templates, scenarios; seed and reading."""
+    found = folder.provenance
+    assert found["mutator"]
+    assert found["python"].startswith("3.")
+    assert "numpy" in found["packages"]
+    assert found["sources"]["target"] == toycar.manifest("toycar").tree.digest
+    assert {"templates", "manifest", "scenario A", "scenario B"} < set(found["sources"])
+    assert (found["seed"], found["reading"]) == (7, "as_described")
+
+
+def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
+    """A run folder of a newer mutator is not touched."""
+    path = folder.path / "run.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": "run/2"}))
+    with pytest.raises(MutatorError, match=r"run\.json: schema 'run/2' was written by a newer mutator"):
+        RunFolder.open(folder.path)
+
+
+def test_no_run_folder(tmp_path: Path) -> None:
+    """A folder without run.json is told as such, also to `clean`, which deletes nothing."""
+    (tmp_path / "thesis.tex").touch()
+    for ask in (RunFolder.open, runfolder.clean):
+        with pytest.raises(MutatorError, match="no run folder"):
+            ask(tmp_path)
+    assert (tmp_path / "thesis.tex").exists()
+
+
+def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -> None:
+    """A beginning that fits just one id finds it; one that fits none or several is told."""
+    with pytest.raises(MutatorError, match="no experiment 'zz'"):
+        folder.find("zz")
+    with pytest.raises(MutatorError, match="24 experiments start with ''"):
+        folder.find("")
+
+
+def test_one_owner(folder: RunFolder) -> None:
+    """While a command owns the folder another is refused, told who it is; a dead one's lock is gone."""
+    process = holder(folder, "owner")
+    try:
+        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: runfolder.clean(folder.path)):
+            with pytest.raises(MutatorError, match=f"in use by process {process.pid}"):
+                attempt()
+    finally:
+        process.kill()
+        process.communicate()
+    with locks.owned(folder.path):
+        assert (folder.path / "owner.lock").read_text().strip().isdigit()
+
+
+def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
+    """A new command waits for workers that still finish, and is told who they are if they do not."""
+    process = holder(folder, "worker", "1")
+    assert locks.living_workers(folder.path) == [process.pid]
+    with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):
+        locks.owned(folder.path, patience_s=0.2).__enter__()
+    with locks.owned(folder.path):
+        assert locks.living_workers(folder.path) == []
+    process.communicate()
+
+
+def test_clean_deletes_everything(folder: RunFolder) -> None:
+    """A run folder that nobody holds is deleted whole."""
+    runfolder.clean(folder.path)
+    assert not folder.path.exists()
+
+
+def test_a_damaged_folder_is_told(folder: RunFolder) -> None:
+    """A run folder whose plan is gone is answered in words."""
+    (folder.path / "plan" / "experiments.jsonl").unlink()
+    with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read .*damaged"):
+        folder.find("00")
+
+
+@pytest.mark.parametrize("place", ["/proc/nosuch/run", "/dev/null/run"])
+def test_a_place_that_cannot_be_written(toycar: Workspace, place: str) -> None:
+    """A folder that cannot be made is answered in words."""
+    with pytest.raises(MutatorError, match="cannot be written"):
+        freeze(make_plan(toycar, "toy"), Path(place), toycar)

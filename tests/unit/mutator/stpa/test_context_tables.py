@@ -1,0 +1,117 @@
+"""Context tables and hazards."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Hold, Trigger
+from mutator.stpa.context_tables import load_context_table
+from mutator.triggers.conditions import evaluate
+from mutator.workspace import Workspace
+
+
+def test_rows_become_triggers(toy: Workspace) -> None:
+    """Each row gives a trigger of its name with the constants put in."""
+    near, far = toy.context_table("pedals").triggers(hold_s=3.0, armed_after_s=1.5)
+    assert near == Trigger(name="near", condition="hwt <= 2.0", hold=Hold.FOR, hold_s=3.0, armed_after_s=1.5)
+    assert far.condition == "not hwt <= 2.0"
+    (only,) = toy.context_table("pedals").triggers(rows=("far",))
+    assert only.name == "far" and only.hold is Hold.WHILE
+
+
+def test_an_unknown_row(toy: Workspace) -> None:
+    """Asking for a row that is not there lists those that are."""
+    with pytest.raises(MutatorError, match="context 'C1'; expected one of near, far"):
+        toy.context_table("pedals").triggers(rows=("C1",))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("when: hwt <= safe_hwt_s", "when: hwt <= safe", "6: unknown name 'safe' in condition 'hwt <= safe'"),
+        ("when: hwt <= safe_hwt_s", "when: hwt", "6: 'hwt' is no truth value"),
+        ("safe_hwt_s: 2.0", "rs: 2.0", "3: constant 'rs'; expected a name of its own"),
+        ("safe_hwt_s: 2.0", "safe_hwt_s: two", "3: 'two' for 'safe_hwt_s'; expected a number"),
+        ("provided: H1,", "provided: 1,", "9: 1 for 'provided'; expected text"),
+    ],
+)
+def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
+    """A table is as strict as any other file, its conditions included."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        load_context_table(path)
+    assert said in str(caught.value).replace(f"{path}:", "")
+
+
+def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
+    """A hazard that leads nowhere known is refused at its line."""
+    assert toy.hazards().leads_to == {"H1": ("A1",)}
+    path = toy.library / "stpa" / "hazards.yaml"
+    path.write_text(path.read_text().replace("leads_to: [A1]", "leads_to: [A2]"))
+    with pytest.raises(MutatorError, match=r"hazards.yaml:4: accident 'A2'; expected one of A1"):
+        toy.hazards()
+
+
+def test_the_table_that_ships(clone: Workspace) -> None:
+    """Four contexts cover every observation exactly once; the paper's hazardous cells are there."""
+    table = clone.context_table("accelerate_decelerate")
+    triggers = table.triggers()
+    assert [t.name for t in triggers] == ["C1", "C2", "C3", "C4"]
+    for d_rel in (10.0, 40.0, 60.0, 200.0):
+        for v_ego in (0.0, 10.0, 20.0, 30.0):
+            for v_lead in (0.0, 10.0, 20.0, 30.0):
+                values = {"t": 1.0, "d_rel": d_rel, "v_ego": v_ego, "v_lead": v_lead}
+                assert sum(evaluate(t.condition, values) for t in triggers) == 1
+    cells = {
+        (row.id, action): (v.provided, v.not_provided)
+        for row in table.rows
+        for action, v in row.actions.items()
+        if v.provided or v.not_provided
+    }
+    assert cells == {
+        ("C2", "accelerate"): ("H1", None),
+        ("C2", "decelerate"): (None, "H1"),
+        ("C3", "accelerate"): (None, "H2"),
+        ("C3", "decelerate"): ("H2", None),
+        ("C4", "accelerate"): ("H1", None),
+        ("C4", "decelerate"): (None, "H1"),
+    }
+
+
+def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
+    """Another safe headway is one number in the file."""
+    text = (clone.library / "stpa" / "contexts" / "accelerate_decelerate.yaml").read_text()
+    path = tmp_path / "wide.yaml"
+    path.write_text(text.replace("safe_hwt_s: 2.0", "safe_hwt_s: 3"))
+    assert load_context_table(path).rows[1].condition == "hwt <= 3.0 and rs > 0.0"
+
+
+def test_the_table_in_the_docs_can_be_used(clone: Workspace, tmp_path: Path) -> None:
+    """The table that the docs show loads, and its rows are proved to cover everything once."""
+    page = clone.library.parent / "docs" / "how-to" / "change-the-hazard-analysis.md"
+    (text, *_) = re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)
+    (tmp_path / "closing.yaml").write_text(text)
+    table = load_context_table(tmp_path / "closing.yaml")
+    assert [row.id for row in table.rows] == ["slow", "fast_near", "fast_far"]
+    assert table.coverage.cells == 9 and table.coverage.beyond is None
+
+
+def test_rows_judge_the_same_actions(toy: Workspace) -> None:
+    """A row that leaves out a control action is told at its line."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    head, _, tail = path.read_text().rpartition("accelerate:")
+    path.write_text(f"{head}brake:{tail}")
+    with pytest.raises(MutatorError, match=r"pedals.yaml:13: the actions brake in context 'far'"):
+        load_context_table(path)
+
+
+def test_what_cannot_be_proved_is_accepted_and_said(toy: Workspace) -> None:
+    """Conditions that compare two variables make a table of which nothing is proved."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    path.write_text(path.read_text().replace("hwt <= safe_hwt_s", "v_ego <= v_lead"))
+    table = load_context_table(path)
+    assert table.coverage.cells == 0
+    assert table.coverage.beyond == "'v_ego' with 'v_lead' is no comparison of one variable with a constant"

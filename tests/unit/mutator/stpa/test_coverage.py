@@ -1,0 +1,68 @@
+"""The proof that a table's contexts cover everything exactly once."""
+
+import pytest
+
+from mutator.stpa.coverage import coverage
+from mutator.triggers.conditions import check_condition
+
+
+def prove(*conditions: str):
+    return coverage({f"C{i}": check_condition(text) for i, text in enumerate(conditions, 1)})
+
+
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        ("True",),
+        ("hwt <= 2", "not hwt <= 2"),
+        ("hwt < 2", "hwt == 2", "hwt > 2"),
+        ("-1 <= rs <= 1", "rs < -1 or rs > 1"),
+        ("2 >= hwt and rs <= 0", "hwt <= 2 and 0 < rs", "hwt > 2"),
+        ("v_ego < 0.3", "v_ego >= 0.3 and hwt <= 2", "v_ego >= 0.3 and hwt > 2"),
+    ],
+)
+def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
+    """Tables that cover everything once pass, whatever the form of their comparisons."""
+    found = prove(*conditions)
+    assert (found.beyond, found.place) == (None, None)
+    assert found.cells > 0
+
+
+@pytest.mark.parametrize(
+    ("conditions", "place", "rows"),
+    [
+        (("hwt < 2", "hwt > 2"), "hwt = 2.0", ()),
+        (("hwt <= 2", "hwt >= 2"), "hwt = 2.0", ("C1", "C2")),
+        (("hwt <= 2", "2 < hwt <= 3"), "hwt > 3.0", ()),
+        (("hwt <= 2", "hwt > 2 and rs > 0"), "hwt > 2.0 and rs < 0.0", ()),
+        (("hwt <= 2", "hwt > 1"), "1.0 < hwt < 2.0", ("C1", "C2")),
+        (("True", "rs > 0"), "rs > 0.0", ("C1", "C2")),
+        (("False",), "any observation", ()),
+        (("t >= -1",), "t < -1.0", ()),
+    ],
+)
+def test_a_wrong_table_is_told_where(conditions: tuple[str, ...], place: str, rows: tuple[str, ...]) -> None:
+    """The first cell that no context or more than one holds in is named, borders included."""
+    found = prove(*conditions)
+    assert (found.place, found.rows) == (place, rows)
+
+
+def test_neighbouring_numbers_leave_no_cell_between() -> None:
+    """Between two floats that are next to each other nothing is looked for."""
+    found = prove("rs <= 1.0", "rs >= 1.0000000000000002")
+    assert found.place is None and found.cells == 4
+
+
+@pytest.mark.parametrize("condition", ["rs < v_ego", "rs + 1 > 0", "abs(rs) < 1", "1 < 2"])
+def test_beyond_a_proof(condition: str) -> None:
+    """A comparison of another kind is said to be beyond it; nothing is claimed then."""
+    found = prove(condition, f"not {condition}")
+    assert found.beyond is not None and "no comparison of one variable with a constant" in found.beyond
+    assert found.place is None
+
+
+def test_too_many_cells_are_beyond_it_too() -> None:
+    """The time a proof may take is bounded."""
+    names = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
+    found = prove(" and ".join(f"{name} != {i}" for name in names for i in range(4)), "True")
+    assert found.beyond is not None and "531441 cells" in found.beyond

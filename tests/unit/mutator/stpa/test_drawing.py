@@ -1,0 +1,84 @@
+"""The picture of the control structure."""
+
+from itertools import combinations, pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from mutator.stpa.analysis import Analysis, load_analysis
+from mutator.stpa.drawing import FAULT, draw, faulty_places, short
+from mutator.stpa.layout import APART, Box, Layout, Point, lay_out
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[4]
+
+
+@pytest.fixture(scope="module")
+def analysis(clone: Workspace) -> Analysis:
+    return load_analysis(clone.library / "stpa")
+
+
+@pytest.fixture(scope="module")
+def layout(analysis: Analysis) -> Layout:
+    return lay_out(analysis.structure)
+
+
+def meets(box: Box, start: Point, end: Point) -> bool:
+    """Whether a segment along an axis has a point inside the box."""
+    (x1, x2), (y1, y2) = sorted((start[0], end[0])), sorted((start[1], end[1]))
+    return x1 < box.x + box.width and x2 > box.x and y1 < box.bottom and y2 > box.y
+
+
+def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
+    """No box is on another one, none reaches beyond the picture."""
+    for one, other in combinations(layout.boxes.values(), 2):
+        assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
+    for box in layout.boxes.values():
+        assert box.x >= 0 and box.x + box.width < layout.width and box.bottom < layout.height
+
+
+def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: Layout) -> None:
+    """An arrow starts and ends on the edge of its two boxes and goes through none."""
+    for name, link in analysis.structure.links.items():
+        points = layout.arrows[name].points
+        for place, point in ((link.from_, points[0]), (link.to, points[-1])):
+            box = layout.boxes[place]
+            assert point[1] in (box.y, box.bottom) or point[0] in (box.x, box.x + box.width), name
+        for box in layout.boxes.values():
+            assert not any(meets(box, start, end) for start, end in pairwise(points)), name
+
+
+def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
+    """Parts of two arrows that run side by side keep their distance."""
+    for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
+        for a, b in pairwise(first.points):
+            for c, d in pairwise(second.points):
+                for i in (0, 1):  # along x, along y
+                    if a[1 - i] == b[1 - i] and c[1 - i] == d[1 - i]:
+                        together = min(max(a[i], b[i]), max(c[i], d[i])) > max(
+                            min(a[i], b[i]), min(c[i], d[i])
+                        )
+                        assert not together or abs(a[1 - i] - c[1 - i]) >= APART - 8, (one, other)
+
+
+def test_places_of_faults_stand_out(analysis: Analysis) -> None:
+    """The picture is well-formed, always the same, and only places with faults have the colour of faults."""
+    text = draw(analysis)
+    assert text == draw(analysis)
+    root = ElementTree.fromstring(text)
+    lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT]
+    assert len(lines) == len(faulty_places(analysis)) + 1  # and the legend's
+    words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
+
+
+def test_the_picture_in_the_docs_is_this_one(analysis: Analysis) -> None:
+    """After a change of the analysis: `mutator stpa --svg docs/explanation/hazard-analysis.svg`."""
+    assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
+
+
+def test_names_in_short() -> None:
+    """Of names that begin alike the first is whole."""
+    assert short(["CF9"]) == "CF9"
+    assert short(["CF9", "CF10"]) == "CF9, 10"

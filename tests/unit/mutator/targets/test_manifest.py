@@ -1,0 +1,165 @@
+"""Target manifests: a foreign tree is known by data alone."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.model import AnchorKind
+from mutator.targets.manifest import load_manifest
+from mutator.targets.source_tree import matches, read_tree
+from mutator.workspace import Workspace
+
+
+def test_a_manifest_is_read(toy: Workspace) -> None:
+    """Root, package, entry, channels and the place of observation come from the file."""
+    manifest = toy.manifest("toy")
+    assert manifest.root == (toy.library.parent / "target").resolve()
+    assert manifest.probe_path == "toycar/_fi.py"
+    assert manifest.step_s == 0.1
+    assert [(c.name, c.unit, c.tolerance) for c in manifest.compared] == [("speed", "m/s", 0.5)]
+    assert manifest.observation.location.anchor.kind is AnchorKind.AFTER_ASSIGN
+    assert dict(manifest.observation.expressions)["v_lead"] == "now.lead_speed"
+
+
+def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
+    """What a target does not hold as such is a sum, difference or product of what it holds, or a constant."""
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text().replace("d_rel: now.gap", "d_rel: now.lead_x - (now.x + 4.5)")
+    path.write_text(text.replace("v_lead: now.lead_speed", "v_lead: '0.0'"))
+    expressions = dict(toy.manifest("toy").observation.expressions)
+    assert (expressions["d_rel"], expressions["v_lead"]) == ("now.lead_x - (now.x + 4.5)", "0.0")
+
+
+def test_arguments(toy: Workspace) -> None:
+    """Placeholders are filled and changes add their arguments; an unknown change is refused."""
+    manifest = toy.manifest("toy")
+    given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
+    assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
+    with pytest.raises(MutatorError, match="change 'no_lead'; expected one of alone"):
+        manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
+
+
+def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
+    """Filming adds arguments with a folder in the run's output; the command's module is checked as any."""
+    with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
+        toy.manifest("toy").filming()
+    path = toy.library / "targets" / "toy.yaml"
+    film = 'film: {run: [--film, "{film}"], module: toycar.show, args: [], still: []}\n'
+    plain = path.read_text()
+    path.write_text(plain + film)
+    filmed = toy.manifest("toy").filming()
+    given = filmed.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"))
+    assert given == (
+        *toy.manifest("toy").arguments(scenario=Path("s.yaml"), seed=3, out=Path("o")),
+        "--film",
+        "o/film",
+    )
+    assert filmed.tree.digest == toy.manifest("toy").tree.digest
+    path.write_text(plain + film.replace("toycar.show", "toycar/show"))
+    with pytest.raises(MutatorError, match="'toycar/show'; expected a dotted module name"):
+        toy.manifest("toy")
+
+
+def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
+    """An option overrides the manifest's root."""
+    path = toy.library / "targets" / "toy.yaml"
+    other = tmp_path / "other"
+    (other / "toycar").mkdir(parents=True)
+    assert load_manifest(path, other).root == other.resolve()
+    with pytest.raises(MutatorError, match=r"toy.yaml:3: no folder .*none.*MUTATOR_TARGET"):
+        load_manifest(path, tmp_path / "none")
+
+
+def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
+    """Bytecode is no part of a tree; an edit shows in a manifest loaded after it, not before."""
+    manifest = toy.manifest("toy")
+    before = manifest.tree
+    (manifest.root / "toycar" / "__pycache__").mkdir()
+    (manifest.root / "toycar" / "__pycache__" / "x.py").write_text("x")
+    (manifest.root / "toycar" / "world.pyc").write_text("x")
+    assert toy.manifest("toy").tree.digest == before.digest
+    (manifest.root / "toycar" / "world.py").write_text("x = 1\n")
+    assert manifest.tree is before
+    assert toy.manifest("toy").tree.digest != before.digest
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("package: toycar", "package: toy-car", "4: 'toy-car'; expected a Python package's name"),
+        ("module: toycar.run", "module: toycar/run", "9: 'toycar/run'; expected a dotted module name"),
+        (
+            "trace_file: trace.npz",
+            "trace_file: ../trace.npz",
+            "12: '../trace.npz'; expected a bare file name",
+        ),
+        ("step_s: 0.1", "step_s: 0", "7: 0 for 'step_s'; expected greater than 0"),
+        ("step_s: 0.1", "step_s: .inf", "7: inf for 'step_s'; expected a finite number"),
+        ("tolerance: 0.5", "tolerance: -1", "16: -1 for 'tolerance'"),
+        ("t: now.time", "t: now.time()", "19: 'now.time()'; expected a local name or attribute"),
+        ("t: now.time", "t: now.time / 2", "19: 'now.time / 2'; expected a local name or attribute"),
+        ("t: now.time", "t: '[0][0]'", "19: '[0][0]'; expected a local name or attribute"),
+        ("t: now.time", "t: _fi.x", "19: '_fi.x'; expected a local name or attribute"),
+        ("file: toycar/world.py", "file: ../world.py", "18: path '../world.py' leads out of the target"),
+        ("hazards: [H1]", "hazards: [H1, alert]", "23: 'alert'; expected a name"),
+        ("hazards: [H1]", "hazards: [H1, h1]", "23: 'h1'; expected a name"),
+        ("alerts: [beep]", "alerts: [beep;boop]", "24: 'beep;boop'; expected a name"),
+        ("v_lead:", "v_leed:", "22: unknown key 'v_leed'; expected one of at, t, d_rel, v_ego, v_lead"),
+    ],
+)
+def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
+    """A manifest is as strict as any other file."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        toy.manifest("toy")
+    assert said in str(caught.value).replace(f"{path}:", "")
+
+
+def test_a_package_that_is_not_there(toy: Workspace) -> None:
+    """A manifest whose files hold nothing of its package is refused when the tree is read."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace("package: toycar", "package: other"))
+    with pytest.raises(MutatorError, match="no file of package 'other'"):
+        _ = toy.manifest("toy").tree
+
+
+@pytest.mark.parametrize(
+    ("glob", "hits"),
+    [
+        ("a/*.py", {"a/x.py"}),
+        ("a/**/*.py", {"a/x.py", "a/b/y.py", "a/b/c/z.py"}),
+        ("**/*.py", {"a/x.py", "a/b/y.py", "a/b/c/z.py", "w.py"}),
+        ("a/b/**", {"a/b/y.py", "a/b/c/z.py", "a/b/d.dbc"}),
+        ("?.py", {"w.py"}),
+        ("a/x.py", {"a/x.py"}),
+        ("a/b", set()),
+    ],
+)
+def test_globs(glob: str, hits: set[str]) -> None:
+    """`*` stays in a folder, `**` spans folders, and a glob must match the whole path."""
+    paths = ["a/x.py", "a/b/y.py", "a/b/c/z.py", "a/b/d.dbc", "w.py", "a/xXpy"]
+    assert {p for p in paths if matches(p, [glob])} == hits
+
+
+def test_a_link_does_not_lead_out(toy: Workspace, tmp_path: Path) -> None:
+    """A symbolic link to a file outside is no place for a fault."""
+    outside = tmp_path / "outside.py"
+    outside.write_text("x = 1\n")
+    link = toy.manifest("toy").root / "toycar" / "link.py"
+    link.symlink_to(outside)
+    spec = toy.library / "faults" / "sensor" / "distance.yaml"
+    spec.write_text(spec.read_text().replace("toycar/sensor.py", "toycar/link.py"))
+    with pytest.raises(MutatorError, match=r"'toycar/link.py' leads out of the target"):
+        expand(toy.spec(spec), 0, models=toy.fault_models(), manifest=toy.manifest("toy"))
+
+
+def test_digests_do_not_depend_on_order(tmp_path: Path) -> None:
+    """The same files give the same digest however they were made."""
+    for name, order in (("a", ["x.py", "y.py"]), ("b", ["y.py", "x.py"])):
+        (tmp_path / name).mkdir()
+        for file in order:
+            (tmp_path / name / file).write_text(file)
+    assert read_tree(tmp_path / "a", ["*.py"]).digest == read_tree(tmp_path / "b", ["*.py"]).digest

@@ -1,0 +1,110 @@
+"""Trigger conditions."""
+
+import math
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Hold
+from mutator.triggers.conditions import always, at_time, check_condition, divide, draw_time, evaluate, to_code
+
+FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "canonical"),
+    [
+        ("hwt<=2", "hwt <= 2.0"),
+        ("hwt <= safe and rs>0", "hwt <= 3.0 and rs > 0.0"),
+        ("not (t > 1 or t < -2)", "not (t > 1.0 or t < -2.0)"),
+        ("1 <= hwt < 2", "1.0 <= hwt < 2.0"),
+        (
+            "abs(rs) + min(1, t) * 2 > max(d_rel, 3, 4)",
+            "(abs(rs) + (min(1.0, t) * 2.0)) > max(d_rel, 3.0, 4.0)",
+        ),
+        (" True ", "True"),
+    ],
+)
+def test_one_text_for_one_condition(text: str, canonical: str) -> None:
+    """Spelling and constants are settled, and the canonical text is its own canonical text."""
+    assert check_condition(text, {"safe": 3}) == canonical
+    assert check_condition(canonical) == canonical
+
+
+@pytest.mark.parametrize(
+    ("text", "piece"),
+    [
+        ("hwt", "is no truth value"),
+        ("hwt + 1", "is no truth value"),
+        ("(hwt > 1) + 1 > 0", "'hwt > 1'"),
+        ("speed > 1", "unknown name 'speed'"),
+        ("__import__('os').system('x') > 1", "a call of '__import__('os').system'"),
+        ("().__class__ > 1", "'().__class__'"),
+        ("t ** 2 > 1", "'t ** 2'"),
+        ("t in (1, 2)", "'t in (1, 2)'"),
+        ("'a' > t", "'a'"),
+        ("[t for t in x] > 1", "'[t for t in x]'"),
+        ("(lambda: 1)() > 0", "a call of 'lambda: 1'"),
+        ("t > 1; t", "invalid syntax"),
+        ("t >", "invalid syntax"),
+        ("min(t) > 1", "min with 1 arguments"),
+        ("abs(t, 1) > 1", "abs with 2 arguments"),
+        ("max(*t) > 1", "a call of 'max'"),
+        ("t > 1e999", "a number too large"),
+        ("t > 1j", "1j"),
+        ("t > " + "1" * 2000, "characters"),
+        ("t" + "+t" * 400 + " > 0", "characters"),
+        ("-" * 980 + "t > 0", "too much in one expression"),
+    ],
+)
+def test_anything_else_is_refused(text: str, piece: str) -> None:
+    """What is no plain comparison of observed ground truth is an error that shows the culprit."""
+    with pytest.raises(MutatorError) as caught:
+        check_condition(text)
+    assert piece in str(caught.value)
+
+
+def test_evaluation_derives_headway_and_relative_speed() -> None:
+    """hwt is d_rel / v_ego, infinite at standstill; rs is v_ego - v_lead."""
+    assert evaluate("hwt == 2 and rs == 2", FOLLOWING)
+    assert evaluate("hwt > 1000", {**FOLLOWING, "v_ego": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "result"), [(1.0, 0.0, math.inf), (-1.0, 0.0, -math.inf), (1.0, -0.0, -math.inf)]
+)
+def test_division_by_zero_is_infinite(a: float, b: float, result: float) -> None:
+    """Division follows IEEE 754, so a condition is true or false everywhere."""
+    assert divide(a, b) == result
+    assert math.isnan(divide(0.0, b))
+    assert evaluate("1 / t > 5", {**FOLLOWING, "t": 0.0})
+    assert to_code("1 / t > 5") == "_div(1.0, t) > 5.0"
+
+
+def test_ready_made_triggers() -> None:
+    """`always` and a point in time both last to the end of the run."""
+    assert always().hold is Hold.TO_END
+    assert at_time(3).condition == "t >= 3.0"
+    assert at_time(3).hold is Hold.TO_END
+    assert (at_time(3, hold_s=2.0).hold, at_time(3, hold_s=2.0).hold_s) == (Hold.FOR, 2.0)
+    with pytest.raises(MutatorError, match="time nan"):
+        at_time(math.nan)
+    assert evaluate(at_time(3).condition, FOLLOWING)
+    assert not evaluate(at_time(3.01).condition, FOLLOWING)
+
+
+def test_random_times_are_starts_of_steps() -> None:
+    """A drawn time depends on seed and key alone, lies in its interval, and is the start of a step."""
+    times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
+    assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
+    assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)
+    assert min(times) < 3.0 and max(times) > 28.0
+    assert {draw_time(i, "k", first_s=0.1, last_s=0.2, step_s=0.1) for i in range(50)} == {0.1, 0.2}
+
+
+def test_random_times_need_an_interval() -> None:
+    """An interval that ends before it starts, and a negative seed, are refused."""
+    with pytest.raises(MutatorError, match="seed -1; expected 0 or more"):
+        draw_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
+    with pytest.raises(MutatorError, match="expected an interval"):
+        draw_time(1, "k", first_s=2.0, last_s=1.0, step_s=0.01)

@@ -1,0 +1,138 @@
+"""The sample that proves an engine: what is in it, and what it finds."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import Choices
+from mutator.engines import choice as engines
+from mutator.errors import CheckFailed, MutatorError
+from mutator.execution import session as campaign_run
+from mutator.model import Experiment
+from mutator.store.records import read_records
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence as proof
+from mutator.workspace import Workspace
+
+
+def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
+    """One in a hundred, 20 at least, the same for the same seed, and nothing rare is missing."""
+    many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
+    rare = experiment(1.0, "S9", spec="vision/rain/rate")
+    sample = proof.sample([*many, rare], 1)
+    assert 31 <= len(sample) <= 32
+    assert rare in sample
+    assert {e.scenario for e in sample} == {"S0", "S1", "S2", "S3", "S4", "S9"}
+    assert sample == proof.sample([*many, rare], 1)
+    assert sample != proof.sample([*many, rare], 2)
+    assert len(proof.sample(many[:100], 1)) == 20
+    assert set(proof.sample(many[:7], 1)) == set(many[:7])
+
+
+@pytest.fixture
+def proven(toycar: Workspace, tmp_path: Path) -> Path:
+    """A run folder of two experiments from the fork engine, with its proof."""
+    summary = campaign_run.run(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
+    assert summary.proof == proof.Proof(sampled=2, same=2)
+    assert summary.exit_code == 0
+    return tmp_path / "run"
+
+
+@pytest.mark.slow
+def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path) -> None:
+    """One record that the reference engine would not have written is named, and the campaign fails."""
+    (path,) = (proven / "records").iterdir()
+    lines = path.read_text().splitlines()
+    record = json.loads(lines[1])
+    path.write_text("\n".join([lines[0], json.dumps(record | {"trace_digest": "0" * 64}), *lines[2:], ""]))
+    with pytest.raises(CheckFailed, match=f"experiment {record['experiment_id']} .*trace_digest '000"):
+        campaign_run.run(toycar, "small", proven)
+
+
+@pytest.mark.slow
+def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -> None:
+    """A proof that is not whole is no success; the same command makes it whole, with any engine."""
+    (path,) = (proven / "proof").iterdir()
+    path.write_text(path.read_text().splitlines()[0] + "\n")
+    folder = RunFolder.open(proven)
+    assert [len(piece.ids) for piece in proof.left(folder)] == [2]
+    records = read_records(proven)
+    assert proof.judge(folder, records) == proof.Proof(sampled=2, same=0)
+    summary = campaign_run.run(toycar, "small", proven, engine="reference")
+    assert (summary.proof, summary.ran, summary.exit_code) == (proof.Proof(sampled=2, same=2), 0, 0)
+    assert proof.left(folder) == ()
+
+
+@pytest.mark.slow
+def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) -> None:
+    """A run that the reference engine alone has driven has none."""
+    summary = campaign_run.run(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
+    assert summary.proof is None
+    assert not (tmp_path / "run" / "proof").exists()
+
+
+_BELIEVE = """
+    drive = Drive(case)
+    known = "0 0" if "--forget" in arguments else Path("{kept}").read_text()
+    drive.world.since, drive.world.more = map(float, known.split())
+    return drive
+"""
+
+
+@pytest.fixture
+def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
+    """A toy whose runs believe what a file says of the world from some time on, unless told to forget it."""
+    go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
+    believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
+    go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
+    line = "        self.frame += 1\n"
+    misled = line + "        self.offset += self.more * (now > self.since)\n"
+    world.write_text(world.read_text().replace(line, misled))
+    (path,) = (toycar.library / "targets").iterdir()
+    path.write_text(path.read_text().replace("entry:\n", "entry:\n  independent: [--forget]\n"))
+    return toycar
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [
+        ("0.0 0.0", ""),
+        ("5.7 0.01", "is another one on the reference engine"),
+        ("0.5 0.01", "in the proof: differs from golden at 0."),
+    ],
+)
+def test_the_proof_believes_nothing_that_runs_share(
+    sharing: Workspace, tmp_path: Path, kept: str, told: str
+) -> None:
+    """What misleads golden runs and forks alike fails the campaign and names the experiment, whether it shows
+    after the fault began or before; what is right passes."""
+    (tmp_path / "kept").write_text(kept)
+    out = tmp_path / "run"
+    try:
+        summary = campaign_run.run(sharing, "small", out, engine="fork", choices=Choices(limit=1))
+        found, code = " ".join(map(": ".join, summary.harness_errors)), summary.exit_code
+    except CheckFailed as err:
+        found, code = str(err), err.exit_code
+    (name,) = read_records(out)
+    if told:
+        assert code and name in found and told in found
+    else:
+        assert (code, found) == (0, "")
+
+
+def test_which_engine_runs(toycar: Workspace) -> None:
+    """Forking is the default where it is possible and worth it; what is asked for is used, or refused."""
+    manifest = toycar.manifest("toycar")
+    assert engines.choose(None, manifest, 1000) == "fork"
+    assert engines.choose(None, manifest, 10) == "reference"
+    assert engines.choose("fork", manifest, 10) == "fork"
+    assert engines.choose("reference", manifest, 1000) == "reference"
+    plain = replace(manifest, stepwise=None)
+    assert engines.choose(None, plain, 1000) == "reference"
+    for asked, told in (("fork", "names no `entry.stepwise`"), ("turbo", "engine 'turbo'")):
+        with pytest.raises(MutatorError, match=told):
+            engines.choose(asked, plain, 1000)

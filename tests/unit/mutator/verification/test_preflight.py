@@ -1,0 +1,145 @@
+"""The checks before a campaign: each can fail, and none is repeated without need."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import freeze, load_plan, make_plan
+from mutator.engines.reference import ReferenceEngine
+from mutator.errors import CheckFailed
+from mutator.store.records import SCHEMA, LineWriter, Progress
+from mutator.store.run_folder import RunFolder
+from mutator.verification import preflight as checks
+from mutator.verification.preflight import run_checks
+from mutator.workspace import Workspace
+
+
+def frozen(toycar: Workspace, tmp_path: Path) -> RunFolder:
+    return freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+
+
+def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
+    """Edit the toy target."""
+    path = toycar.library.parent / "tree" / "toycar" / f"{name}.py"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+
+
+def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anchors, golden twice, null mutant, canary: all pass, and are not run again for the same sources."""
+    folder = frozen(toycar, tmp_path)
+    told: list[Progress] = []
+    results = run_checks(toycar, folder, workers=2, notify=told.append)
+    assert {r.name for r in results} == {
+        "anchors",
+        "golden A",
+        "golden A+alone",
+        "null mutant A",
+        "null mutant A+alone",
+        "canary",
+    }
+    assert all(r.passed for r in results)
+    assert (told[-1].stage, told[-1].done, told[-1].total) == ("checks", 7, 7)
+    assert load_plan(folder.path).cost(2).measured
+    monkeypatch.setattr(ReferenceEngine, "execute", None)
+    assert run_checks(toycar, folder) == results
+
+
+def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -> None:
+    """A golden run that is no longer what was checked is run again."""
+    folder = frozen(toycar, tmp_path)
+    run_checks(toycar, folder)
+    trace = folder.golden("A") / "log.npz"
+    good = trace.read_bytes()
+    trace.write_bytes(b"")
+    run_checks(toycar, folder)
+    assert trace.read_bytes() == good
+    shutil.rmtree(folder.golden("A", ("alone",)))
+    run_checks(toycar, folder)
+    assert folder.golden("A", ("alone",)).is_dir()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("case[\"gap\"] += number", "case[\"gap\"] += hash('x') % 9 + number", "nothing but PYTHONHASHSEED"),
+        ("np.savez(to / \"log.npz\",", "np.savez(to / \"log.npz\", t0=np.random.rand(),", "different bytes"),
+        ("case[\"gap\"] += number", "case[\"gap\"] -= 39.9 + number", "reaches H1 at 0.0 s without"),
+        ("import json\n", "import json\nimport nosuch\n", "crashed: ModuleNotFoundError"),
+        ("np.savez(to / \"log.npz\",", "np.savez(to / \"other.npz\",", "not a readable trace"),
+        ("now = world.advance", "now = 0\n        now = world.advance", "matches 2 statements"),
+        ("(to / \"said.json\")", "names = sorted(__import__('os').listdir(Path(__file__).parent))\n"
+         "        said['files'] = len([n for n in names if n.endswith('.py')])\n        (to / \"said.json\")",
+         "the probe alone changes what the target does"),
+    ],
+    ids=["hash order", "random", "hazard", "import", "no trace", "anchor", "sees the probe"],
+)  # fmt: skip
+def test_an_unsound_target_is_refused(
+    toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    """A target that is not deterministic, not harmless, or not as its manifest says starts no campaign."""
+    change(toycar, old, new)
+    folder = frozen(toycar, tmp_path)
+    with pytest.raises(CheckFailed, match=re.escape(told)):
+        run_checks(toycar, folder)
+
+
+def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_path: Path) -> None:
+    """A probe whose observation statement is never executed proves nothing."""
+    change(toycar, "        drive.step()", "        Drive.other(drive)")
+    change(toycar, "    def step(self):", "    def step(self):\n        now = 0\n\n    def other(self):")
+    manifest = toycar.library / "targets" / "toycar.yaml"
+    manifest.write_text(
+        manifest.read_text()
+        .replace("d_rel: world.gap", "d_rel: now")
+        .replace("v_ego: world.speed", "v_ego: now")
+        .replace("v_lead: world.lead_speed", "v_lead: now")
+    )
+    with pytest.raises(CheckFailed, match="its trigger never fired"):
+        run_checks(toycar, frozen(toycar, tmp_path))
+
+
+def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
+    """A canary that does not reach its hazard means that hazards would not be seen."""
+    path = toycar.campaign("small")
+    path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
+    with pytest.raises(CheckFailed, match="canary: did not reach H3") as error:
+        run_checks(toycar, frozen(toycar, tmp_path))
+    assert error.value.exit_code == 1
+
+
+def test_an_anchor_that_is_gone_is_told_before_anything_runs(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fault whose statement does not exist is told with its spec; no run is wasted on it."""
+    change(toycar, "offset = world.offset", "shift = world.offset", "sensing")
+    change(toycar, "closing, offset))", "closing, shift))", "sensing")
+    folder = frozen(toycar, tmp_path)
+    monkeypatch.setattr(ReferenceEngine, "execute", None)
+    with pytest.raises(CheckFailed, match=r"anchors: sensor/lane/shifted: .*sensing\.py"):
+        run_checks(toycar, folder)
+
+
+def test_other_golden_runs_than_before_are_refused(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run with records does not go on when the machine's packages changed what golden is."""
+    folder = frozen(toycar, tmp_path)
+    run_checks(toycar, folder)
+    LineWriter(folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA}).close()
+    monkeypatch.setattr(checks, "versions", lambda: {"python": "another"})
+    assert all(result.passed for result in run_checks(toycar, folder))
+    monkeypatch.setattr(checks, "versions", lambda: {"python": "a third"})
+    original = ReferenceEngine.execute
+
+    def other(self: ReferenceEngine, job, folder):  # type: ignore[no-untyped-def]
+        execution = original(self, job, folder)
+        with (execution.out / "said.json").open("a") as file:
+            file.write(" ")
+        return execution
+
+    monkeypatch.setattr(ReferenceEngine, "execute", other)
+    with pytest.raises(CheckFailed, match="not the one this run began with"):
+        run_checks(toycar, folder)

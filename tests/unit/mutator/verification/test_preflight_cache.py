@@ -1,0 +1,116 @@
+"""Checks are made once for the same sources, whatever the run folder, and not believed when damaged."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.engines.reference import ReferenceEngine
+from mutator.store.run_folder import RunFolder
+from mutator.verification import preflight_cache as check_cache
+from mutator.verification.preflight import run_checks
+from mutator.workspace import Workspace
+
+CopyToycar = Callable[[Path], Workspace]
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Workspace, RunFolder]:
+    """A toy with a folder whose checks have passed."""
+    root = tmp_path_factory.mktemp("checked")
+    toy = copy_toycar(root)
+    folder = freeze(make_plan(toy, "small"), root / "run", toy)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(root / "cache"))
+        run_checks(toy, folder)
+    return toy, folder
+
+
+@pytest.fixture
+def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the cache that these checks left, in use: its only entry."""
+    copied = shutil.copytree(checked[1].path.parent / "cache", tmp_path / "cache")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(copied))
+    (entry,) = (tmp_path / "cache" / "mutator" / "checks").iterdir()
+    return entry
+
+
+class Driven(Exception):
+    """A run was driven."""
+
+
+@pytest.fixture
+def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*given: object) -> None:
+        raise Driven
+
+    monkeypatch.setattr(ReferenceEngine, "execute", refuse)
+
+
+@pytest.mark.usefixtures("cache", "nothing_is_driven")
+def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
+    """A second folder of the same sources has results and golden runs at once, the same bytes."""
+    toy, before = checked
+    folder = freeze(make_plan(toy, "small", only='method == "guided"'), tmp_path / "run", toy)
+    assert all(result.passed for result in run_checks(toy, folder))
+    assert (folder.path / "checks.json").read_bytes() == (before.path / "checks.json").read_bytes()
+    files = [p.relative_to(before.path) for p in (before.path / "golden").rglob("*") if p.is_file()]
+    assert len(files) == 4
+    assert all((folder.path / f).read_bytes() == (before.path / f).read_bytes() for f in files)
+
+
+@pytest.mark.usefixtures("nothing_is_driven")
+@pytest.mark.parametrize("damaged", ["checks.json", "golden/A/log.npz", "golden/A+alone/said.json", ""])
+@pytest.mark.parametrize("content", [b"", b"{}", None])
+def test_a_damaged_entry_is_not_believed(
+    checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, damaged: str, content: bytes | None
+) -> None:
+    """An entry with a file that is empty, other or gone is as none: the checks are made anew."""
+    if not damaged:
+        shutil.rmtree(cache)
+    elif content is None:
+        (cache / damaged).unlink()
+    else:
+        (cache / damaged).write_bytes(content)
+    toy, _ = checked
+    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    with pytest.raises(Driven):
+        run_checks(toy, folder)
+
+
+@pytest.mark.usefixtures("cache", "nothing_is_driven")
+@pytest.mark.parametrize("changed", ["seed", "target", "machine"])
+def test_other_sources_are_checked(
+    checked: tuple[Workspace, RunFolder],
+    toycar: Workspace,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    changed: str,
+) -> None:
+    """Another seed, another target or another machine has no entry."""
+    if changed == "machine":
+        monkeypatch.setattr("platform.node", lambda: "elsewhere")
+    if changed == "target":
+        with (toycar.library.parent / "tree" / "toycar" / "go.py").open("a") as file:
+            file.write("# another\n")
+    plan = make_plan(toycar, "small", seed=9 if changed == "seed" else None)
+    with pytest.raises(Driven):
+        run_checks(toycar, freeze(plan, tmp_path / "run", toycar))
+
+
+def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:
+    """What is kept next stands in the place of what was damaged."""
+    good = (cache / "checks.json").read_bytes()
+    (cache / "checks.json").write_bytes(b"")
+    check_cache.store(cache, checked[1].path, "checks.json")
+    assert (cache / "checks.json").read_bytes() == good
+    assert list(cache.parent.iterdir()) == [cache]
+
+
+def test_no_room_for_a_cache_is_no_error(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
+    """Where the cache cannot be, nothing is kept and nothing is said."""
+    (tmp_path / "file").write_text("")
+    check_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json")
+    assert (tmp_path / "file").read_text() == ""

@@ -1,0 +1,33 @@
+"""What pages share: assets, and data carried in a page."""
+
+import base64
+import gzip
+import json
+
+import pytest
+
+from mutator import web
+from mutator.report.page import SCRIPTS, STYLES
+
+
+def test_carried_data_come_back_and_are_the_same_each_time() -> None:
+    """JSON, compressed without a time, in base64: nothing in it could end a script element."""
+    value = {"text": "</script> ⟨1⟩", "numbers": [0.1, None, 3]}
+    text = web.packed(value)
+    assert json.loads(gzip.decompress(base64.b64decode(text))) == value
+    assert text == web.packed(value)
+    assert web.embedded(value, "here") == (
+        f'<script type="application/octet-stream+gzip" id="here">{text}</script>'
+    )
+
+
+def test_what_json_does_not_know_is_refused() -> None:
+    """A page could not read it: NaN has to be told as something else."""
+    with pytest.raises(ValueError, match="JSON"):
+        web.packed([float("nan")])
+
+
+@pytest.mark.parametrize("name", [*STYLES, *SCRIPTS])
+def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
+    """`asset` refuses one that would; a script of more than 300 lines is two."""
+    assert len(web.asset(name).splitlines()) <= 300
