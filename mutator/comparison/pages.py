@@ -9,12 +9,12 @@ from importlib.resources import files as package_files
 from pathlib import Path
 
 from mutator._common.files import make_folder, write_atomic
+from mutator._common.tables import Table, markdown_line
 from mutator._common.text import counted
 from mutator.comparison.comparison import Comparison, Gate, told
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.comparison.sides import words
 from mutator.outcomes.rows import Row
-from mutator.report.page import markdown_line, markdown_table
 from mutator.web import asset
 
 LISTED = 50  # experiments of one kind of change that the Markdown names; page and CSV have all
@@ -90,7 +90,7 @@ def markdown(comparison: Comparison) -> str:
     parts = [f"# {c.names.a} against {c.names.b}", summary(c), *c.remarks, "## What differs between the runs"]
     differing = [[f.name, f.a, f.b] for f in c.facts if f.differs]
     if differing:
-        parts.append(markdown_table(["what", c.names.a, c.names.b], differing))
+        parts.append(Table(heads=("what", c.names.a, c.names.b), rows=differing).as_markdown())
     else:
         parts.append("Nothing: the same sources, choices and versions.")
     parts.append(files_text(c))
@@ -99,7 +99,7 @@ def markdown(comparison: Comparison) -> str:
         if pairs := c.having(change):
             parts += [f"## {change.value}: {len(pairs)}", _listed(pairs)]
     if c.unmatched:
-        parts += ["## Not compared", markdown_table(["why", "experiments"], _texts(reasons(c)))]
+        parts += ["## Not compared", _reasons(c).as_markdown()]
         parts.append("Each of them is in `unmatched.csv`.")
     parts.append("The table of all pairs is `pairs.csv`; `index.html` lists those that changed.")
     return "\n\n".join(parts) + "\n"
@@ -111,8 +111,9 @@ def _listed(pairs: tuple[Pair, ...]) -> str:
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 
 
-def _texts(lines: Iterable[tuple[object, ...]]) -> list[list[str]]:
-    return [[str(cell) for cell in line] for line in lines]
+def _reasons(comparison: Comparison) -> Table:
+    rows = [(why, str(number)) for why, number in reasons(comparison)]
+    return Table(heads=("why", "experiments"), rows=rows)
 
 
 def page(comparison: Comparison) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mutator._common.files import write_atomic
+from mutator._common.tables import Table
 from mutator.model import Status
 from mutator.outcomes import rows as tables
 from mutator.outcomes.rows import Count, Row
@@ -40,12 +41,11 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
-    """A table of counts, ready to be printed."""
+class Counts:
+    """A table of counts and its title."""
 
     title: str
-    heads: list[str]
-    lines: list[list[str]]
+    table: Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +56,7 @@ class Content:
     facts: list[tuple[str, str]]
     planned: str  # how many experiments and runs
     outcomes: dict[str, int]
-    tables: list[Table]
+    tables: list[Counts]
     observations: (
         "Told | None"  # of the paper; None: the library has none, or none of their fault types is here
     )
@@ -191,7 +191,7 @@ def _facts(folder: RunFolder, rows: Sequence[Row], engine: "EngineTold | None") 
     return [(name, str(value)) for name, value in facts.items()]
 
 
-def _tables(rows: Sequence[Row]) -> list[Table]:
+def _tables(rows: Sequence[Row]) -> list[Counts]:
     keys = (
         ("By fault type", "fault type", tables.by_fault_type),
         ("By scenario", "scenario", tables.by_scenario),
@@ -202,5 +202,5 @@ def _tables(rows: Sequence[Row]) -> list[Table]:
     for title, head, key in keys:
         counts: tuple[Count, ...] = tables.counts_by(rows, key)
         heads, lines = tables.count_table(counts, head, hazards)
-        made.append(Table(title=title, heads=heads, lines=lines))
+        made.append(Counts(title=title, table=Table(heads=heads, rows=lines, right=range(1, len(heads)))))
     return made

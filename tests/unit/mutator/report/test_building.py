@@ -303,16 +303,3 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
         assert "t_h1 > t_activation" in text
     assert "action_" not in written.markdown.read_text()
     assert "<figure" not in written.page.read_text().replace('el("figure"', "")
-
-
-def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
-    """Whatever ends a line, or would be taken for an element, italics or bold, in a cell is text."""
-    lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"], ["no *x* in __init__"], ["a * b_c_d * `_e`"]]
-    table = report_page.markdown_table(["said"], lines)
-    assert table.splitlines()[2:] == [
-        "| a b c |",
-        "| &lt;class 'float'> |",
-        "| p < 0.05 |",
-        r"| no \*x\* in \_\_init\_\_ |",
-        "| a * b_c_d * `_e` |",
-    ]
