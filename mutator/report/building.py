@@ -13,6 +13,7 @@ from mutator._common.files import write_atomic
 from mutator._common.tables import Table
 from mutator.model import Status
 from mutator.outcomes import rows as tables
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Count, Row
 from mutator.report import stamp as report_stamp
 from mutator.store.run_folder import RunFolder
@@ -111,7 +112,7 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
     from mutator.statistics import sheets
     from mutator.statistics.frame import load
 
-    rows = tables.read_results(folder.path / "results.csv")
+    rows = Results.of_run(folder.path).rows()
     engine = report_engine.told(folder)
     frame = load(folder.path / "results.csv")
     statistics = sheets.run_sheets(folder, workspace)

@@ -40,9 +40,15 @@ def drawings(
 
 
 def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
-    """The rows that the query finds, in the order they are looked at."""
+    """The rows that the query finds, in the order they are looked at; none where the target has no such
+    hazard or channel."""
     numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
-    found = numbers.query(wanted.query, engine="python")
+    try:
+        found = numbers.query(wanted.query, engine="python")
+    except pd.errors.UndefinedVariableError:
+        return numbers.iloc[:0]
+    if wanted.order not in numbers:
+        return numbers.iloc[:0]
     return found.sort_values([wanted.order, "experiment_id"], ascending=[False, True])
 
 
