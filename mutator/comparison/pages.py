@@ -11,9 +11,8 @@ from pathlib import Path
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.tables import Table, markdown_line
 from mutator._common.text import counted
-from mutator.comparison.comparison import Comparison, Gate, told
+from mutator.comparison.comparison import Comparison, Gate, ending_change
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
-from mutator.comparison.sides import words
 from mutator.outcomes.rows import Row
 from mutator.web import asset
 
@@ -38,7 +37,7 @@ def write(comparison: Comparison, out: Path) -> Written:
     for sheet in comparison.sheets:
         write_atomic(out / "tables" / f"{sheet.name}.csv", sheet.csv().encode())
     write_atomic(pairs, _table(_pair_line(p) for p in comparison.pairs))
-    unmatched = ({"why": why, "experiment": e.id, "words": words(e)} for why, e in comparison.unmatched)
+    unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
     write_atomic(out / "unmatched.csv", _table(unmatched, heads=("why", "experiment", "words")))
     write_atomic(text, markdown(comparison).encode())
     write_atomic(hypertext, page(comparison).encode())
@@ -106,7 +105,9 @@ def markdown(comparison: Comparison) -> str:
 
 
 def _listed(pairs: tuple[Pair, ...]) -> str:
-    lines = [f"- {words(p.b)}: {markdown_line(told(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]]
+    lines = [
+        f"- {p.b.label}: {markdown_line(ending_change(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]
+    ]
     more = len(pairs) - LISTED
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 
@@ -148,7 +149,7 @@ def _shown(pair: Pair) -> dict[str, object]:
     """What the page's table shows of a pair."""
     same = pair.a.id == pair.b.id
     return {
-        "words": words(pair.b),
+        "words": pair.b.label,
         "changes": [change.value for change in Change if change in pair.changes],
         "sides": [_shown_side(pair.row_a), _shown_side(pair.row_b)],
         "ids": [pair.a.id] if same else [pair.a.id, pair.b.id],

@@ -61,16 +61,3 @@ def key_of(experiment: Experiment) -> Key:
     """What the experiment is matched by."""
     fault = experiment.fault
     return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)
-
-
-def words(experiment: Experiment) -> str:
-    """The experiment in words: `radar/chaff/distance 35 m, S1, guided C1`."""
-    fault = experiment.fault
-    value = f" {fault.value} {fault.unit}".removesuffix(" -") if fault.value is not None else ""
-    return f"{fault.spec}{value}, {drive(experiment)}"
-
-
-def drive(experiment: Experiment) -> str:
-    """What the fault was put to, in words: `S1, guided C1`."""
-    method = experiment.method.value
-    return f"{experiment.scenario}, {method} {experiment.trigger.name.removeprefix(f'{method}/')}"

@@ -9,7 +9,6 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Sequence
 
-from mutator.comparison.sides import words
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.columns import plan_row
@@ -45,7 +44,7 @@ def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
 
 
 def _case(experiment: Experiment, row: Row | None, failures: Collection[str]) -> ET.Element:
-    case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=words(experiment))
+    case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=experiment.label)
     facts = {"experiment": experiment.id, "ending": row.ending if row else "not run"}
     if row:
         facts |= {f"hazard {name} [s]": f"{t:.2f}" for name, t in row.hazards}

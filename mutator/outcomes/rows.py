@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from mutator.model import Outcome, Status
+from mutator.model import Outcome, Status, fault_label
 from mutator.outcomes.columns import hazards_in
 
 UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
@@ -49,9 +49,8 @@ class Row:
 
     @property
     def fault(self) -> str:
-        """The fault in words: `radar/chaff/distance 35 m`."""
-        value = f" {self.value} {self.unit}".rstrip(" -") if self.value else ""
-        return f"{self.module}/{self.fault_type}/{self.variant}{value}"
+        """The label of the fault."""
+        return fault_label(f"{self.module}/{self.fault_type}/{self.variant}", self.value, self.unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

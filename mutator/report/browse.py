@@ -90,11 +90,13 @@ def reading_order(row: Row) -> tuple[str, ...]:
 
 
 def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, Any]:
-    """The results, a column each, and those that are filtered by: `kind`, `ending`, `hazards`, `t_hazard`."""
+    """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
+    `t_hazard`."""
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ())
     }
     columns["kind"] = [f"{r.module}/{r.fault_type}" for r in rows]
+    columns["fault"] = [r.fault for r in rows]
     columns["ending"] = [r.ending for r in rows]
     columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
     columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]

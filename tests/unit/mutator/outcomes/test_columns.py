@@ -62,7 +62,14 @@ def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
 
 @pytest.mark.parametrize(
     ("column", "text"),
-    [("trigger", True), ("kind", True), ("hazards", True), ("value", False), ("t_crushed", False)],
+    [
+        ("trigger", True),
+        ("kind", True),
+        ("fault", True),
+        ("hazards", True),
+        ("value", False),
+        ("t_crushed", False),
+    ],
 )
 def test_text_is_told_from_numbers(column: str, text: bool) -> None:
     """Names are text whatever they look like; a target's own columns are numbers."""
