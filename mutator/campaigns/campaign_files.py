@@ -91,22 +91,44 @@ class Campaign:
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
 
 
-class _SelectionModel(StrictModel):
-    spec: str
-    values: int | None = Field(None, ge=1)
+class _SelectionModel(StrictModel, title="A selection"):
+    """Faults of the library, by the names of their specs."""
+
+    spec: str = Field(
+        description="A glob over `<module>/<fault_type>/<variant>`: `radar/*`, `car_sensors/speed/low`."
+    )
+    values: int | None = Field(
+        None, ge=1, description="How many of each variant's values, spread evenly; without it, all."
+    )
 
 
-class _ArmingModel(StrictModel):
-    as_described: float = Field(ge=0.0, allow_inf_nan=False)
-    as_coded: float = Field(ge=0.0, allow_inf_nan=False)
+class _ArmingModel(StrictModel, title="Arming"):
+    """In seconds since the start of a run, for each reading."""
+
+    as_described: float = Field(ge=0.0, allow_inf_nan=False, description="With the reading of the text.")
+    as_coded: float = Field(ge=0.0, allow_inf_nan=False, description="With the reading of the code.")
 
 
-class _TriggersModel(StrictModel):
-    table: str
-    rows: list[str] | None = Field(None, min_length=1)
-    armed_after_s: _ArmingModel
-    random_until_s: float = Field(gt=0.0, allow_inf_nan=False)
-    hold_s: float | None = Field(None, gt=0.0, allow_inf_nan=False)
+class _TriggersModel(StrictModel, title="Triggers"):
+    """Guided experiments wait for the contexts of a table, random ones for a time that is drawn."""
+
+    table: str = Field(description="A context table, by its name.")
+    rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
+    armed_after_s: _ArmingModel = Field(
+        description="Before that time no trigger fires and no random time is drawn."
+    )
+    random_until_s: float = Field(
+        gt=0.0,
+        allow_inf_nan=False,
+        description="The latest random time. One past the end of a scenario never comes.",
+    )
+    hold_s: float | None = Field(
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="How long a fault stays active once triggered; without it, while its context holds, or "
+        "from its random time to the end.",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "_TriggersModel":
@@ -115,38 +137,66 @@ class _TriggersModel(StrictModel):
         return self
 
 
-class _CanaryModel(StrictModel):
-    spec: str
-    scenario: str
-    hazard: str
-    at_s: float = Field(ge=0.0, allow_inf_nan=False)
+class _CanaryModel(StrictModel, title="The canary"):
+    """A fault known to be harmful. It must reach its hazard, or the campaign does not start."""
+
+    spec: str = Field(
+        description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken."
+    )
+    scenario: str = Field(description="The scenario.")
+    hazard: str = Field(description="The hazard that must come.")
+    at_s: float = Field(ge=0.0, allow_inf_nan=False, description="From when on the fault is active.")
 
 
-class _LimitsModel(StrictModel):
-    cpu_s: int = Field(default=60, ge=1)
-    wall_s: int = Field(default=300, ge=1)
-    memory_mb: int = Field(default=4096, ge=256)
-    steps: int = Field(default=20_000, ge=1)
+class _LimitsModel(StrictModel, title="Limits"):
+    """What one run may use before it is stopped."""
+
+    cpu_s: int = Field(default=60, ge=1, description="Seconds of CPU.")
+    wall_s: int = Field(default=300, ge=1, description="Seconds of wall time.")
+    memory_mb: int = Field(default=4096, ge=256, description="MiB of address space.")
+    steps: int = Field(default=20_000, ge=1, description="Steps of simulation.")
 
 
-class CampaignModel(StrictModel):
-    """A campaign file, but for its key `schema`."""
+class CampaignModel(StrictModel, title="The file"):
+    """What is run, and what each run may use."""
 
-    name: str = Field(pattern=r"^[a-z0-9_]+$")
-    about: str
-    target: str
-    scenarios: list[str] = Field(min_length=1)
-    setting: list[str] = Field(default_factory=list)
-    faults: list[_SelectionModel] = Field(min_length=1)
-    reading: Literal["as_described", "as_coded"] = "as_described"
-    methods: list[Literal["guided", "random"]] = Field(min_length=1)
-    triggers: _TriggersModel
-    sample: int | None = Field(None, ge=1)
-    proportional: bool = False
-    seed: int = Field(ge=0, lt=2**63)
-    canary: _CanaryModel
-    limits: _LimitsModel = _LimitsModel()
-    chunk: int = Field(20, ge=1, le=1000)
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="Its name: small letters, digits and `_`.")
+    about: str = Field(description="What it is for.")
+    target: str = Field(description="The target, by the name of its manifest.")
+    scenarios: list[str] = Field(min_length=1, description="Names of scenarios, each once.")
+    setting: list[str] = Field(
+        default_factory=list,
+        description="Changes of the manifest that every run is made with, fault-free ones included.",
+    )
+    faults: list[_SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
+    reading: Literal["as_described", "as_coded"] = Field(
+        "as_described",
+        description="Which of the two [readings](../explanation/concepts.md#readings); `--reading` "
+        "overrides it.",
+    )
+    methods: list[Literal["guided", "random"]] = Field(
+        min_length=1, description="`guided`, `random` or both."
+    )
+    triggers: _TriggersModel = Field(description="When faults become active.")
+    sample: int | None = Field(
+        None,
+        ge=1,
+        description="How many experiments are taken, each variant as often as another; without it, all.",
+    )
+    proportional: bool = Field(
+        False,
+        description="The sample takes each fault type in each scenario in proportion to its number, guided "
+        "and random ones in pairs.",
+    )
+    seed: int = Field(ge=0, lt=2**63, description="The seed of all that is drawn; `--seed` overrides it.")
+    canary: _CanaryModel = Field(description="The check that a known fault does harm.")
+    limits: _LimitsModel = Field(_LimitsModel(), description="What one run may use.")
+    chunk: int = Field(
+        20,
+        ge=1,
+        le=1000,
+        description="How many experiments make a unit of work, which a worker takes at a time.",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "CampaignModel":

@@ -96,12 +96,13 @@ class FaultSpec:
         return iter(self.variants)
 
 
-class SweepModel(StrictModel):
-    """Ranges of equal width at equal distances: first, step, last."""
+class SweepModel(StrictModel, title="A sweep"):
+    """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` is the 24
+    ranges [15, 24], [25, 34] ... [245, 254]; one value is drawn from each, both ends included."""
 
-    first: list[float]
-    step: float = Field(gt=0.0, allow_inf_nan=False)
-    last: list[float]
+    first: list[float] = Field(description="The first range, [low, high].")
+    step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
+    last: list[float] = Field(description="The last range; whole steps above the first.")
 
     @model_validator(mode="after")
     def _even(self) -> "SweepModel":
@@ -120,36 +121,62 @@ class SweepModel(StrictModel):
         return ranges
 
 
-class _DrawModel(StrictModel):
-    integers_from: SweepModel | None = None
-    reals_from: SweepModel | None = None
-    decimals: int | None = Field(None, ge=0, le=12)
-    values: list[float | int] | None = None
-    cap: float | None = Field(None, allow_inf_nan=False)
-    key: str | None = None
+class _DrawModel(StrictModel, title="A draw"):
+    """The key of a draw is a name of one's own and a unit: `distance_m`. Parameters take the drawn value by
+    that name, without the unit, with a minus sign if wanted: `by_m: -distance`. Exactly one of
+    `integers_from`, `reals_from` and `values` is given. The same seed and the same key draw the same
+    values."""
+
+    integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")
+    reals_from: SweepModel | None = Field(None, description="One number from each range of a sweep.")
+    decimals: int | None = Field(
+        None, ge=0, le=12, description="Round numbers of `reals_from` to so many decimals."
+    )
+    values: list[float | int] | None = Field(None, description="These values, as they are.")
+    cap: float | None = Field(None, allow_inf_nan=False, description="No drawn value is above it.")
+    key: str | None = Field(
+        None,
+        description="What seeds the draw, so that variants can share it; default: the variant's full name.",
+    )
 
 
-class _ReadingModel(StrictModel):
-    injections: list[InjectionModel]
+class _ReadingModel(StrictModel, title="A reading"):
+    injections: list[InjectionModel] = Field(
+        description="At least one; any of them executed while triggered counts as activation."
+    )
 
 
-class _VariantModel(StrictModel):
-    aim: str
-    about: str
-    changes: list[str] = Field(default_factory=list)
-    hold: Literal["while", "to_end"] | None = None
-    draw: dict[str, _DrawModel] | None = None
-    as_described: _ReadingModel
-    as_coded: _ReadingModel | None = None
+class _VariantModel(StrictModel, title="A variant"):
+    """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
+
+    aim: str = Field(description="The hazard it aims at, one of the target's.")
+    about: str = Field(description="What this variant does.")
+    changes: list[str] = Field(
+        default_factory=list,
+        description="Changes of the scenario that belong to the fault, by their names in the target's "
+        "manifest.",
+    )
+    hold: Literal["while", "to_end"] | None = Field(
+        None,
+        description="How long the fault stays active, where it does not follow the trigger: `to_end` for a "
+        "fault that latches.",
+    )
+    draw: dict[str, _DrawModel] | None = Field(
+        None, description="One draw: name and unit -> draw. Without it the variant is a single fault."
+    )
+    as_described: _ReadingModel = Field(description="The injections in the reading of the text.")
+    as_coded: _ReadingModel | None = Field(
+        None, description="The injections in the reading of the code, where they differ."
+    )
 
 
-class SpecModel(StrictModel):
-    """A spec file, but for its key `schema`."""
+class SpecModel(StrictModel, title="The file"):
+    """A fault type of a module, in one or more variants."""
 
-    module: str
-    fault_type: str
-    about: str
-    variants: dict[str, _VariantModel]
+    module: str = Field(description="The module of the controller that the fault is in.")
+    fault_type: str = Field(description="The name of the fault type; with the module the name of the spec.")
+    about: str = Field(description="What goes wrong, in a sentence.")
+    variants: dict[str, _VariantModel] = Field(description="Name of the variant -> variant; at least one.")
 
 
 def load_spec(path: Path) -> FaultSpec:

@@ -125,54 +125,105 @@ class TargetManifest:
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args), stepwise=None)
 
 
-class _ChannelModel(StrictModel):
-    unit: str
-    tolerance: float = Field(0.0, ge=0.0, allow_inf_nan=False)
-    about: str = ""
+class _ChannelModel(StrictModel, title="A channel"):
+    """By its name in the trace."""
+
+    unit: str = Field(description="Its unit, for tables and axes; `-` for none.")
+    tolerance: float = Field(
+        0.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="By how much it may differ from golden and still count as the same.",
+    )
+    about: str = Field("", description="What it is.")
 
 
-class _ChangeModel(StrictModel):
-    args: list[str]
-    same_in: list[str] = Field(min_length=2)
+class _ChangeModel(StrictModel, title="A change"):
+    """A change is a list of further arguments, or this, where it makes scenarios the same run."""
+
+    args: list[str] = Field(description="Further arguments.")
+    same_in: list[str] = Field(
+        min_length=2, description="Scenarios that the change makes the same run: it is driven once."
+    )
 
 
-class _EntryModel(StrictModel):
-    module: str
-    args: list[str]
-    stepwise: str | None = None
-    independent: list[str] = Field(default_factory=list)
-    changes: dict[str, list[str] | _ChangeModel] = Field(default_factory=dict)
+class _EntryModel(StrictModel, title="The entry"):
+    """`{scenario}`, `{seed}` and `{out}` in the arguments are the scenario's file, the seed, and the folder
+    in which trace and record are to be left."""
+
+    module: str = Field(description="Run as `python -m`, from the root.")
+    args: list[str] = Field(description="Its arguments.")
+    stepwise: str | None = Field(
+        None,
+        description="A function of the module that takes these arguments and gives a run that is driven "
+        "step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
+        "need.",
+    )
+    independent: list[str] = Field(
+        default_factory=list,
+        description="More arguments, of a run that takes nothing from what other runs left behind.",
+    )
+    changes: dict[str, list[str] | _ChangeModel] = Field(
+        default_factory=dict, description="Name of a change of the scenario -> its arguments."
+    )
 
 
-class _FilmModel(StrictModel):
-    run: list[str]
-    module: str
-    args: list[str]
-    still: list[str]
+class _FilmModel(StrictModel, title="Films"):
+    """What `mutator show --video` and `--still` need. `{film}`, `{golden}`, `{faulty}`, `{events}`, `{out}`
+    and `{t}` in the arguments are filled in."""
+
+    run: list[str] = Field(description="More arguments of the entry, which make a run leave a film.")
+    module: str = Field(description="Run as `python -m` to show two films.")
+    args: list[str] = Field(description="Its arguments.")
+    still: list[str] = Field(description="More of them for a still picture.")
 
 
-class ManifestModel(StrictModel):
-    """A manifest file, but for its key `schema`."""
+class ManifestModel(StrictModel, title="The file"):
+    """How a target is found, run and observed, and what its runs leave behind."""
 
-    name: str
-    about: str = ""
-    root: str
-    package: str
-    files: list[str]
-    forbid: list[str] = Field(default_factory=list)
-    reads_itself: list[str] = Field(default_factory=list)
-    step_s: float = Field(gt=0.0, allow_inf_nan=False)
-    armed_after_s: float = Field(0.0, ge=0.0, allow_inf_nan=False)
-    entry: _EntryModel
-    trace_file: str
-    time_channel: str
-    record_file: str
-    compare: dict[str, _ChannelModel]
-    plot: dict[str, _ChannelModel] = Field(default_factory=dict)
-    observation: ObservationModel
-    hazards: list[str]
-    alerts: list[str]
-    film: _FilmModel | None = None
+    name: str = Field(description="Its name, which campaigns use.")
+    about: str = Field("", description="What the target is.")
+    root: str = Field(
+        description="The folder that goes on `sys.path`, relative to this file; `--target` overrides it."
+    )
+    package: str = Field(description="The import package in it. The probe is added to it as `_fi.py`.")
+    files: list[str] = Field(
+        description="Globs, relative to the root: what makes up the tree. `**` stands for any folders."
+    )
+    forbid: list[str] = Field(default_factory=list, description="Globs: no fault may be injected there.")
+    reads_itself: list[str] = Field(
+        default_factory=list,
+        description="Globs: files that a run reads while it runs, so that a mutant of one is run by the "
+        "reference engine.",
+    )
+    step_s: float = Field(gt=0.0, allow_inf_nan=False, description="The length of a step of simulation.")
+    armed_after_s: float = Field(
+        0.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="When `mutator try` arms triggers, where nothing else is said.",
+    )
+    entry: _EntryModel = Field(description="How a run is started.")
+    trace_file: str = Field(
+        description="The trace's name in `{out}`: an `.npz` with an array for each channel."
+    )
+    time_channel: str = Field(description="The channel that holds time in s.")
+    record_file: str = Field(
+        description="The record's name in `{out}`: a JSON file, see [another controller "
+        "tree](../how-to/add-a-target.md#what-a-run-leaves-behind)."
+    )
+    compare: dict[str, _ChannelModel] = Field(
+        description="Actuator outputs: one that differs from golden means that the fault manifested."
+    )
+    plot: dict[str, _ChannelModel] = Field(
+        default_factory=dict, description="More channels that are worth a plot."
+    )
+    observation: ObservationModel = Field(description="Where ground truth is read.")
+    hazards: list[str] = Field(description="Names of the hazards that the target checks.")
+    alerts: list[str] = Field(
+        description="Names of the alerts that count; others that a record has are left out."
+    )
+    film: _FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
 
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:

@@ -11,9 +11,10 @@ from typer.main import get_command
 
 from mutator.cli.main import GROUPS, app
 from mutator.config import yaml_files as yamlio
-from mutator.reference import words
+from mutator.faults.specs import SpecModel
 from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files
 from mutator.reference.schemas import FORMATS, Format, definitions
+from mutator.reference.tables import reading_order
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
@@ -57,11 +58,21 @@ def test_nothing_else_says_that_it_is_generated() -> None:
     assert found - {SCHEMAS / "scenario.json"} == {*_generated()}
 
 
-def test_every_key_is_told_and_none_that_is_gone() -> None:
-    """The words know exactly the models and keys of the file formats."""
-    parts = {name: part for kind in FORMATS for name, part in told(kind).items()}
-    assert {*words.SECTIONS} == {*parts}
-    assert {*words.ABOUT} == {f"{name}.{key}" for name, part in parts.items() for key in part["properties"]}
+@pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
+def test_every_model_and_key_is_described(kind: Format) -> None:
+    """Each model of a file format has a title, and each of its keys is described in a sentence."""
+    parts = told(kind)
+    assert parts
+    for name, part in parts.items():
+        assert not part["title"].endswith("Model"), f"{name}: give the class a title"
+        for key, value in part["properties"].items():
+            assert value["description"].endswith("."), f"{name}.{key}: a sentence"
+
+
+def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
+    """The file's own model first, then those of its keys, each where it is first needed."""
+    names = reading_order(definitions(SpecModel))
+    assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 
 def test_every_verb_is_in_a_group() -> None:
