@@ -12,10 +12,10 @@ from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Experiment, Fault, Outcome, Status
 from mutator.outcomes import results
-from mutator.outcomes.golden import Trace, golden_key, load_trace
+from mutator.outcomes.golden import Trace, load_trace
 from mutator.statistics.frame import hazard_names
 from mutator.store import plan_file as planfile
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:

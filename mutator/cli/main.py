@@ -11,8 +11,8 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from mutator import __version__
 from mutator._common.interrupts import terminable
+from mutator._common.version import VERSION
 from mutator.cli import campaigns, compare, experiments, exports, faults, library, reviews, run_folders, stpa
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
@@ -73,7 +73,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"mutator {__version__}")
+        typer.echo(f"mutator {VERSION}")
         raise typer.Exit
 
 

@@ -14,11 +14,11 @@ from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.review.gate import FILE as REVIEWED
 from mutator.store import plan_file as planfile
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder
 from mutator.verification import equivalence as proof
-from mutator.verification.preflight import FILE as CHECKS
-from mutator.verification.preflight import SCHEMA as CHECKS_SCHEMA
 
 _SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
 _REMEDY = "give the folder of each shard of one plan, once"

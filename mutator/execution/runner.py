@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator.campaigns.shared_runs import runs
-from mutator.engines.reference import Engine, Execution, How, Job
+from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Experiment, Record, Status
@@ -24,7 +24,7 @@ from mutator.targets.manifest import TargetManifest
 @dataclass(frozen=True, kw_only=True)
 class Finished:
     """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
-    None without a mutant or a run. `how`, `why` and `start` are the execution's."""
+    None without a mutant or a run. `mode`, `why` and `start` are the execution's."""
 
     experiment: Experiment
     record: Record
@@ -33,7 +33,7 @@ class Finished:
     cpu_s: float = 0.0
     wall_s: float = 0.0
     log: str = ""
-    how: How | None = None  # None: it was not run
+    mode: RunMode | None = None  # None: it was not run
     why: str = ""
     start: int = 0
 
@@ -134,7 +134,7 @@ class Runner:
             cpu_s=execution.cpu_s,
             wall_s=execution.wall_s,
             log=execution.log,
-            how=execution.how,
+            mode=execution.mode,
             why=execution.why,
             start=execution.start,
         )

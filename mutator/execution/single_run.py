@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import full_disk_told, make_folder
-from mutator.campaigns.campaign_files import Limits
 from mutator.campaigns.provenance import check_sources, sources
-from mutator.engines.reference import Job, ReferenceEngine, prepare_base
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed
 from mutator.execution.runner import Finished, Goldens, Runner
-from mutator.model import Experiment, Record, Status
+from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.building import Mutant
 from mutator.store import plan_file as planfile
 from mutator.store.records import read_records

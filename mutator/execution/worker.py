@@ -12,8 +12,9 @@ from pathlib import Path
 from mutator._common.files import full_disk_told
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
-from mutator.engines import choice as engines
-from mutator.engines.reference import Engine, ReferenceEngine
+from mutator.engines.jobs import Engine, Setting
+from mutator.engines.reference import ReferenceEngine
+from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Status
 from mutator.store import plan_file as planfile
@@ -103,15 +104,15 @@ class Worker:
 
     def _engine(self, name: str) -> Engine:
         folder = self.folder
-        return engines.make(
-            name,
-            self._manifest,
-            self._workspace.fault_models(),
+        setting = Setting(
+            manifest=self._manifest,
+            models=self._workspace.fault_models(),
             base=folder.base,
             work=folder.work,
             limits=folder.limits,
             parent=self._parent,
         )
+        return make_engine(name, setting)
 
     def _independent_engine(self) -> Engine:
         folder = self.folder
@@ -130,7 +131,7 @@ class Worker:
                 "wall_s": finished.wall_s,
                 "host": socket.gethostname(),
                 "worker": self._name,
-                "engine": finished.how,
+                "engine": finished.mode,
                 "why": finished.why,
             }
         )
