@@ -153,11 +153,13 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         """`became` says what a record has of its own; None: the experiment was not run."""
         plan = make_plan(workspace, campaign, Choices(**choices))
         freeze(plan, out, workspace)
+        compared = workspace.manifest(plan.campaign.target).compared
+        unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
         lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA})
         for experiment in plan.experiments:
             fields = became(experiment)
             if fields is not None:
-                lines.append(dataclasses.asdict(record(experiment.id, **fields)))
+                lines.append(dataclasses.asdict(record(experiment.id, **unchanged | fields)))
         lines.close()
         return out
 

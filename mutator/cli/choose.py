@@ -52,13 +52,6 @@ class FaultChoice:
         return dataclasses.replace(spec, variants=variants)
 
 
-def fault_words(fault: "Fault") -> str:
-    """A fault in words: `radar/chaff/distance 35 m`."""
-    return (
-        fault.spec if fault.value is None else f"{fault.spec} {fault.value} {fault.unit}".removesuffix(" -")
-    )
-
-
 def one_of_each_variant(faults: "tuple[Fault, ...]") -> "tuple[tuple[Fault, int], ...]":
     """The middle fault of each variant, and how many the variant has: they differ in their value alone."""
     groups: dict[str, list[Fault]] = {}

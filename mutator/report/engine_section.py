@@ -4,13 +4,13 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mutator._common.tables import Table
 from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence as proof
 
-HEADS = ["how", "experiments"]
 LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
 _WORDS = {
     RunMode.FORK: "a fork of the golden run, taken right before the fault is first active",
@@ -26,8 +26,7 @@ class Told:
     """A table of how many experiments were run how; what their proof came to, as a sentence and in few words;
     `failed`: it found an experiment that is another one on the reference engine."""
 
-    heads: list[str]
-    lines: list[list[str]]
+    table: Table
     proof: str
     state: str
     failed: bool
@@ -39,7 +38,8 @@ def told(folder: RunFolder) -> Told | None:
     if not ways and not (folder.path / proof.FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder)
-    return Told(heads=HEADS, lines=list(_lines(ways)), proof=sentence, state=state, failed=failed)
+    table = Table(heads=("how", "experiments"), rows=list(_lines(ways)), right=(1,))
+    return Told(table=table, proof=sentence, state=state, failed=failed)
 
 
 def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from mutator.model import Fault, Trigger
+from mutator.model import Trigger
 from mutator.review.catalogue import Group
 from mutator.review.groups import Shape
 
@@ -21,7 +21,7 @@ def values(group: "Group") -> tuple[list[str], list[list[str]]]:
             fault = faults.get(member)
             if fault is not None:
                 found = dict(zip(shape.holes, filled, strict=True))
-                words = [_fault(fault), fault.reading]
+                words = [fault.label, fault.reading]
                 rows.append([*words, *(found.get(name, "") for name in names)])
     return ["fault", "reading", *names], rows
 
@@ -45,9 +45,3 @@ def conditions(triggers: Sequence["Trigger"]) -> list[str]:
     elif times:
         lines.append(f"from a time on, {len(set(times))} of them from {min(times)} s to {max(times)} s")
     return lines
-
-
-def _fault(fault: Fault) -> str:
-    if fault.value is None:
-        return fault.spec
-    return f"{fault.spec} {fault.value} {fault.unit}".removesuffix(" -")
