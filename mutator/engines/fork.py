@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import disk_full, full_disk_told, write_atomic
+from mutator._common.files import disk_full, raising_disk_full, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import Exchange, NotExchangeable, exchange
@@ -68,7 +68,7 @@ class ForkEngine:
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job; its scratch folder `folder` is new, and left to the caller."""
         try:
-            with full_disk_told(self._work):
+            with raising_disk_full(self._work):
                 return self._execute(job, folder)
         except (NotExchangeable, Refused) as why:
             shutil.rmtree(folder, ignore_errors=True)

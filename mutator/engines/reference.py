@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import disk_full, full_disk_told, is_disk_full
+from mutator._common.files import disk_full, is_disk_full, raising_disk_full
 from mutator._common.hashing import digest
 from mutator.engines import bytecode
 from mutator.engines.jobs import Execution, Job, Setting
@@ -72,7 +72,7 @@ class ReferenceEngine:
 
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
-        with full_disk_told(self.work):
+        with raising_disk_full(self.work):
             request = self._prepare(job, folder)
         ended = self._spawn(request, folder, job.hash_seed)
         log = tail(folder / "log")
@@ -190,7 +190,7 @@ def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
     """The pristine tree with its bytecode in the folder `dest`, made there unless it is already whole."""
     if not dest.is_dir():
         half = dest.with_name(f"{dest.name}.{os.getpid()}")
-        with full_disk_told(dest):
+        with raising_disk_full(dest):
             shutil.rmtree(half, ignore_errors=True)
             bytecode.write_compiled(manifest.tree.files, half)
             half.rename(dest)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from mutator._common.files import full_disk_told, read_json, write_json
+from mutator._common.files import raising_disk_full, read_json, write_json
 from mutator._common.locks import owned
 from mutator._common.text import counted
 from mutator.campaigns.plans import make_run_folder
@@ -44,7 +44,7 @@ def merge(shards: Sequence[Path], out: Path) -> Path:
         make_run_folder(out)
         stack.enter_context(owned(out))
         try:
-            with full_disk_told(out):
+            with raising_disk_full(out):
                 _copy(folders, out)
             return results.build(out)
         except BaseException:

@@ -125,7 +125,7 @@ class Runner:
         try:
             record = self._record(experiment, built, execution)
         except BadOutput as err:
-            record = _bare(experiment, Status.HARNESS_ERROR, _told(err), built)
+            record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
         return Finished(
             experiment=experiment,
             record=record,
@@ -154,7 +154,7 @@ class Runner:
         except BadOutput as err:
             if activation is None:
                 raise
-            return _bare(experiment, Status.CRASHED, _told(err), built, activation)
+            return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation)
         difference = golden.compare(reference, faulty, channels, self.manifest.time_channel)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
@@ -187,7 +187,7 @@ def activation_of(report: Mapping[str, Any]) -> Activation | None:
     )
 
 
-def _told(err: BadOutput) -> str:
+def _problem_of(err: BadOutput) -> str:
     """What is wrong with an output, without the scratch folder that it was in."""
     return f"{Path(err.where or '').name}: {err.got}"
 

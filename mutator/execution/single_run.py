@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.files import full_disk_told, make_folder
+from mutator._common.files import make_folder, raising_disk_full
 from mutator.campaigns.provenance import check_sources, sources
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
@@ -102,7 +102,7 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
     work = out / "work"
     shutil.rmtree(work, ignore_errors=True)
     try:
-        with full_disk_told(work):
+        with raising_disk_full(work):
             work.mkdir()
         yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
     finally:

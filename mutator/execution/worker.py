@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.files import full_disk_told
+from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
 from mutator.engines.jobs import Engine, Setting
@@ -48,7 +48,7 @@ class Worker:
         manifest = workspace.manifest(head["target"])
         scenarios = {scenario for scenario, _ in head["goldens"]}
         check_sources(self.folder.path, head["sources"], sources(workspace, manifest, scenarios))
-        with full_disk_told(self.folder.work):
+        with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
         self._runner = self._make_runner(self._engine(assignment.engine))
@@ -139,7 +139,7 @@ class Worker:
 
     def _write_patch(self, experiment: Experiment, data: bytes) -> None:
         path = self.folder.patch(experiment.id)
-        with full_disk_told(path):
+        with raising_disk_full(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import full_disk_told, read_json, write_json
+from mutator._common.files import raising_disk_full, read_json, write_json
 from mutator._common.hashing import digest
 from mutator.campaigns.provenance import sources, versions
 from mutator.campaigns.shared_runs import same_in
@@ -47,7 +47,7 @@ def run_checks(
     known = checks.known()
     if known is not None:
         return known
-    with full_disk_told(folder.path):
+    with raising_disk_full(folder.path):
         results = tuple(checks.run(workers, notify or (lambda progress: None)))
     failed = [result for result in results if not result.passed]
     if failed:
@@ -96,7 +96,7 @@ class _Checks:
             return None  # none is there, or a damaged one
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            with full_disk_told(self.folder.path):
+            with raising_disk_full(self.folder.path):
                 check_cache.copy(place, self.folder.path, FILE)
         return results
 
