@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from mutator.engines import bytecode  # noqa: E402
 from mutator.mutants import building as mutant  # noqa: E402
-from mutator.triggers.conditions import always  # noqa: E402
+from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL = 1.02

@@ -181,6 +181,19 @@ class Experiment:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What one run may use before it is stopped.
+
+    Seconds of CPU and of wall time, MiB of address space, observed simulation steps.
+    """
+
+    cpu_s: int = 60
+    wall_s: int = 300
+    memory_mb: int = 4096
+    steps: int = 20_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Activation:
     """How often an injected statement ran while triggered: simulation times in s, and a count."""
 

@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.config.problems import suggestion
+from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, load_fault_models
 from mutator.faults.specs import FaultSpec, load_spec

@@ -11,10 +11,10 @@ import pandas as pd
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Experiment, Fault
-from mutator.outcomes.golden import Trace, golden_key, load_trace
+from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
 from mutator.store import plan_file as planfile
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -11,8 +11,8 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from mutator import __version__
 from mutator._common.interrupts import terminable
+from mutator._common.version import VERSION
 from mutator.cli import (
     campaigns,
     comparisons,
@@ -83,7 +83,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"mutator {__version__}")
+        typer.echo(f"mutator {VERSION}")
         raise typer.Exit
 
 

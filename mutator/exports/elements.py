@@ -9,8 +9,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mutator import __version__
 from mutator._common.text import counted
+from mutator._common.version import VERSION
 from mutator.execution import single_run as single
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
@@ -52,7 +52,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
     return {
         "schemaVersion": SCHEMA_VERSION,
         "thresholds": {"high": 100, "low": 0},
-        "framework": {"name": "mutator", "version": __version__},
+        "framework": {"name": "mutator", "version": VERSION},
         "config": config,
         "files": dict(sorted(files.items())),
         "testFiles": _tests([e for group in drives.values() for e in group]),

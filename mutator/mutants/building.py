@@ -15,8 +15,8 @@ from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.rendering import render, snippet
 from mutator.mutants.shapes import Change, Mold, lines_of, proven, shape_of
 from mutator.mutants.skeletons import compiles, skeleton
+from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.paths import check_location
 from mutator.triggers.conditions import check_condition, to_code
 
 OBSERVE_TAG = "observe"

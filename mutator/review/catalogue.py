@@ -23,7 +23,7 @@ from mutator.mutants.splicing import PROBE_TAG
 from mutator.review import groups
 from mutator.review.groups import Shape
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 
 if TYPE_CHECKING:
     from mutator.campaigns.plans import Plan

@@ -9,7 +9,7 @@ import pytest
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants import building as mutant
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 

@@ -15,7 +15,7 @@ from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Inject
 from mutator.mutants import building as mutant
 from mutator.mutants.building import InvalidMutant
 from mutator.targets.source_tree import read_tree
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 GOLDEN = Path(__file__).parents[1] / "toy" / "golden"

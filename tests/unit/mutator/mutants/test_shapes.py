@@ -12,7 +12,7 @@ from mutator.mutants.anchors import parse_file
 from mutator.mutants.building import InvalidMutant, build, build_directly
 from mutator.mutants.patches import changed_file
 from mutator.mutants.shapes import Change, Mold, lines_of, proven, shape_of
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 TEXTS = [

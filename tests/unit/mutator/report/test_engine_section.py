@@ -47,7 +47,7 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
         proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
     ) -> Path:
         run = tmp_path / "run"
-        plan = make_plan(toycar, "small", **asdict(Choices(limit=4)))
+        plan = make_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
         freeze(plan, run, toycar)
         records = [record(experiment) for experiment in plan.experiments]
         write(run / "records/0001-main.jsonl", SCHEMA, [asdict(r) for r in records])

@@ -11,7 +11,7 @@ from mutator.faults.specs import READINGS
 from mutator.model import Fault, Hold
 from mutator.mutants import building as mutant
 from mutator.targets.source_tree import matches
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
