@@ -24,7 +24,7 @@ from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.reference import Engine, Job, ReferenceEngine, prepare_base  # noqa: E402
 from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
-from mutator.mutants import building as mutant  # noqa: E402
+from mutator.mutants.building import build  # noqa: E402
 from mutator.outcomes import golden  # noqa: E402
 from mutator.outcomes.golden import golden_key  # noqa: E402
 from mutator.triggers.conditions import always  # noqa: E402
@@ -57,7 +57,7 @@ class Bench:
         work = folder / "work"
         work.mkdir()
         base = prepare_base(self.manifest, folder / "base")
-        null = mutant.build(self.manifest, self.models, None, always()).files
+        null = build(self.manifest, self.models, None, always()).files
         arguments = (self.manifest, base, work, plan.campaign.limits)
         self.engines: dict[str, Callable[[], Engine]] = {
             "reference": lambda: ReferenceEngine(*arguments),

@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mutator.campaigns.campaign_files import Limits
-from mutator.engines.code_swap import NotExchangeable, exchange
+from mutator.engines.code_swap import NotSwappable, plan_swap
 from mutator.engines.fork import ForkEngine
 from mutator.engines.reference import Engine, ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import always
 
@@ -53,8 +53,8 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
     found = {}
     for name, fault in variants.items():
         try:
-            exchange(manifest, mutant.build(manifest, models, fault, always()).files, "")
-        except NotExchangeable as reason:
+            plan_swap(manifest, build(manifest, models, fault, always()).files, "")
+        except NotSwappable as reason:
             found[name] = str(reason)
         except MutatorError:
             continue  # the checks before the campaign tell it, or it is not run at all
@@ -74,5 +74,5 @@ def make(
     """The engine of that name."""
     if name == REFERENCE:
         return ReferenceEngine(manifest, base, work, limits, parent)
-    null = mutant.build(manifest, models, None, always()).files
+    null = build(manifest, models, None, always()).files
     return ForkEngine(manifest, base, work, limits, parent, null=null, warm=name == WARM)

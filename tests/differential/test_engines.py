@@ -12,7 +12,7 @@ from mutator.campaigns.campaign_files import Limits
 from mutator.engines import choice as engines
 from mutator.engines.reference import Engine, Execution, How, Job, prepare_base
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Status, Trigger, Value
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
 from mutator.triggers.conditions import always, at_time
 from mutator.workspace import Workspace
 
@@ -100,7 +100,7 @@ class Engines:
         return self._goldens[scenario]
 
     def job(self, fault: Fault | None, trigger: Trigger, scenario: str = "A") -> Job:
-        built = mutant.build(self.manifest, self.models, fault, trigger)
+        built = build(self.manifest, self.models, fault, trigger)
         return Job(
             name="job",
             scenario=self.toy.scenario(scenario),
