@@ -57,31 +57,32 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     `fault.hold` overrides `trigger.hold`. MutatorError when an anchor is not found or ambiguous (candidates
     are listed), InvalidMutant when the result does not compile.
     """
-    return _build(manifest, models, fault, trigger, _Reuse(manifest.tree))
+    return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
 
 def build_directly(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
 ) -> Mutant:
     """The same mutant with each file spliced, compared and compiled anew: `build` must give its bytes."""
-    return _build(manifest, models, fault, trigger, _Splice())
+    return _build(manifest, models, fault, trigger, _Splicer())
 
 
 def _build(
-    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, method: "_Splice"
+    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
     injections = fault.injections if fault else ()
     ids = tuple(injection_id(i, injection) for i, injection in enumerate(injections))
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
     edits = _edits(manifest, models, injections, ids)
-    probe_file, probe = probe_path(manifest.package), _probe(manifest, models, mutant_id, trigger, hold, ids)
-    method.check_probe(probe, (mutant_id, *ids), models.folder / PROBE_TEMPLATE)
+    probe_file = probe_path(manifest.package)
+    probe = _probe(manifest, models, mutant_id, trigger, hold, ids)
+    splicer.check_probe(probe, (mutant_id, *ids), models.folder / PROBE_TEMPLATE)
     files = {probe_file: probe.encode()}
     patches = {probe_file: new_file(probe_file, probe)}
     for path, file_edits in edits.items():
         file = parsed(manifest.tree, path)
-        change = method.change(file, [probe_import(file, manifest.package), *file_edits], ids)
+        change = splicer.change(file, [probe_import(file, manifest.package), *file_edits], ids)
         files[path], patches[path] = change.data, change.patch
     return Mutant(
         id=mutant_id,
@@ -165,7 +166,7 @@ def _compile(data: bytes, where: Path) -> None:
         ) from None
 
 
-class _Splice:
+class _Splicer:
     """Makes every file by splicing, and compiles it; `ids` are those in the injected lines."""
 
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
@@ -186,7 +187,7 @@ class _Splice:
         return Change(data=data, patch=changed_file(file.path, pieces))
 
 
-class _Reuse(_Splice):
+class _ReusingSplicer(_Splicer):
     """Makes a file from a reusable change, if there is one; splices it and keeps one if not."""
 
     def __init__(self, tree: SourceTree) -> None:

@@ -12,6 +12,7 @@ from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.rendering import render
 from mutator.triggers.conditions import check_condition, evaluate, to_code
+from mutator.web import asset
 from mutator.workspace import Workspace
 
 
@@ -296,3 +297,8 @@ def test_reports_are_read(clone: Workspace) -> None:
     assert contract.was_triggered(fi.report())
     assert contract.mutant_of(None) is None
     assert not contract.was_triggered(None)
+
+
+def test_pages_know_the_tags() -> None:
+    """The script that shows diffs cannot ask the contract, so it must spell the tags as the contract does."""
+    assert f"fi:({contract.IMPORT_TAG}|{contract.OBSERVE_TAG})" in asset("diff.js")
