@@ -19,15 +19,16 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import Plan, make_plan  # noqa: E402
+from mutator.campaigns.plans import Choices, Plan, make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
-from mutator.engines.reference import Engine, Job, ReferenceEngine, prepare_base  # noqa: E402
+from mutator.engines.jobs import Engine, Job  # noqa: E402
+from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E402
 from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
 from mutator.outcomes import golden  # noqa: E402
-from mutator.outcomes.golden import golden_key  # noqa: E402
-from mutator.triggers.conditions import always  # noqa: E402
+from mutator.store.run_folder import golden_key  # noqa: E402
+from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_OF_WARM = 1.15  # fork's CPU over warm's times the share of simulated time that remains after activation
@@ -107,10 +108,10 @@ class Bench:
 
     def _take(self, measured: Measured, finished: Finished) -> None:
         measured.records[finished.experiment.id] = finished.record
-        measured.how[str(finished.how)] += 1
+        measured.how[str(finished.mode)] += 1
         measured.why[finished.why] += 1
         measured.children_s += finished.cpu_s
-        if finished.how != "golden":
+        if finished.mode != "golden":
             measured.steps += self.steps(finished.experiment) - finished.start
 
 
@@ -127,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args(arguments)
     workspace = Workspace.find(root=ROOT)
-    plan = make_plan(workspace, options.campaign, limit=options.experiments)
+    plan = make_plan(workspace, options.campaign, Choices(limit=options.experiments))
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(plan, workspace, Path(folder))
         found: dict[str, Measured] = {}

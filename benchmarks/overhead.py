@@ -21,14 +21,15 @@ from time import process_time
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import make_plan  # noqa: E402
+from mutator.campaigns.plans import Choices, make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
-from mutator.engines.reference import Job, ReferenceEngine, prepare_base  # noqa: E402
+from mutator.engines.jobs import Job  # noqa: E402
+from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E402
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
 from mutator.store.records import SCHEMA, LineWriter  # noqa: E402
-from mutator.triggers.conditions import always  # noqa: E402
+from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_MS = 5.0
@@ -48,7 +49,7 @@ class Cost:
 
 def late(workspace: Workspace, count: int) -> list[Experiment]:
     """Faults of the campaign that need no change of the scenario, first active in the last steps."""
-    plan = make_plan(workspace, "paper", limit=8 * count)
+    plan = make_plan(workspace, "paper", Choices(limit=8 * count))
     known = {e.fault.id: e for e in plan.experiments if e.scenario == SCENARIO and not e.fault.changes}
     made = []
     for number, experiment in enumerate(islice(cycle(known.values()), count)):
@@ -67,7 +68,7 @@ class Bench:
         self.manifest, self.models = workspace.manifest("openpilot"), workspace.fault_models()
         self.work = folder / "work"
         self.work.mkdir()
-        limits = make_plan(workspace, "paper", limit=1).campaign.limits
+        limits = make_plan(workspace, "paper", Choices(limit=1)).campaign.limits
         self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
 
     def golden(self) -> float:
@@ -91,7 +92,7 @@ class Bench:
         def run(some: Sequence[Experiment]) -> float:
             children = 0.0
             for finished in runner.run(some):
-                assert finished.how == "fork" and finished.mutant, finished.record
+                assert finished.mode == "fork" and finished.mutant, finished.record
                 (self.folder / "patch").write_bytes(finished.mutant.patch_bytes)
                 records.append(asdict(finished.record))
                 children += finished.cpu_s

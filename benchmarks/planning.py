@@ -17,12 +17,12 @@ from typing import Any
 
 from mutator._common.files import write_json
 from mutator.campaigns.plans import freeze, make_plan
-from mutator.engines.reference import Execution, Job, ReferenceEngine
-from mutator.execution import session as campaign_run
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine
+from mutator.execution.running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.outcomes.golden import golden_key
 from mutator.store.records import SCHEMA, LineWriter
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import RunFolder, golden_key
 from mutator.verification import preflight as checks
 from mutator.verification import preflight_cache as check_cache
 from mutator.workspace import Workspace
@@ -90,7 +90,7 @@ def until_the_first_run(workspace: Workspace, out: Path) -> float:
 
     run, ReferenceEngine.execute = ReferenceEngine.execute, stop  # type: ignore[method-assign]
     began = process_time()
-    campaign_run.run(workspace, "paper", out, engine="reference")
+    run_campaign(workspace, "paper", out, engine="reference")
     ReferenceEngine.execute = run  # type: ignore[method-assign]
     return float(reached[0] - began)
 
@@ -114,8 +114,8 @@ def main() -> None:
         for experiment in plan.experiments:
             lines.append(asdict(masked(experiment)))
         lines.close()
-        table.timed("tables", lambda: campaign_run.run(workspace, "paper", out))
-        table.timed("resume, complete", lambda: campaign_run.run(workspace, "paper", out))
+        table.timed("tables", lambda: run_campaign(workspace, "paper", out))
+        table.timed("resume, complete", lambda: run_campaign(workspace, "paper", out))
 
 
 if __name__ == "__main__":

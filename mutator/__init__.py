@@ -2,11 +2,13 @@
 
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.version import VERSION
+
 if TYPE_CHECKING:
     from mutator.api.runs import Run as Run
     from mutator.api.runs import load_run as load_run
 
-__version__ = "0.1.0"
+__version__ = VERSION
 _LAZY = ("Run", "load_run")  # pandas is not paid for by who only wants the version
 
 

@@ -100,6 +100,17 @@ class Trigger:
     armed_after_s: float = 0.0
 
 
+def fault_label(spec: str, value: Value, unit: str) -> str:
+    """What tables and messages call a fault: `radar/chaff/distance 35 m`.
+
+    `value` and `unit` are as the spec states them, or as they stand in a table: None or '' for no value, `-`
+    or '' for no unit.
+    """
+    if value is None or value == "":
+        return spec
+    return f"{spec} {value}" if unit in ("", "-") else f"{spec} {value} {unit}"
+
+
 @dataclass(frozen=True)
 class Fault:
     """One fault with its value drawn: what is injected, where, and what it aims at.
@@ -125,6 +136,11 @@ class Fault:
     def id(self) -> str:
         return content_id(self)
 
+    @property
+    def label(self) -> str:
+        """What tables and messages call it."""
+        return fault_label(self.spec, self.value, self.unit)
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -148,9 +164,33 @@ class Experiment:
         return content_id([self.fault.id, *parts])
 
     @property
+    def label(self) -> str:
+        """What reports call it: `radar/chaff/distance 35 m, S1, guided C1`."""
+        return f"{self.fault.label}, {self.drive_label}"
+
+    @property
+    def drive_label(self) -> str:
+        """What reports call the drive that its fault is put to: `S1, guided C1`."""
+        method = self.method.value
+        return f"{self.scenario}, {method} {self.trigger.name.removeprefix(f'{method}/')}"
+
+    @property
     def changes(self) -> tuple[str, ...]:
         """All changes of the scenario, each once: the fault's own, then those of the setting."""
         return tuple(dict.fromkeys((*self.fault.changes, *self.setting)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What one run may use before it is stopped.
+
+    Seconds of CPU and of wall time, MiB of address space, observed simulation steps.
+    """
+
+    cpu_s: int = 60
+    wall_s: int = 300
+    memory_mb: int = 4096
+    steps: int = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

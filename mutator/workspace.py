@@ -4,10 +4,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.config.problems import suggestion
+from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, load_fault_models
 from mutator.faults.specs import FaultSpec, load_spec
+from mutator.outcomes.columns import check_names
 from mutator.stpa.analysis import Analysis, load_analysis
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.targets.manifest import TargetManifest, load_manifest
@@ -50,7 +51,9 @@ class Workspace:
 
     def manifest(self, name: str) -> TargetManifest:
         """The target `name`, or the manifest file of that path."""
-        return load_manifest(self._file("targets", name, "target"), self.target)
+        manifest = load_manifest(self._file("targets", name, "target"), self.target)
+        check_names(manifest)
+        return manifest
 
     def target_names(self) -> tuple[str, ...]:
         """Names of the manifests in the library."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.model import (
     Activation,
     Anchor,
@@ -151,13 +151,15 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         **choices: Any,
     ) -> Path:
         """`became` says what a record has of its own; None: the experiment was not run."""
-        plan = make_plan(workspace, campaign, **choices)
+        plan = make_plan(workspace, campaign, Choices(**choices))
         freeze(plan, out, workspace)
+        compared = workspace.manifest(plan.campaign.target).compared
+        unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
         lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA})
         for experiment in plan.experiments:
             fields = became(experiment)
             if fields is not None:
-                lines.append(dataclasses.asdict(record(experiment.id, **fields)))
+                lines.append(dataclasses.asdict(record(experiment.id, **unchanged | fields)))
         lines.close()
         return out
 

@@ -1,4 +1,4 @@
-"""Files of the harness's own: schema versions checked on reading, whole or not at all on writing."""
+"""The harness's own files: schemas are checked on reading, and files are written whole or not at all."""
 
 import errno
 import json
@@ -14,13 +14,13 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 
 class DiskFull(MutatorError):
-    """No space left: nothing that was finished is lost, and the same command goes on once there is room."""
+    """No space left. What finished is kept, and the same command goes on once there is room."""
 
     exit_code = EXIT_HARNESS_ERRORS
 
 
 def is_disk_full(err: BaseException) -> bool:
-    """Whether the file system said that there is no room (or no quota) left."""
+    """Whether the disk (or a quota) is full."""
     return isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -33,7 +33,7 @@ def disk_full(where: Path) -> DiskFull:
 
 
 @contextmanager
-def full_disk_told(where: Path) -> Iterator[None]:
+def raising_disk_full(where: Path) -> Iterator[None]:
     """Turn the file system's ENOSPC into DiskFull."""
     try:
         yield
@@ -44,9 +44,9 @@ def full_disk_told(where: Path) -> Iterator[None]:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder to write into, with those above it; MutatorError when that cannot be."""
+    """Make a folder to write into, and its parents; MutatorError when that fails."""
     try:
-        with full_disk_told(path):
+        with raising_disk_full(path):
             path.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=path):
                 return
@@ -54,7 +54,7 @@ def make_folder(path: Path) -> None:
         raise MutatorError(
             f"cannot be written ({err.strerror})",
             where=path,
-            expected="a folder of one's own",
+            expected="a folder that you may write to",
             remedy="choose another --out",
         ) from None
 
@@ -64,7 +64,7 @@ def write_atomic(path: Path, data: bytes) -> None:
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    with full_disk_told(path):
+    with raising_disk_full(path):
         try:
             with temporary.open("wb") as file:
                 file.write(data)
@@ -77,7 +77,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a file of that name is what a kill left of `write_atomic`."""
+    """Whether a file of that name was left by a killed `write_atomic`."""
     return re.fullmatch(r"\..+\.\d+", name) is not None
 
 
@@ -101,7 +101,7 @@ def read_json(path: Path, schema: str) -> dict[str, Any]:
 
 
 def check_schema(found: object, schema: str, where: Path) -> None:
-    """Refuse what is no `schema` (`name/version`), and every newer version of it."""
+    """Refuse anything but `schema` (`name/version`) and older versions of it."""
     name, _, known = schema.partition("/")
     found_name, _, version = str(found).partition("/")
     if found_name != name or not version.isdigit():

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: both end what is being done in order, but never in the middle of a parse."""
+"""Ctrl-C and SIGTERM: both end the work in order, but never in the middle of a parse."""
 
 import signal
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ _state = _State()
 def terminable() -> Iterator[None]:
     """Within it, SIGINT and SIGTERM raise KeyboardInterrupt: stop in order, keep what finished.
 
-    A process that was told to ignore SIGINT goes on doing so.
+    A process that ignores SIGINT goes on ignoring it.
     """
 
     def interrupt(number: int, frame: object) -> None:
@@ -45,9 +45,9 @@ def terminable() -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Within it, an interruption waits; it is raised at the end.
+    """Within it, an interruption waits until the end.
 
-    For native code that calls Python: it turns an exception raised there into one of its own.
+    Native code that calls Python turns an exception raised there into one of its own.
     """
     _state.held += 1
     try:

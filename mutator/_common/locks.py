@@ -1,4 +1,4 @@
-"""Who may write to a run folder: one command at a time, and no worker of an earlier one beside it.
+"""Who may write to a run folder: one command at a time, and no worker of an earlier command.
 
 Locks are flocks: the kernel drops them when their process dies, however it dies.
 """
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from mutator._common.files import full_disk_told
+from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 
 OWNER = "owner.lock"
@@ -20,8 +20,8 @@ _PATIENCE_S = 15.0  # workers of a dead command end by themselves well within th
 
 @contextmanager
 def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
-    """Own the existing folder `run`; MutatorError when another command, or a worker left by one, holds it."""
-    with full_disk_told(run):
+    """Own the existing folder `run`; MutatorError while another command or its workers hold it."""
+    with raising_disk_full(run):
         fd = os.open(run / OWNER, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         if not _try_lock(fd):
@@ -31,7 +31,7 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
                 expected="one command at a time in a run folder",
                 remedy="wait until it ends, or use another folder",
             )
-        with full_disk_told(run):
+        with raising_disk_full(run):
             os.ftruncate(fd, 0)
             os.write(fd, f"{os.getpid()}\n".encode())
         _wait_for_workers(run, patience_s)
@@ -41,8 +41,8 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
 
 
 def register_worker(run: Path) -> int:
-    """Say that this process works in `run`, for as long as the returned descriptor is open."""
-    with full_disk_told(run):
+    """Register this process as a worker in `run`, for as long as the returned descriptor is open."""
+    with raising_disk_full(run):
         folder = run / WORKERS
         folder.mkdir(exist_ok=True)
         fd = os.open(folder / str(os.getpid()), os.O_RDWR | os.O_CREAT, 0o644)
@@ -51,7 +51,7 @@ def register_worker(run: Path) -> int:
 
 
 def living_workers(run: Path) -> list[int]:
-    """Process ids of the workers in `run`; what dead ones left is removed."""
+    """Process ids of the workers in `run`; entries of dead workers are removed."""
     living = []
     for path in sorted((run / WORKERS).glob("[0-9]*")):
         fd = os.open(path, os.O_RDWR)
@@ -70,7 +70,7 @@ def _wait_for_workers(run: Path, patience_s: float) -> None:
     while living := living_workers(run):
         if time.monotonic() > deadline:
             raise MutatorError(
-                f"workers of an earlier run are still at work (processes {', '.join(map(str, living))})",
+                f"workers of an earlier run are still running (processes {', '.join(map(str, living))})",
                 where=run,
                 expected="a folder without workers",
                 remedy="wait for them or end them, then give the same command again",

@@ -1,4 +1,4 @@
-"""Seeded draws: one generator for each (seed, key), so that no draw depends on how many came before it."""
+"""Seeded draws: one generator for each (seed, key), so no draw depends on how many came before it."""
 
 import hashlib
 

@@ -1,6 +1,25 @@
-"""Words for people."""
+"""Text for people: counted things, values in errors, suggestions."""
+
+import difflib
+from typing import Any
 
 
 def counted(count: int, noun: str) -> str:
     """A number of things: 1 run, 2 runs."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def shown(value: Any) -> str:
+    """A value as an error shows it: at most 60 characters, text told from numbers by its quotes."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def suggestion(word: str, known: list[str]) -> str:
+    """`, did you mean 'x'?` when one of `known` is close to `word`, else nothing."""
+    close = difflib.get_close_matches(word, known, n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""

@@ -4,25 +4,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
-from mutator.model import Experiment, Fault, Outcome, Status
-from mutator.outcomes import results
-from mutator.outcomes.golden import Trace, golden_key, load_trace
-from mutator.statistics.frame import hazard_names
+from mutator.model import Experiment, Fault
+from mutator.outcomes.golden import Trace, load_trace
+from mutator.outcomes.reader import Results
 from mutator.store import plan_file as planfile
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
-
-if TYPE_CHECKING:
-    from mutator.workspace import Workspace
-
-_NAMES = ("module", "fault_type", "reading", "unit", "scenario", "method", "trigger", "variant", "aim")
-_SCALES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
+from mutator.workspace import Workspace
 
 
 def load_run(path: str | Path, *, root: str | Path | None = None) -> "Run":
@@ -73,33 +67,9 @@ class Run:
     def frame(self) -> pd.DataFrame:
         """A row per experiment that has a record, by experiment id: the columns of results.csv, typed.
 
-        Names are categories (`outcome` and `status` in their order), flags nullable booleans (NA: the run did
-        not end well), times floats in s of simulation (NaN: did not happen). `kind` (`radar/chaff`), `hazard`
-        and `t_hazard` (any, the first) are added. `frame.attrs["units"]` has the unit of each number.
+        As `mutator.outcomes.reader.Results.frame` makes it; the table is brought up to date first.
         """
-        results.ensure(self.path)
-        frame = pd.read_parquet(self.path / "results.parquet").set_index("experiment_id")
-        hazards = [name.lower() for name in hazard_names(frame)]
-        frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
-        for name in ("activated", "manifested", *hazards):
-            frame[name] = frame[name].astype("boolean")
-        for name in _NAMES:
-            frame[name] = frame[name].astype("category")
-        for name, order in _SCALES.items():
-            frame[name] = pd.Categorical(frame[name], categories=order, ordered=True)
-        unknown = frame[hazards].isna().all(axis=1)
-        frame["hazard"] = frame[hazards].any(axis=1).astype("boolean").mask(unknown)
-        frame["t_hazard"] = frame[[f"t_{name}" for name in hazards]].min(axis=1)
-        frame.attrs["units"] = self._units(frame)
-        return frame
-
-    def _units(self, frame: pd.DataFrame) -> dict[str, str]:
-        """The unit of each column of numbers; `unit` names that of `value`, row by row."""
-        numbers = frame.select_dtypes("number").columns
-        times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
-        known = {name: "s" if name in times else "-" for name in numbers}
-        known |= {name: "as its channel" for name in numbers if name.startswith("max_dev_")}
-        return known | {"value": "as the column `unit` says"}
+        return Results.up_to_date(self.path).frame()
 
     def golden(self, scenario: str, changes: tuple[str, ...] | None = None) -> pd.DataFrame:
         """The fault-free run of a scenario: a column per channel, by time in s.
@@ -143,9 +113,7 @@ class Run:
         return Traces(self._workspace, self.folder)
 
     @cached_property
-    def _workspace(self) -> "Workspace":
-        from mutator.workspace import Workspace
-
+    def _workspace(self) -> Workspace:
         return Workspace.find(self.root)
 
     def _once(self, name: str, read: Callable[[], Trace]) -> pd.DataFrame:

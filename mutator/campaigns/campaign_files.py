@@ -10,20 +10,9 @@ from pydantic import Field, model_validator
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.specs import AS_CODED, AS_DESCRIBED
-from mutator.model import Method
+from mutator.model import Limits, Method
 
 SCHEMA = "campaign/1"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """What one run may use before it is stopped: seconds of CPU and of wall time, MiB of address space,
-    observed simulation steps."""
-
-    cpu_s: int = 60
-    wall_s: int = 300
-    memory_mb: int = 4096
-    steps: int = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import at_time, draw_time
+from mutator.triggers.kinds import at_time, draw_time
 from mutator.workspace import Workspace
 
 _Numbered = tuple[int, Fault]  # a fault and its place among the values of its variant

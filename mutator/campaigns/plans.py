@@ -20,6 +20,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file as planfile
+from mutator.store.check_results import measured_cpu_s
 from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
 from mutator.store.shards import Shard
 from mutator.workspace import Workspace
@@ -33,7 +34,12 @@ _BYTES_PER_GOLDEN = 1_200_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choices:
-    """What the command line chose on top of the campaign file; None: as the file says."""
+    """What was chosen on top of the campaign file; None: as the file says.
+
+    `only` and `exclude` are filter expressions (`mutator.campaigns.filters`) over the columns known before
+    running; `limit` keeps that many experiments, picked like a campaign's `sample`; `shard` (`k/n`) is the
+    share of the plan that its run folder will run.
+    """
 
     seed: int | None = None
     reading: str | None = None
@@ -99,36 +105,24 @@ class Plan:
         )
 
 
-def make_plan(
-    workspace: Workspace,
-    campaign: str | Path,
-    *,
-    seed: int | None = None,
-    reading: str | None = None,
-    only: str | None = None,
-    exclude: str | None = None,
-    limit: int | None = None,
-    shard: str | None = None,
-) -> Plan:
+def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
     """Expand a campaign (a name of the library or a file) into its plan; nothing is written or run.
 
-    `only`/`exclude` are filter expressions (`mutator.campaigns.filters`) over the columns known
-    before running; `limit` keeps that many experiments, picked like a campaign's `sample`; `shard` (`k/n`)
-    is the share of the plan that its run folder will run.
+    MutatorError for a choice that does not fit the campaign, and when no experiment is left.
     """
     loaded = load_campaign(workspace.campaign(campaign))
-    choices = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
-    seed = loaded.seed if seed is None else seed
-    reading = reading or loaded.reading
+    choices = choices or Choices()
+    seed = loaded.seed if choices.seed is None else choices.seed
+    reading = choices.reading or loaded.reading
     _check(choices, loaded)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
     once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
     canary = expansion.canary()
     chunks = cut_runs(once, loaded.chunk)
-    if shard is not None and Shard.parse(shard).of > len(chunks):
+    if choices.shard is not None and Shard.parse(choices.shard).of > len(chunks):
         raise MutatorError(
-            f"shard {shard}",
+            f"shard {choices.shard}",
             expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
             remedy="use fewer shards, or a smaller chunk in the campaign",
         )
@@ -280,8 +274,6 @@ def _csv(plan: Plan) -> bytes:
 
 def load_plan(out: Path) -> Plan:
     """The frozen plan of a run folder, complete (for reports; workers read single chunks instead)."""
-    from mutator.verification.preflight import measured_cpu_s
-
     folder = RunFolder.open(out)
     head = folder.head
     canary = dict(head["canary"])

@@ -5,8 +5,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from mutator import __version__
 from mutator._common.hashing import digest
+from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -40,7 +40,7 @@ def versions() -> dict[str, Any]:
     """Versions of mutator, Python, and every installed package (any of them may be the target's)."""
     packages = {d.metadata["Name"].lower(): d.version for d in metadata.distributions()}
     return {
-        "mutator": __version__,
+        "mutator": VERSION,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
         "packages": dict(sorted(packages.items())),

@@ -67,19 +67,18 @@ def plan(
 
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
-    from mutator.campaigns.plans import freeze, load_plan, make_plan
-    from mutator.engines import choice as engines
+    from mutator.campaigns.plans import Choices, freeze, load_plan, make_plan
+    from mutator.engines.forkable import not_forked
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
+    chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
     with terminal.wait("planning"):
-        made = make_plan(
-            workspace, campaign, seed=seed, reading=reading, only=only, exclude=exclude, limit=limit
-        )
+        made = make_plan(workspace, campaign, chosen)
     folder = freeze(made, out, workspace)
     manifest = workspace.manifest(made.campaign.target)
     faults = [experiment.fault for experiment in made.experiments]
-    anew = engines.not_forked(manifest, workspace.fault_models(), faults)
+    anew = not_forked(manifest, workspace.fault_models(), faults)
     cost = load_plan(folder.path).cost(workers)  # knows what a run took, once one was driven here
     groups = Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in made.experiments)
     if as_json:
@@ -157,14 +156,14 @@ def run(
     """Run or resume a campaign; ends with its table and report."""
     from mutator.campaigns.plans import Choices
     from mutator.cli.progress import campaign_progress
-    from mutator.execution import session as campaign_run
+    from mutator.execution.running import run_campaign
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
     chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     try:
         with campaign_progress(terminal) as notify:
-            summary = campaign_run.run(
+            summary = run_campaign(
                 workspace,
                 campaign,
                 out,

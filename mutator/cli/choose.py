@@ -52,13 +52,6 @@ class FaultChoice:
         return dataclasses.replace(spec, variants=variants)
 
 
-def fault_words(fault: "Fault") -> str:
-    """A fault in words: `radar/chaff/distance 35 m`."""
-    return (
-        fault.spec if fault.value is None else f"{fault.spec} {fault.value} {fault.unit}".removesuffix(" -")
-    )
-
-
 def one_of_each_variant(faults: "tuple[Fault, ...]") -> "tuple[tuple[Fault, int], ...]":
     """The middle fault of each variant, and how many the variant has: they differ in their value alone."""
     groups: dict[str, list[Fault]] = {}
@@ -90,11 +83,8 @@ def context_tables(workspace: "Workspace") -> tuple["ContextTable", ...]:
 
 def find_trigger(workspace: "Workspace", text: str, armed_after_s: float) -> "Trigger":
     """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
-    from mutator.model import Trigger
-    from mutator.triggers.conditions import always, at_time, check_condition
+    from mutator.triggers.kinds import TYPED, read_trigger
 
-    if text == "always":
-        return always(armed_after_s=armed_after_s)
     named = [
         (table, row.id)
         for table in context_tables(workspace)
@@ -110,22 +100,12 @@ def find_trigger(workspace: "Workspace", text: str, armed_after_s: float) -> "Tr
         table, row = named[0]
         return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
-        time = float(text)
-    except ValueError:
-        pass
-    else:
-        return at_time(time)
-    try:
-        condition = check_condition(text)
+        return read_trigger(text, armed_after_s)
     except MutatorError as e:
         contexts = ", ".join(row.id for table in context_tables(workspace) for row in table.rows)
         raise MutatorError(
-            e.got,
-            where="--trigger",
-            expected=f"a context ({contexts}), a time in s, `always`, or a condition, e.g. 'hwt <= 2'",
-            remedy=e.remedy,
+            e.got, where="--trigger", expected=f"a context ({contexts}), {TYPED}", remedy=e.remedy
         ) from e
-    return Trigger(name="condition", condition=condition, armed_after_s=armed_after_s)
 
 
 def find_run(given: Path | None, root: Path) -> Path:

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.hashing import plain
+from mutator._common.tables import Table
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
 STYLES = {
     "ok": "green",
@@ -80,7 +81,7 @@ class Terminal:
         if self.out.is_terminal:
             self.out.print(_rich_table(heads, cells, right, total))
         else:
-            self.say("\n".join(_plain_table(heads, cells, right)))
+            self.say(Table(heads=heads, rows=cells, right=right).as_text())
 
     def diff(self, patch: str) -> None:
         """A unified diff, coloured in a terminal; elsewhere its very bytes, for `patch`."""
@@ -149,12 +150,14 @@ def told(error: MutatorError) -> str:
     )
 
 
-def _rich_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool) -> "Table":
+def _rich_table(
+    heads: Sequence[str], rows: list[list[str]], right: Sequence[int], total: bool
+) -> "RichTable":
     from rich import box
-    from rich.table import Table
+    from rich.table import Table as RichTable
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
+    table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
     for i, head in enumerate(heads):
         table.add_column(Text(head), justify="right" if i in right else "left", overflow="fold")
     for i, row in enumerate(rows):
@@ -163,17 +166,6 @@ def _rich_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int
             table.add_section()
         table.add_row(*(Text(c, style=STYLES.get(c, "bold" if last else "")) for c in row))
     return table
-
-
-def _plain_table(heads: Sequence[str], rows: list[list[str]], right: Sequence[int]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
-
-    def line(cells: Sequence[str]) -> str:
-        pairs = zip(cells, widths, strict=True)
-        padded = [c.rjust(w) if i in right else c.ljust(w) for i, (c, w) in enumerate(pairs)]
-        return "  ".join(padded).rstrip()
-
-    return [line(heads), *map(line, rows)]
 
 
 def short_path(where: str | Path | None) -> str:

@@ -60,7 +60,7 @@ def describe(experiment: "Experiment") -> dict[str, Any]:
     hold = fault.hold or trigger.hold
     return {
         "experiment": experiment.id,
-        "fault": choose.fault_words(fault),
+        "fault": fault.label,
         "aim": fault.aim,
         "reading": fault.reading,
         "scenario": " ".join((experiment.scenario, *experiment.changes)),

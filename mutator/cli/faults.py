@@ -85,7 +85,7 @@ def try_fault(
     faults = choice.faults(workspace, target, workspace.fault_models())
     fault, _ = choose.one_of_each_variant(faults)[0]
     if len(faults) > 1:
-        terminal.note(f"{choose.fault_words(fault)}, one of {len(faults)} (choose by --variant, --value)")
+        terminal.note(f"{fault.label}, one of {len(faults)} (choose by --variant, --value)")
     armed_after_s = target.armed_after_s if armed_after is None else armed_after
     when = choose.find_trigger(workspace, trigger, armed_after_s)
     experiment = _experiment(workspace, fault, scenario, when, seed or 0)
@@ -149,7 +149,7 @@ def diff(
         from mutator.cli.experiment_view import experiment_patch, find_experiment
 
         found = find_experiment(workspace, run, what)
-        name = (choose.fault_words(found.experiment.fault), found.experiment.id)
+        name = (found.experiment.fault.label, found.experiment.id)
         _print_diffs(terminal, [(*name, experiment_patch(workspace, found))], whole=patch)
         return
     from mutator.mutants.building import build
@@ -161,7 +161,7 @@ def diff(
     for fault, of in choose.one_of_each_variant(choice.faults(workspace, target, models)):
         mutant = build(target, models, fault, when)
         many = f", one of {of}" if of > 1 else ""
-        diffs.append((choose.fault_words(fault) + many, mutant.id, mutant.patch))
+        diffs.append((fault.label + many, mutant.id, mutant.patch))
     _print_diffs(terminal, diffs, whole=patch)
 
 

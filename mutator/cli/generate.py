@@ -109,13 +109,13 @@ def _of_specs(
 def _of_campaign(
     workspace: "Workspace", request: Request
 ) -> tuple["TargetManifest", list[tuple["Fault", "Trigger"]]]:
-    from mutator.campaigns.plans import make_plan
+    from mutator.campaigns.plans import Choices, make_plan
 
     if request.specs or request.triggers:
         raise MutatorError(
             "--campaign together with specs or --trigger", expected="one or the other", where="generate"
         )
-    plan = make_plan(workspace, request.campaign or "", seed=request.seed, reading=request.reading)
+    plan = make_plan(workspace, request.campaign or "", Choices(seed=request.seed, reading=request.reading))
     pairs = [(e.fault, e.trigger) for e in plan.experiments]
     return workspace.manifest(plan.campaign.target), pairs
 

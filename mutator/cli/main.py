@@ -11,9 +11,19 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from mutator import __version__
 from mutator._common.interrupts import terminable
-from mutator.cli import campaigns, compare, experiments, exports, faults, library, reviews, run_folders, stpa
+from mutator._common.version import VERSION
+from mutator.cli import (
+    campaigns,
+    comparisons,
+    experiments,
+    exports,
+    faults,
+    library,
+    reviews,
+    run_folders,
+    stpa,
+)
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
@@ -73,7 +83,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"mutator {__version__}")
+        typer.echo(f"mutator {VERSION}")
         raise typer.Exit
 
 
@@ -92,7 +102,7 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments):
+for module in (library, stpa, faults, reviews, campaigns, run_folders, comparisons, exports, experiments):
     module.register(app)
 
 

@@ -36,9 +36,9 @@ class Wanted:
         workspace = self.place.workspace()
         with terminal.wait("making the mutants"):
             if self.campaign:
-                from mutator.campaigns.plans import make_plan
+                from mutator.campaigns.plans import Choices, make_plan
 
-                plan = make_plan(workspace, self.campaign, seed=self.seed, reading=self.reading)
+                plan = make_plan(workspace, self.campaign, Choices(seed=self.seed, reading=self.reading))
                 target = plan.campaign.target
                 groups = catalogue.of_plan(workspace, plan)
             else:

@@ -26,8 +26,9 @@ def register(app: typer.Typer) -> None:
 def show_counts(terminal: Terminal, run: Path) -> None:
     """The table of results by fault type, and how the experiments ended."""
     from mutator.outcomes import rows as tables
+    from mutator.outcomes.reader import Results
 
-    rows = tables.read_results(run / "results.csv")
+    rows = Results.of_run(run).rows()
     hazards = tables.hazard_names(rows)
     heads, lines = tables.count_table(tables.counts_by(rows, tables.by_fault_type), "fault type", hazards)
     terminal.table(heads, lines, right=range(1, len(heads)), total=True)

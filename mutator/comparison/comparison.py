@@ -16,7 +16,7 @@ from mutator.comparison.sheets import (
     rates_sheets,
     times_sheets,
 )
-from mutator.comparison.sides import Side, read_side, words
+from mutator.comparison.sides import Side, read_side
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.outcomes.rows import Row
@@ -143,16 +143,16 @@ def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ..
         if gate is Gate.UNMATCHED:
             m = comparison.matching
             strangers = (*m.only_a, *m.only_b, *m.ambiguous)
-            found += [Finding(gate=gate, experiment_id=e.id, words=words(e)) for e in strangers]
+            found += [Finding(gate=gate, experiment_id=e.id, words=e.label) for e in strangers]
         else:
             found += [
-                Finding(gate=gate, experiment_id=p.b.id, words=f"{words(p.b)}: {told(p)}")
+                Finding(gate=gate, experiment_id=p.b.id, words=f"{p.b.label}: {ending_change(p)}")
                 for p in comparison.having(Change(gate.value))
             ]
     return tuple(found)
 
 
-def told(pair: Pair) -> str:
+def ending_change(pair: Pair) -> str:
     """What became of a pair: `sdc -> hazard (H1 7.10 s after activation)`."""
     return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
 

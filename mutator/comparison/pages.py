@@ -9,12 +9,11 @@ from importlib.resources import files as package_files
 from pathlib import Path
 
 from mutator._common.files import make_folder, write_atomic
+from mutator._common.tables import Table, markdown_line
 from mutator._common.text import counted
-from mutator.comparison.comparison import Comparison, Gate, told
+from mutator.comparison.comparison import Comparison, Gate, ending_change
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
-from mutator.comparison.sides import words
 from mutator.outcomes.rows import Row
-from mutator.report.page import markdown_line, markdown_table
 from mutator.web import asset
 
 LISTED = 50  # experiments of one kind of change that the Markdown names; page and CSV have all
@@ -38,7 +37,7 @@ def write(comparison: Comparison, out: Path) -> Written:
     for sheet in comparison.sheets:
         write_atomic(out / "tables" / f"{sheet.name}.csv", sheet.csv().encode())
     write_atomic(pairs, _table(_pair_line(p) for p in comparison.pairs))
-    unmatched = ({"why": why, "experiment": e.id, "words": words(e)} for why, e in comparison.unmatched)
+    unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
     write_atomic(out / "unmatched.csv", _table(unmatched, heads=("why", "experiment", "words")))
     write_atomic(text, markdown(comparison).encode())
     write_atomic(hypertext, page(comparison).encode())
@@ -90,7 +89,7 @@ def markdown(comparison: Comparison) -> str:
     parts = [f"# {c.names.a} against {c.names.b}", summary(c), *c.remarks, "## What differs between the runs"]
     differing = [[f.name, f.a, f.b] for f in c.facts if f.differs]
     if differing:
-        parts.append(markdown_table(["what", c.names.a, c.names.b], differing))
+        parts.append(Table(heads=("what", c.names.a, c.names.b), rows=differing).as_markdown())
     else:
         parts.append("Nothing: the same sources, choices and versions.")
     parts.append(files_text(c))
@@ -99,20 +98,23 @@ def markdown(comparison: Comparison) -> str:
         if pairs := c.having(change):
             parts += [f"## {change.value}: {len(pairs)}", _listed(pairs)]
     if c.unmatched:
-        parts += ["## Not compared", markdown_table(["why", "experiments"], _texts(reasons(c)))]
+        parts += ["## Not compared", _reasons(c).as_markdown()]
         parts.append("Each of them is in `unmatched.csv`.")
     parts.append("The table of all pairs is `pairs.csv`; `index.html` lists those that changed.")
     return "\n\n".join(parts) + "\n"
 
 
 def _listed(pairs: tuple[Pair, ...]) -> str:
-    lines = [f"- {words(p.b)}: {markdown_line(told(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]]
+    lines = [
+        f"- {p.b.label}: {markdown_line(ending_change(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]
+    ]
     more = len(pairs) - LISTED
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 
 
-def _texts(lines: Iterable[tuple[object, ...]]) -> list[list[str]]:
-    return [[str(cell) for cell in line] for line in lines]
+def _reasons(comparison: Comparison) -> Table:
+    rows = [(why, str(number)) for why, number in reasons(comparison)]
+    return Table(heads=("why", "experiments"), rows=rows)
 
 
 def page(comparison: Comparison) -> str:
@@ -147,7 +149,7 @@ def _shown(pair: Pair) -> dict[str, object]:
     """What the page's table shows of a pair."""
     same = pair.a.id == pair.b.id
     return {
-        "words": words(pair.b),
+        "words": pair.b.label,
         "changes": [change.value for change in Change if change in pair.changes],
         "sides": [_shown_side(pair.row_a), _shown_side(pair.row_b)],
         "ids": [pair.a.id] if same else [pair.a.id, pair.b.id],

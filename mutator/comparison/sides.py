@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Value
-from mutator.outcomes import results
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
-from mutator.outcomes.rows import Row, row_from
+from mutator.outcomes.reader import row_of
+from mutator.outcomes.rows import Row
 from mutator.store import plan_file as planfile
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
@@ -53,11 +53,7 @@ def read_side(run: Path, only: str | None = None) -> Side:
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(e for e in planfile.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
     hazards = folder.head["hazards"]
-    rows = {
-        e.id: row_from({k: _text(v) for k, v in results.row(e, records[e.id], hazards).items()})
-        for e in experiments
-        if e.id in records
-    }
+    rows = {e.id: row_of(e, records[e.id], hazards) for e in experiments if e.id in records}
     return Side(folder=folder, experiments=experiments, rows=rows)
 
 
@@ -65,21 +61,3 @@ def key_of(experiment: Experiment) -> Key:
     """What the experiment is matched by."""
     fault = experiment.fault
     return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)
-
-
-def words(experiment: Experiment) -> str:
-    """The experiment in words: `radar/chaff/distance 35 m, S1, guided C1`."""
-    fault = experiment.fault
-    value = f" {fault.value} {fault.unit}".removesuffix(" -") if fault.value is not None else ""
-    return f"{fault.spec}{value}, {drive(experiment)}"
-
-
-def drive(experiment: Experiment) -> str:
-    """What the fault was put to, in words: `S1, guided C1`."""
-    method = experiment.method.value
-    return f"{experiment.scenario}, {method} {experiment.trigger.name.removeprefix(f'{method}/')}"
-
-
-def _text(value: object) -> str:
-    """A cell as it stands in results.csv."""
-    return "" if value is None else str(value)

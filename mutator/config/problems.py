@@ -1,11 +1,12 @@
 """Words for what pydantic found wrong with a file: value shown, what was expected, a remedy."""
 
-import difflib
 import types
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
+
+from mutator._common.text import shown, suggestion
 
 _TYPES = {
     "float_type": ("a number", "write it as a number, without quotes or unit"),
@@ -18,22 +19,6 @@ _TYPES = {
     "model_type": ("a mapping", "write `key: value` lines beneath it"),
     "finite_number": ("a finite number", "write an ordinary number"),
 }
-
-
-def shown(value: Any) -> str:
-    """A value as an error shows it: at most 60 characters, text told from numbers by its quotes."""
-    if value is None:
-        return "nothing"
-    if isinstance(value, bool):
-        return str(value).lower()
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def suggestion(word: str, known: list[str]) -> str:
-    """`, did you mean 'x'?` when one of `known` is close to `word`, else nothing."""
-    close = difflib.get_close_matches(word, known, n=1)
-    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, str, tuple[str | int, ...]]:

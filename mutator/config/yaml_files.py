@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from mutator._common.text import counted
-from mutator.config import problems as shape_errors
+from mutator._common.text import counted, shown
+from mutator.config import problems
 from mutator.errors import MutatorError
 
 Keys = tuple[str | int, ...]
@@ -184,7 +184,7 @@ def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
     if not isinstance(source.data, dict):
         raise source.error(
             (),
-            f"{shape_errors.shown(source.data)}",
+            f"{shown(source.data)}",
             expected="a mapping of keys to values",
             remedy="see docs",
         )
@@ -193,12 +193,12 @@ def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
     try:
         return model.model_validate(body), source
     except ValidationError as error:
-        problems = error.errors(include_url=False)
+        found = error.errors(include_url=False)
         # a misspelt key also misses: the misspelling says more
-        problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
-        got, expected, remedy, keys = shape_errors.explain(problems[0], model)
-        if len(problems) > 1:
-            remedy += f" ({counted(len(problems) - 1, 'more mistake')} after this one)"
+        found.sort(key=lambda problem: problem["type"] != "extra_forbidden")
+        got, expected, remedy, keys = problems.explain(found[0], model)
+        if len(found) > 1:
+            remedy += f" ({counted(len(found) - 1, 'more mistake')} after this one)"
         raise source.error(keys, got, expected=expected, remedy=remedy) from None
 
 

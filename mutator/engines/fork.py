@@ -13,18 +13,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import disk_full, full_disk_told, write_atomic
+from mutator._common.files import disk_full, raising_disk_full, write_atomic
 from mutator._common.hashing import content_id
-from mutator.campaigns.campaign_files import Limits
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
 from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting
+from mutator.engines.jobs import Execution, Job, RunMode, Setting
 from mutator.engines.processes import Ended, is_full, judge_report, judge_silent, read_report, tail
-from mutator.engines.reference import Execution, How, Job, ReferenceEngine
-from mutator.model import Status
+from mutator.engines.reference import ReferenceEngine
+from mutator.model import Limits, Status
+from mutator.mutants.building import build
 from mutator.mutants.probe import mutant_of, probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import OBSERVED
+from mutator.triggers.kinds import always
 
 _MORE_S = 60.0  # beyond the wall limit of a run, until its process in the server must have answered
 _Key = tuple[str, int, tuple[str, ...]]
@@ -68,7 +70,7 @@ class ForkEngine:
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job; its scratch folder `folder` is new, and left to the caller."""
         try:
-            with full_disk_told(self._work):
+            with raising_disk_full(self._work):
                 return self._execute(job, folder)
         except (NotSwappable, Refused) as why:
             shutil.rmtree(folder, ignore_errors=True)
@@ -172,7 +174,7 @@ class ForkEngine:
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
             log=tail(folder / "log"),
-            how=How.WARM if self._warm else How.FORK,
+            mode=RunMode.WARM if self._warm else RunMode.FORK,
         )
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
@@ -260,7 +262,7 @@ def _golden(job: Job, golden: Path) -> Execution:
         probe=silent_report(job.mutant),
         cpu_s=0.0,
         wall_s=0.0,
-        how=How.GOLDEN,
+        mode=RunMode.GOLDEN,
     )
 
 
@@ -272,5 +274,22 @@ def _lost(why: str, folder: Path) -> Execution:
         probe=None,
         cpu_s=0.0,
         wall_s=0.0,
-        how=How.FORK,
+        mode=RunMode.FORK,
+    )
+
+
+def make_fork(setting: Setting) -> ForkEngine:
+    """The fork engine of a campaign."""
+    return _make(setting, warm=False)
+
+
+def make_warm(setting: Setting) -> ForkEngine:
+    """The same, but each run is a fork of the loaded target, before its first step."""
+    return _make(setting, warm=True)
+
+
+def _make(setting: Setting, *, warm: bool) -> ForkEngine:
+    null = build(setting.manifest, setting.models, None, always()).files
+    return ForkEngine(
+        setting.manifest, setting.base, setting.work, setting.limits, setting.parent, null=null, warm=warm
     )

@@ -1,4 +1,4 @@
-"""Engines run jobs: a tree, a scenario, a seed. The reference engine: a fresh interpreter for each."""
+"""The reference engine: a fresh interpreter for each job, on a tree of its own."""
 
 import json
 import os
@@ -6,16 +6,14 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from mutator._common.files import disk_full, full_disk_told, is_disk_full
+from mutator._common.files import disk_full, is_disk_full, raising_disk_full
 from mutator._common.hashing import digest
-from mutator.campaigns.campaign_files import Limits
 from mutator.engines import bytecode
+from mutator.engines.jobs import Execution, Job, Setting
 from mutator.engines.processes import (
     Ended,
     ended_within,
@@ -28,68 +26,12 @@ from mutator.engines.processes import (
     steady,
     tail,
 )
-from mutator.model import Status
+from mutator.model import Limits, Status
 from mutator.mutants.probe import mutant_of, probe_module
 from mutator.targets.manifest import TargetManifest
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
 _LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
-
-
-class How(StrEnum):
-    """What a run was: a fresh interpreter, a fork of a loaded program, or the golden run itself."""
-
-    REFERENCE = "reference"
-    WARM = "warm"
-    FORK = "fork"
-    GOLDEN = "golden"  # the trigger never held, so there was nothing to run
-
-
-@dataclass(frozen=True, kw_only=True)
-class Job:
-    """One run of the target. `files` are the changed and new files of its tree (none: pristine)."""
-
-    name: str
-    scenario: Path
-    seed: int
-    changes: tuple[str, ...] = ()
-    files: Mapping[str, bytes] = field(default_factory=dict)
-    mutant: str | None = None  # id that the probe must report; None: a tree without probe
-    hash_seed: int = 0
-    golden: Path | None = None  # output folder of the run without the fault, where it is known
-
-
-@dataclass(frozen=True, kw_only=True)
-class Execution:
-    """What came of a job. `out` holds the target's trace and record when status is ok.
-
-    `probe` is the probe's report if the tree has one; `log` the tail of what the run printed; `how` what ran
-    it, and where it was not the engine that was asked, `why`; `start` is the step before which the golden run
-    did its work.
-    """
-
-    status: Status
-    detail: str
-    out: Path
-    probe: dict[str, Any] | None
-    cpu_s: float
-    wall_s: float
-    log: str = ""
-    how: How = How.REFERENCE
-    why: str = ""
-    start: int = 0
-
-
-class Engine(Protocol):
-    """Runs jobs and yields each with what came of it, in any order; `out` is valid until the next one.
-
-    The output folder of a job whose trigger never holds may be the golden run's: it is not to be touched.
-    """
-
-    def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...
-
-    def close(self) -> None:
-        """End what the engine keeps running between jobs."""
 
 
 class ReferenceEngine:
@@ -131,7 +73,7 @@ class ReferenceEngine:
 
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
-        with full_disk_told(self.work):
+        with raising_disk_full(self.work):
             request = self._prepare(job, folder)
         ended = self._spawn(request, folder, job.hash_seed)
         log = tail(folder / "log")
@@ -240,11 +182,16 @@ class ReferenceEngine:
         return ""
 
 
+def make_reference(setting: Setting) -> ReferenceEngine:
+    """The reference engine of a campaign."""
+    return ReferenceEngine(setting.manifest, setting.base, setting.work, setting.limits, setting.parent)
+
+
 def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
     """The pristine tree with its bytecode in the folder `dest`, made there unless it is already whole."""
     if not dest.is_dir():
         half = dest.with_name(f"{dest.name}.{os.getpid()}")
-        with full_disk_told(dest):
+        with raising_disk_full(dest):
             shutil.rmtree(half, ignore_errors=True)
             bytecode.write_compiled(manifest.tree.files, half)
             half.rename(dest)

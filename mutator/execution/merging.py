@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from mutator._common.files import full_disk_told, read_json, write_json
+from mutator._common.files import raising_disk_full, read_json, write_json
 from mutator._common.locks import owned
 from mutator._common.text import counted
 from mutator.campaigns.plans import make_run_folder
@@ -14,11 +14,11 @@ from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.review.gate import FILE as REVIEWED
 from mutator.store import plan_file as planfile
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder
 from mutator.verification import equivalence as proof
-from mutator.verification.preflight import FILE as CHECKS
-from mutator.verification.preflight import SCHEMA as CHECKS_SCHEMA
 
 _SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
 _REMEDY = "give the folder of each shard of one plan, once"
@@ -44,7 +44,7 @@ def merge(shards: Sequence[Path], out: Path) -> Path:
         make_run_folder(out)
         stack.enter_context(owned(out))
         try:
-            with full_disk_told(out):
+            with raising_disk_full(out):
                 _copy(folders, out)
             return results.build(out)
         except BaseException:

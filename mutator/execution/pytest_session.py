@@ -16,7 +16,7 @@ from mutator._common.locks import living_workers, register_worker
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
-from mutator.execution import session as campaign_run
+from mutator.execution.session import Session, Summary, open_session
 from mutator.execution.worker import Assignment, Worker, bind_to_parent
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
@@ -144,7 +144,7 @@ class WorkerSide:
 class Controller:
     """Plugin of the command: hands out chunks, or runs them itself without xdist; notes what goes wrong."""
 
-    def __init__(self, begun: campaign_run.Session | None = None) -> None:
+    def __init__(self, begun: Session | None = None) -> None:
         self.begun = begun
         self._worker: LazyWorker | None = None
 
@@ -200,13 +200,13 @@ class PlainController(Controller):
         self._reviewed = reviewed
         self._out = out
         self._open = ExitStack()
-        self._told: list[str] = []
+        self._closing_lines: list[str] = []
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionstart(self, session: pytest.Session) -> None:
         workers = getattr(session.config.option, "numprocesses", None) or 0
         try:
-            opened = campaign_run.session(
+            opened = open_session(
                 Workspace.find(),
                 self._campaign,
                 self._out,
@@ -229,23 +229,23 @@ class PlainController(Controller):
         try:
             super().pytest_sessionfinish(session)
             summary = self.begun.finish()
-            self._told = _lines(summary)
+            self._closing_lines = _lines(summary)
             if not summary.interrupted:
                 session.exitstatus = summary.exit_code
         except MutatorError as err:
-            self._told = [str(err)]
+            self._closing_lines = [str(err)]
             session.exitstatus = err.exit_code
         finally:
             self._open.close()
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        if self._told:
+        if self._closing_lines:
             terminalreporter.section("campaign")
-        for line in self._told:
+        for line in self._closing_lines:
             terminalreporter.write_line(line)
 
 
-def _lines(summary: campaign_run.Summary) -> list[str]:
+def _lines(summary: Summary) -> list[str]:
     """The end of a campaign for a terminal."""
     lines = [
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",

@@ -1,4 +1,4 @@
-"""The frozen plan that a command works on: made now, or found and the one that was asked for."""
+"""The frozen plan that a command works on: made now, or found in its run folder."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -13,19 +13,19 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 
-def frozen(
+def open_frozen(
     workspace: Workspace, campaign: str | Path, out: Path, choices: Choices, *, reviewed: bool
 ) -> RunFolder:
-    """The run folder `out`, which is the caller's, with a frozen plan of the campaign in it.
+    """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign in it.
 
-    With `reviewed` the folder also keeps who approved what; CheckFailed, and no new plan, when that is not
-    all of it. MutatorError when it holds another plan, or one of other sources.
+    With `reviewed`, also store who approved what; CheckFailed, and no new plan, unless all of it is approved.
+    MutatorError when the folder holds another plan, or one of other sources.
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
         approvals = gate.approvals(workspace, load_plan(folder.path)) if reviewed else None
     else:
-        plan = make_plan(workspace, campaign, **asdict(choices))
+        plan = make_plan(workspace, campaign, choices)
         approvals = gate.approvals(workspace, plan) if reviewed else None
         folder = freeze_owned(plan, out, workspace)
     if approvals is not None:
@@ -34,7 +34,7 @@ def frozen(
 
 
 def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
-    """The run folder, if it was planned from this campaign with these choices and sources."""
+    """Open a run folder that was planned from this campaign with these choices and sources, or refuse it."""
     folder = RunFolder.open(out)
     head = folder.head
     loaded = load_campaign(workspace.campaign(campaign))

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from mutator.campaigns.shared_runs import runs
-from mutator.engines.reference import Engine, Execution, How, Job
+from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Experiment, Record, Status
@@ -23,7 +23,7 @@ from mutator.targets.manifest import TargetManifest
 @dataclass(frozen=True, kw_only=True)
 class Finished:
     """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
-    None without a mutant or a run. `how`, `why` and `start` are the execution's."""
+    None without a mutant or a run. `mode`, `why` and `start` are the execution's."""
 
     experiment: Experiment
     record: Record
@@ -32,7 +32,7 @@ class Finished:
     cpu_s: float = 0.0
     wall_s: float = 0.0
     log: str = ""
-    how: How | None = None  # None: it was not run
+    mode: RunMode | None = None  # None: it was not run
     why: str = ""
     start: int = 0
 
@@ -124,7 +124,7 @@ class Runner:
         try:
             record = self._record(experiment, built, execution)
         except BadOutput as err:
-            record = _bare(experiment, Status.HARNESS_ERROR, _told(err), built)
+            record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
         return Finished(
             experiment=experiment,
             record=record,
@@ -133,7 +133,7 @@ class Runner:
             cpu_s=execution.cpu_s,
             wall_s=execution.wall_s,
             log=execution.log,
-            how=execution.how,
+            mode=execution.mode,
             why=execution.why,
             start=execution.start,
         )
@@ -153,7 +153,7 @@ class Runner:
         except BadOutput as err:
             if activation is None:
                 raise
-            return _bare(experiment, Status.CRASHED, _told(err), built, activation)
+            return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation)
         difference = golden.compare(reference, faulty, channels, self.manifest.time_channel)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
@@ -173,7 +173,7 @@ class Runner:
         )
 
 
-def _told(err: BadOutput) -> str:
+def _problem_of(err: BadOutput) -> str:
     """What is wrong with an output, without the scratch folder that it was in."""
     return f"{Path(err.where or '').name}: {err.got}"
 

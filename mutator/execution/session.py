@@ -1,44 +1,37 @@
-"""Run a campaign: plan if needed, check, run what lacks a record, build the table.
+"""A session: one command at work in a run folder that it owns, from the plan to the table of results.
 
-`mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` are this same code: `run` starts pytest in
-this process with the plugin of `mutator.execution.pytest_plugin`.
+How the pending work is dealt out to processes is not decided here: see `distribution`.
 """
 
-import io
 import os
 import shutil
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from importlib import metadata
 from itertools import chain
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from mutator._common.files import DiskFull, is_half_written
 from mutator._common.interrupts import terminable
 from mutator._common.locks import owned
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.plans import Choices, make_run_folder
-from mutator.engines import choice as engines
 from mutator.engines.reference import prepare_base
+from mutator.engines.registry import REFERENCE, choose_engine
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
-from mutator.execution.run_plan import frozen
+from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
-from mutator.store.records import Progress, Tail, label, read_records
+from mutator.store.records import Progress, label, read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence as proof
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
-_NOTIFY_S = 0.5
 
 Notify = Callable[[Progress], None]
 
@@ -67,42 +60,6 @@ class Summary:
         return EXIT_OK if whole and not self.problem else EXIT_HARNESS_ERRORS
 
 
-def run(
-    workspace: Workspace,
-    campaign: str | Path,
-    out: Path,
-    *,
-    workers: int = 0,
-    choices: Choices | None = None,
-    engine: str | None = None,
-    reviewed: bool = False,
-    notify: Notify | None = None,
-) -> Summary:
-    """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
-
-    A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
-    MutatorError, as is a changed campaign file or target. `engine` is one of `engines.ENGINES` (None: the
-    fastest that is worth it). With `reviewed` only what is approved is run (`mutator.review.gate`). `notify`
-    is called from another thread about twice a second. MutatorError for wrong input, CheckFailed when
-    something is not approved, the checks before the campaign fail, or the proof of its engine does.
-    """
-    with session(
-        workspace,
-        campaign,
-        out,
-        workers=workers,
-        choices=choices or Choices(),
-        engine=engine,
-        reviewed=reviewed,
-        notify=notify,
-    ) as begun:
-        begun.prepare()
-        if begun.pending or begun.proof:
-            with _followed(begun):
-                _run_pytest(begun)
-        return begun.finish()
-
-
 class Session:
     """One command at work in a run folder that it owns."""
 
@@ -116,7 +73,7 @@ class Session:
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[proof.Sample, ...] = ()
         self._manifest = workspace.manifest(folder.head["target"])
-        self.engine = engines.choose(engine, self._manifest, folder.planned)
+        self.engine = choose_engine(engine, self._manifest, folder.planned)
         self.problem = ""
         self.interrupted = False
         self._began = time.monotonic()
@@ -128,7 +85,7 @@ class Session:
         records = read_records(self.folder.path)
         self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
         left = pending(self.folder, records)
-        if left and self.engine != engines.REFERENCE:
+        if left and self.engine != REFERENCE:
             proof.begin(self.folder.path)
         self.proof = proof.left(self.folder)
         if left or self.proof:
@@ -182,7 +139,7 @@ class Session:
 
 
 @contextmanager
-def session(
+def open_session(
     workspace: Workspace,
     campaign: str | Path,
     out: Path,
@@ -193,14 +150,14 @@ def session(
     reviewed: bool = False,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
-    """Own `out` and have a frozen plan in it; scratch is cleared before and after."""
+    """Own the run folder `out` with a frozen plan in it; scratch is cleared before and after."""
     is_new = not out.exists()
     make_run_folder(out)
     with terminable(), owned(out):
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
         try:
-            folder = frozen(workspace, campaign, out, choices, reviewed=reviewed)
+            folder = open_frozen(workspace, campaign, out, choices, reviewed=reviewed)
         except MutatorError:
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is left
                 shutil.rmtree(out, ignore_errors=True)
@@ -215,71 +172,3 @@ def session(
             yield Session(workspace, folder, workers, engine, notify)
         finally:
             shutil.rmtree(folder.work, ignore_errors=True)
-
-
-@contextmanager
-def _followed(begun: Session) -> Iterator[None]:
-    """Tell how far the run is while it goes on."""
-    tail = Tail(begun.folder.path, begun.folder.planned)
-    stop = threading.Event()
-
-    def follow() -> None:
-        while not stop.wait(_NOTIFY_S):
-            begun.notify(tail.poll())
-
-    thread = threading.Thread(target=follow, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
-        begun.notify(tail.poll())
-
-
-def _run_pytest(begun: Session) -> None:
-    """Run the pending chunks as pytest items, without anything of the user's pytest configuration."""
-    from mutator.execution.pytest_session import Controller
-
-    installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
-    folder = begun.folder.path
-    arguments = [
-        *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
-        *(
-            "--disable-plugin-autoload",
-            "-p",
-            "xdist",
-            "-p",
-            "mutator" if installed else "mutator.execution.pytest_plugin",
-        ),
-        *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest", "--assert=plain"),
-        *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(begun.workers)),
-    ]
-    output = _Silent()
-    with _without("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
-        code = pytest.main(arguments, plugins=[Controller(begun), output])
-    if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not begun.problem:
-        begun.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
-
-
-@contextmanager
-def _without(*names: str) -> Iterator[None]:
-    """Without these variables in the environment, also that of the workers."""
-    kept = {name: os.environ.pop(name) for name in names if name in os.environ}
-    try:
-        yield
-    finally:
-        os.environ.update(kept)
-
-
-class _Silent:
-    """Pytest plugin: the terminal reporter writes into a buffer, so the terminal is the caller's."""
-
-    def __init__(self) -> None:
-        self.text = io.StringIO()
-
-    @pytest.hookimpl(trylast=True)  # after the reporter was made, before xdist (registered later) takes it
-    def pytest_configure(self, config: pytest.Config) -> None:
-        manager = config.pluginmanager
-        manager.unregister(name="terminalreporter")
-        manager.register(pytest.TerminalReporter(config, self.text), "terminalreporter")

@@ -6,13 +6,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.files import full_disk_told, make_folder
-from mutator.campaigns.campaign_files import Limits
+from mutator._common.files import make_folder, raising_disk_full
 from mutator.campaigns.provenance import check_sources, sources
-from mutator.engines.reference import Job, ReferenceEngine, prepare_base
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed
 from mutator.execution.runner import Finished, Goldens, Runner
-from mutator.model import Experiment, Record, Status
+from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.building import Mutant
 from mutator.store import plan_file as planfile
 from mutator.store.records import read_records
@@ -102,7 +102,7 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
     work = out / "work"
     shutil.rmtree(work, ignore_errors=True)
     try:
-        with full_disk_told(work):
+        with raising_disk_full(work):
             work.mkdir()
         yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
     finally:

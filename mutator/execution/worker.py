@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.files import full_disk_told
+from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
-from mutator.engines import choice as engines
-from mutator.engines.reference import Engine, ReferenceEngine
+from mutator.engines.jobs import Engine, Setting
+from mutator.engines.reference import ReferenceEngine
+from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Status
 from mutator.store import plan_file as planfile
@@ -47,7 +48,7 @@ class Worker:
         manifest = workspace.manifest(head["target"])
         scenarios = {scenario for scenario, _ in head["goldens"]}
         check_sources(self.folder.path, head["sources"], sources(workspace, manifest, scenarios))
-        with full_disk_told(self.folder.work):
+        with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
         self._runner = self._make_runner(self._engine(assignment.engine))
@@ -103,15 +104,15 @@ class Worker:
 
     def _engine(self, name: str) -> Engine:
         folder = self.folder
-        return engines.make(
-            name,
-            self._manifest,
-            self._workspace.fault_models(),
+        setting = Setting(
+            manifest=self._manifest,
+            models=self._workspace.fault_models(),
             base=folder.base,
             work=folder.work,
             limits=folder.limits,
             parent=self._parent,
         )
+        return make_engine(name, setting)
 
     def _independent_engine(self) -> Engine:
         folder = self.folder
@@ -130,7 +131,7 @@ class Worker:
                 "wall_s": finished.wall_s,
                 "host": socket.gethostname(),
                 "worker": self._name,
-                "engine": finished.how,
+                "engine": finished.mode,
                 "why": finished.why,
             }
         )
@@ -138,7 +139,7 @@ class Worker:
 
     def _write_patch(self, experiment: Experiment, data: bytes) -> None:
         path = self.folder.patch(experiment.id)
-        with full_disk_told(path):
+        with raising_disk_full(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
 

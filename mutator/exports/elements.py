@@ -9,9 +9,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mutator import __version__
 from mutator._common.text import counted
-from mutator.comparison.sides import drive
+from mutator._common.version import VERSION
 from mutator.execution import single_run as single
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
@@ -54,7 +53,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
     return {
         "schemaVersion": SCHEMA_VERSION,
         "thresholds": {"high": 100, "low": 0},
-        "framework": {"name": "mutator", "version": __version__},
+        "framework": {"name": "mutator", "version": VERSION},
         "config": config,
         "files": dict(sorted(files.items())),
         "testFiles": _tests([e for group in drives.values() for e in group]),
@@ -72,13 +71,12 @@ def _mutant(
     file = parsed(manifest.tree, first.location.path)
     site = file.resolve(first.location)
     edit = injection_edit(file, models, first, injection_id(0, first))
-    value = f" {fault.value} {fault.unit}".removesuffix(" -") if fault.value is not None else ""
     also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
-    told = f"{fault.spec}{value}, aims at {fault.aim}" + (f"; also at {', '.join(also)}" if also else "")
+    description = f"{fault.label}, aims at {fault.aim}" + (f"; also at {', '.join(also)}" if also else "")
     return {
         "id": fault.id,
         "mutatorName": first.model,
-        "description": told,
+        "description": description,
         **_splice(file, site, edit),
         **verdict(experiments, records),
     }
@@ -133,8 +131,8 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
     return {
         "status": status,
         "statusReason": reason,
-        "coveredBy": [drive(e) for e in active],
-        "killedBy": [drive(e) for e in hazardous],
+        "coveredBy": [e.drive_label for e in active],
+        "killedBy": [e.drive_label for e in hazardous],
         "testsCompleted": len(of[Status.OK]),
     }
 
@@ -142,6 +140,6 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
 def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
     """A file of tests for each scenario: its drives, by method and trigger."""
     files: dict[str, Any] = {}
-    for scenario, name in sorted({(e.scenario, drive(e)) for e in experiments}):
+    for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})
     return files

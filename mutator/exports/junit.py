@@ -9,12 +9,10 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Sequence
 
-from mutator.comparison.sides import words
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
-from mutator.outcomes import results
-from mutator.outcomes import rows as tables
 from mutator.outcomes.columns import plan_row
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.store.plan_file import read_all
 from mutator.store.run_folder import RunFolder
@@ -28,7 +26,7 @@ def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
     known = [ending.value for ending in ENDINGS]
     if strangers := [name for name in failures if name not in known]:
         raise MutatorError(f"'{strangers[0]}'", where="--failures", expected=f"one of {', '.join(known)}")
-    rows = {row.experiment_id: row for row in tables.read_results(results.ensure(folder.path))}
+    rows = {row.experiment_id: row for row in Results.up_to_date(folder.path).rows()}
     suites: dict[str, list[Experiment]] = {}
     for experiment in read_all(folder.path):
         cells = plan_row(experiment)
@@ -46,7 +44,7 @@ def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
 
 
 def _case(experiment: Experiment, row: Row | None, failures: Collection[str]) -> ET.Element:
-    case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=words(experiment))
+    case = ET.Element("testcase", classname=experiment.fault.spec.replace("/", "."), name=experiment.label)
     facts = {"experiment": experiment.id, "ending": row.ending if row else "not run"}
     if row:
         facts |= {f"hazard {name} [s]": f"{t:.2f}" for name, t in row.hazards}

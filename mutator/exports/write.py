@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mutator._common.files import make_folder, write_atomic
-from mutator.exports import Format
+from mutator.exports import Format, elements, junit
 from mutator.outcomes import results
+from mutator.outcomes.reader import Results
 from mutator.store.run_folder import RunFolder
-
-if TYPE_CHECKING:
-    from mutator.workspace import Workspace
+from mutator.workspace import Workspace
 
 FOLDER = "exports"
 
@@ -18,8 +16,8 @@ FOLDER = "exports"
 FILES = {
     Format.MUTATION_ELEMENTS: "mutation-elements.json",
     Format.JUNIT: "junit.xml",
-    Format.CSV: "results.csv",
-    Format.PARQUET: "results.parquet",
+    Format.CSV: results.CSV,
+    Format.PARQUET: results.PARQUET,
 }
 
 
@@ -28,7 +26,7 @@ def export(
     format: Format,
     out: Path | None = None,
     *,
-    workspace: "Workspace | None" = None,
+    workspace: Workspace | None = None,
     failures: Sequence[str] = (),
 ) -> Path:
     """Write the run folder `run` as `format` to `out` (default: RUN/exports/); returns the file.
@@ -44,16 +42,12 @@ def export(
 
 
 def _content(
-    folder: RunFolder, format: Format, workspace: "Workspace | None", failures: Sequence[str]
+    folder: RunFolder, format: Format, workspace: Workspace | None, failures: Sequence[str]
 ) -> bytes:
     if format is Format.MUTATION_ELEMENTS:
-        from mutator.exports import elements
-
         assert workspace is not None
         return elements.content(folder, workspace)
     if format is Format.JUNIT:
-        from mutator.exports import junit
-
         return junit.content(folder, failures)
-    table = results.ensure(folder.path)
-    return (table if format is Format.CSV else table.with_suffix(".parquet")).read_bytes()
+    table = Results.up_to_date(folder.path)
+    return table.csv() if format is Format.CSV else table.parquet()

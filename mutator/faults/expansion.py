@@ -13,8 +13,8 @@ from mutator.faults.injections import InjectionSpec
 from mutator.faults.parameters import resolve
 from mutator.faults.specs import AS_DESCRIBED, READINGS, Draw, FaultSpec, Variant
 from mutator.model import Fault, Injection
+from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.paths import check_location
 
 _REDRAWS = 100
 

@@ -9,9 +9,9 @@ from typing import Literal
 from pydantic import Field
 
 from mutator._common import hashing as ids
+from mutator._common.text import suggestion
 from mutator.config import units
 from mutator.config.locations import PROBE_NAME
-from mutator.config.problems import suggestion
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionModel, InjectionSpec

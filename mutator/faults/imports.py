@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from mutator.config.problems import suggestion
+from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 

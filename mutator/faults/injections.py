@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import Field
 
+from mutator._common.text import shown
 from mutator.config import units
 from mutator.config.locations import AtModel
-from mutator.config.problems import shown
 from mutator.config.yaml_files import Keys, Source, StrictModel
 from mutator.model import FaultLocation
 

@@ -1,9 +1,9 @@
 """Parameters of an injection: from what a spec wrote to what a template takes, checked against the schema."""
 
 from mutator._common.random_streams import generator
+from mutator._common.text import shown, suggestion
 from mutator.config import units
 from mutator.config.locations import dotted_name
-from mutator.config.problems import shown, suggestion
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema

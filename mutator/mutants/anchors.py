@@ -13,7 +13,7 @@ import libcst as cst
 from libcst.metadata import CodeRange, MetadataWrapper, PositionProvider
 
 from mutator._common.interrupts import held
-from mutator.config.problems import suggestion
+from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.probe import instrumented_line

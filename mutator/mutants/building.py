@@ -23,8 +23,8 @@ from mutator.mutants.reusable_changes import (
     reuse_key,
 )
 from mutator.mutants.splicing import Edit, apply_edits, guard, insertion, joined, probe_import, unsplice
+from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.paths import check_location
 from mutator.targets.source_tree import SourceTree
 
 

@@ -1,12 +1,15 @@
 """Columns of the results table and of its neighbours: names, types, units, meanings.
 
-What is known of an experiment before it runs is in the plan, too.
+The hazards and the compared channels of a target have columns of their own; all others are the same for every
+target. What is known of an experiment before it runs is in the plan, too.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from mutator.model import Experiment
+from mutator.targets.manifest import TargetManifest
 
 ColumnType = Literal["text", "flag", "count", "number"]
 
@@ -21,7 +24,7 @@ class Column:
     about: str
 
 
-RESULTS = (
+_TO_MANIFEST = (
     Column(
         "experiment_id",
         "text",
@@ -45,20 +48,13 @@ RESULTS = (
     Column("activations", "count", "", "how often"),
     Column("manifested", "flag", "", "whether an actuator output then differed from golden"),
     Column("t_manifest", "number", "s", "when first"),
-    Column("h1", "flag", "", "whether hazard H1 came"),
-    Column("t_h1", "number", "s", "when first"),
-    Column("h2", "flag", "", "whether hazard H2 came"),
-    Column("t_h2", "number", "s", "when first"),
-    Column("h3", "flag", "", "whether hazard H3 came"),
-    Column("t_h3", "number", "s", "when first"),
+)
+_TO_REACTION = (
     Column("alerts", "text", "", "names of the alerts in the order of their times, joined by `;`"),
     Column("t_alert", "number", "s", "time of the first alert"),
     Column(
         "reaction_time", "number", "s", "first hazard minus first alert; empty unless the alert came first"
     ),
-    Column("max_dev_gas", "number", "the channel's", "largest difference of gas from golden"),
-    Column("max_dev_brake", "number", "the channel's", "largest difference of the brake from golden"),
-    Column("max_dev_steer", "number", "the channel's", "largest difference of steering from golden"),
 )
 EXTRA = (
     Column("variant", "text", "", "the variant of the spec"),
@@ -73,14 +69,72 @@ TIMINGS = (
     Column("host", "text", "", "the machine"),
     Column("worker", "text", "", "the worker of the session"),
 )
-COLUMNS = tuple(column.name for column in RESULTS)
-PLAN_COLUMNS = (*COLUMNS[:11], "variant", "aim", "condition")
-_TYPES = {column.name: column.type for column in (*RESULTS, *EXTRA)}
+PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim", "condition")
+# Columns that readers of the table add to it; no hazard may take their names.
+_DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards")
+DERIVED = (*_DERIVED_TEXTS, "hazard", "t_hazard")
+_TEXTS = {column.name for column in (*_TO_MANIFEST, *_TO_REACTION, *EXTRA) if column.type == "text"}
+_TEXTS |= {*_DERIVED_TEXTS}
 
 
-def type_of(name: str) -> ColumnType:
-    """Type of a column of the results; any other name is a time or a difference of a target's own."""
-    return _TYPES.get(name, "number")
+def result_columns(hazards: Iterable[str], compared: Sequence[str]) -> tuple[Column, ...]:
+    """The columns of results.csv, in order, for a target's hazards and the names of its compared channels."""
+    return (
+        *_TO_MANIFEST,
+        *(column for name in hazards for column in hazard_columns(name)),
+        *_TO_REACTION,
+        *(
+            Column(column, "number", "the channel's", f"largest difference of `{name}` from golden")
+            for name, column in deviation_columns(compared).items()
+        ),
+        *EXTRA,
+    )
+
+
+def is_text(column: str) -> bool:
+    """Whether a column of the table, or one derived from it, holds text; all others hold numbers."""
+    return column in _TEXTS
+
+
+def hazard_columns(hazard: str) -> tuple[Column, Column]:
+    """The flag and the time of a hazard: `h1` and `t_h1` of H1."""
+    name = hazard.lower()
+    return (
+        Column(name, "flag", "", f"whether hazard {hazard} came"),
+        Column(f"t_{name}", "number", "s", "when first"),
+    )
+
+
+def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
+    """The hazards that a table has columns for, in their order: a flag, and a time of the same name."""
+    known = dict.fromkeys(columns)
+    return tuple(name.upper() for name in known if f"t_{name}" in known)
+
+
+def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
+    """Column of each compared channel: `max_dev_` and its first word (`steer` of `steer_torque`), or its
+    whole name where another channel begins with the same word."""
+    words = [name.split("_")[0] for name in channels]
+    return {
+        name: f"max_dev_{word if words.count(word) == 1 else name}"
+        for name, word in zip(channels, words, strict=True)
+    }
+
+
+def check_names(manifest: TargetManifest) -> None:
+    """MutatorError, at its line of the manifest, for a hazard whose columns have the name of another one."""
+    taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
+    taken |= {*DERIVED}
+    for i, hazard in enumerate(manifest.hazards):
+        names = {column.name for column in hazard_columns(hazard)}
+        if names & taken:
+            raise manifest.source.error(
+                ("hazards", i),
+                f"'{hazard}'",
+                expected=f"a name whose columns, {' and '.join(sorted(names))}, the results do not have yet",
+                remedy="rename it",
+            )
+        taken |= names
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:

@@ -30,11 +30,6 @@ class Difference:
     max_dev: tuple[tuple[str, float], ...]
 
 
-def golden_key(scenario: str, changes: Sequence[str]) -> str:
-    """Name of a fault-free run: `S1`, `S1+no_lead`."""
-    return "+".join((scenario, *changes))
-
-
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
     """Digest of the trace file's bytes."""
     try:

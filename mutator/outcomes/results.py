@@ -4,26 +4,28 @@ import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mutator._common.files import write_atomic
 from mutator.model import Experiment, Record, Status
-from mutator.outcomes.columns import COLUMNS, EXTRA, TIMINGS, plan_row, type_of
+from mutator.outcomes.columns import (
+    TIMINGS,
+    Column,
+    deviation_columns,
+    hazard_columns,
+    plan_row,
+    result_columns,
+)
 from mutator.outcomes.verdicts import reaction_time
 from mutator.store import plan_file as planfile
 from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
 from mutator.store.run_folder import RunFolder
 
-if TYPE_CHECKING:
-    import pyarrow as pa  # type: ignore[import-untyped]
-
-_DERIVED = ("results.csv", "results.parquet", "timings.parquet")
-_HAZARDS = ("H1", "H2", "H3")
+CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
-def row(experiment: Experiment, record: Record, hazards: Sequence[str] = _HAZARDS) -> dict[str, object]:
-    """One row: `COLUMNS`, the target's own hazards and channels, `variant, aim, condition, detail`.
+def row(experiment: Experiment, record: Record, hazards: Sequence[str]) -> dict[str, object]:
+    """One row by column, in any order; without the largest differences where the run left no trace.
 
     `hazards` are those that the target checks. None for nothing; flags are 0 or 1; times are seconds of
     simulation since its start.
@@ -46,20 +48,11 @@ def row(experiment: Experiment, record: Record, hazards: Sequence[str] = _HAZARD
     }
     times = dict(record.hazards)
     for name in hazards:
-        cells[name.lower()] = int(name in times) if ok else None
-        cells[f"t_{name.lower()}"] = _time(times.get(name))
+        flag, time = hazard_columns(name)
+        cells[flag.name] = int(name in times) if ok else None
+        cells[time.name] = _time(times.get(name))
     columns = deviation_columns([name for name, _ in record.max_dev])
     return cells | {columns[name]: value for name, value in record.max_dev}
-
-
-def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
-    """Column of each compared channel: `max_dev_` and its first word (`steer` of `steer_torque`), or its
-    whole name where another channel begins with the same word."""
-    words = [name.split("_")[0] for name in channels]
-    return {
-        name: f"max_dev_{word if words.count(word) == 1 else name}"
-        for name, word in zip(channels, words, strict=True)
-    }
 
 
 def _time(value: float | None) -> float | None:
@@ -69,7 +62,7 @@ def _time(value: float | None) -> float | None:
 def ensure(run: Path) -> Path:
     """results.csv of a run folder: as it is when all derived files are newer than all they are made from,
     else built."""
-    derived = [run / name for name in _DERIVED]
+    derived = [run / name for name in (CSV, PARQUET, TIMINGS_PARQUET)]
     if all(path.is_file() for path in derived):
         made_from = [run / "run.json", *run.glob("records/*.jsonl"), *run.glob("timings/*.jsonl")]
         oldest = min(path.stat().st_mtime_ns for path in derived)
@@ -81,29 +74,16 @@ def ensure(run: Path) -> Path:
 def build(run: Path) -> Path:
     """Write results.csv (returned), results.parquet and timings.parquet of a run folder from its plan and
     records."""
-    import pyarrow as pa
-
     folder = RunFolder.open(run)
     records = read_records(folder.path)
     experiments = sorted(planfile.read_all(folder.path), key=lambda e: e.id)
-    hazards = folder.head["hazards"]
-    rows = [row(e, records[e.id], hazards) for e in experiments if e.id in records]
-    columns = _columns(folder)
-    write_atomic(folder.path / "results.csv", _csv(rows, columns))
-    types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
-    flags = {name.lower() for name in hazards}
-    schema = pa.schema([(name, types["flag" if name in flags else type_of(name)]) for name in columns])
-    write_atomic(folder.path / "results.parquet", _parquet(rows, schema))
-    write_atomic(folder.path / "timings.parquet", _timings(folder.path))
-    return folder.path / "results.csv"
-
-
-def _columns(folder: RunFolder) -> list[str]:
-    """All columns of a run's table, in order: those of every table, then the target's own, then the rest."""
-    hazards = [name.lower() for name in folder.head["hazards"] if name not in _HAZARDS]
-    own = [column for name in hazards for column in (name, f"t_{name}")]
-    own += deviation_columns(folder.head["compared"]).values()
-    return [*COLUMNS, *(name for name in own if name not in COLUMNS), *(column.name for column in EXTRA)]
+    head = folder.head
+    columns = result_columns(head["hazards"], head["compared"])
+    rows = [row(e, records[e.id], head["hazards"]) for e in experiments if e.id in records]
+    write_atomic(folder.path / CSV, _csv(rows, [column.name for column in columns]))
+    write_atomic(folder.path / PARQUET, _parquet(rows, columns))
+    write_atomic(folder.path / TIMINGS_PARQUET, _timings(folder.path))
+    return folder.path / CSV
 
 
 def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
@@ -114,11 +94,13 @@ def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
     return text.getvalue().encode()
 
 
-def _parquet(rows: list[dict[str, object]], schema: "pa.Schema") -> bytes:
+def _parquet(rows: list[dict[str, object]], columns: Sequence[Column]) -> bytes:
     """The rows as a Parquet file; nothing in it depends on when or where it was made."""
-    import pyarrow as pa
+    import pyarrow as pa  # type: ignore[import-untyped]
     from pyarrow import parquet
 
+    types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
+    schema = pa.schema([(column.name, types[column.type]) for column in columns])
     table = pa.table(
         {field.name: pa.array([r.get(field.name) for r in rows], field.type) for field in schema}, schema
     )
@@ -129,11 +111,7 @@ def _parquet(rows: list[dict[str, object]], schema: "pa.Schema") -> bytes:
 
 def _timings(run: Path) -> bytes:
     """What each experiment cost, where: its newest line wins."""
-    import pyarrow as pa
-
     newest: dict[str, dict[str, object]] = {}
     for path in sorted((run / "timings").glob("*.jsonl")):
         newest |= {line["experiment_id"]: line for line in read_lines(path, TIMINGS_SCHEMA)}
-    types = {"text": pa.string(), "number": pa.float64()}
-    schema = pa.schema([(column.name, types[column.type]) for column in TIMINGS])
-    return _parquet([newest[name] for name in sorted(newest)], schema)
+    return _parquet([newest[name] for name in sorted(newest)], TIMINGS)

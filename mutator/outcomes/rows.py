@@ -1,17 +1,15 @@
-"""The results table read back and counted: how many faults were activated, manifested, did harm.
+"""Rows of the results table, typed, and counted: how many faults were activated, manifested, did harm.
 
 A row stands for one experiment. An experiment whose harness failed, or whose mutant could not be made,
 says nothing about its fault: it is counted apart and is in no other number.
 """
 
-import csv
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from mutator.errors import MutatorError
-from mutator.model import Outcome, Status
+from mutator.model import Outcome, Status, fault_label
+from mutator.outcomes.columns import hazards_in
 
 UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
@@ -51,9 +49,8 @@ class Row:
 
     @property
     def fault(self) -> str:
-        """The fault in words: `radar/chaff/distance 35 m`."""
-        value = f" {self.value} {self.unit}".rstrip(" -") if self.value else ""
-        return f"{self.module}/{self.fault_type}/{self.variant}{value}"
+        """The label of the fault."""
+        return fault_label(f"{self.module}/{self.fault_type}/{self.variant}", self.value, self.unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,21 +68,6 @@ class Count:
     crashed: int
     timeout: int
     unusable: int
-
-
-def read_results(path: Path) -> tuple[Row, ...]:
-    """The rows of a results.csv in its order; MutatorError when there is none or it is not one."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return tuple(row_from(line) for line in csv.DictReader(file))
-    except FileNotFoundError:
-        raise MutatorError(
-            "no results here", where=path.parent, expected="a run folder", remedy="see `mutator run --help`"
-        ) from None
-    except (KeyError, ValueError) as e:
-        raise MutatorError(
-            f"not a results table: {e}", where=path, remedy="make it anew: `mutator report DIR`"
-        ) from e
 
 
 def hazard_names(rows: Iterable[Row]) -> tuple[str, ...]:
@@ -162,9 +144,9 @@ def outcome_counts(rows: Iterable[Row]) -> dict[str, int]:
 
 def row_from(line: Mapping[str, str]) -> Row:
     """The row of a line of results.csv, by column; KeyError or ValueError when it is none."""
-    # A hazard has a flag and a time of the same name: h1, t_h1.
-    checked = [name for name in line if f"t_{name}" in line and line[name]]
-    hazards = [(name.upper(), float(line[f"t_{name}"])) for name in checked if line[f"t_{name}"]]
+    checked = [name for name in hazards_in(line) if line[name.lower()]]
+    times = {name: line[f"t_{name.lower()}"] for name in checked}
+    hazards = [(name, float(time)) for name, time in times.items() if time]
     return Row(
         experiment_id=line["experiment_id"],
         module=line["module"],
@@ -179,7 +161,7 @@ def row_from(line: Mapping[str, str]) -> Row:
         outcome=Outcome(line["outcome"]) if line["outcome"] else None,
         t_activation=_time(line["t_activation"]),
         t_manifest=_time(line["t_manifest"]),
-        checked=tuple(map(str.upper, checked)),
+        checked=tuple(checked),
         hazards=tuple(sorted(hazards, key=lambda h: h[1])),
         alerts=tuple(a for a in line["alerts"].split(";") if a),
         t_alert=_time(line["t_alert"]),

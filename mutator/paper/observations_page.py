@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+from mutator._common.tables import Table
 from mutator.paper.observations import FEWEST, Judged, Summed
-from mutator.report.page import markdown_table
 from mutator.statistics.sheet import Cell, Sheet
 
 RULES = f"""\
@@ -25,8 +25,8 @@ runs = load(Path("results.csv"))"""
 HEADS = ("claim", "", "the paper", "rule on its counts", "here", "rule", "verdict")
 
 
-def lines(observation: Summed) -> list[list[str]]:
-    """One line for each claim as it is read, and one for each group."""
+def table(observation: Summed) -> Table:
+    """One row for each claim, and one for each of its groups."""
     made = []
     for one in observation.claims:
         rule = str(one.claim.holds or "")
@@ -38,7 +38,7 @@ def lines(observation: Summed) -> list[list[str]]:
         made.append(first)
         if len(one.answers) > 1:
             made += [["", a.group, "", "", a.found.said, "", a.verdict.value] for a in one.answers]
-    return made
+    return Table(heads=HEADS, rows=made)
 
 
 def published(one: Judged) -> str:
@@ -59,7 +59,7 @@ def markdown(observations: Sequence[Summed], ends: Sequence[tuple[str, float]], 
     """All of it: verdicts, claims, rules, and the queries as they were evaluated."""
     parts = ["# The paper's observations", coverage, verdicts(observations), rules()]
     for one in observations:
-        parts += [f"## {heading(one)}", markdown_table(list(HEADS), lines(one))]
+        parts += [f"## {heading(one)}", table(one).as_markdown()]
     parts += ["## The queries", "In the run folder, in Python:", f"```python\n{session(ends)}\n```"]
     for one in observations:
         for claim in one.claims:
@@ -71,7 +71,7 @@ def markdown(observations: Sequence[Summed], ends: Sequence[tuple[str, float]], 
 def verdicts(observations: Sequence[Summed]) -> str:
     """The observations with their verdicts as a table."""
     rows = [[str(one.number), one.title, one.verdict.value] for one in observations]
-    return markdown_table(["observation", "", "verdict"], rows)
+    return Table(heads=("observation", "", "verdict"), rows=rows).as_markdown()
 
 
 def heading(one: Summed) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from mutator._common.files import write_atomic
+from mutator._common.tables import Table
 from mutator.paper import observations, observations_page
 from mutator.paper.observations import Summed
 from mutator.paper.published import has_paper, load_paper
@@ -26,15 +27,11 @@ class Told:
     ends: tuple[tuple[str, float], ...]
 
     @property
-    def heads(self) -> tuple[str, ...]:
-        return observations_page.HEADS
-
-    @property
     def verdicts(self) -> str:
         return observations_page.verdicts(self.observations)
 
-    def lines(self, observation: Summed) -> list[list[str]]:
-        return observations_page.lines(observation)
+    def table(self, observation: Summed) -> Table:
+        return observations_page.table(observation)
 
     @property
     def rules(self) -> str:

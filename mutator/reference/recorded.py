@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from mutator.outcomes.columns import EXTRA, PLAN_COLUMNS, RESULTS, TIMINGS, Column
+from mutator.outcomes.columns import PLAN_COLUMNS, TIMINGS, Column, result_columns
 from mutator.reference.tables import generated
 from mutator.targets.manifest import Channel, TargetManifest
 from mutator.triggers.conditions import VARIABLES
@@ -22,6 +22,7 @@ OBSERVED = {
 def results(workspace: Workspace) -> str:
     """docs/reference/results.md."""
     left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
+    manifests = [workspace.manifest(name) for name in workspace.target_names()]
     return "\n".join(
         [
             generated("Result columns"),
@@ -31,12 +32,12 @@ def results(workspace: Workspace) -> str:
             "*flag* is 0 or 1. "
             "Times are seconds of simulation since\nits start. What the words mean is in "
             "[Verdicts](../explanation/verdicts.md).\n",
-            *_columns((*RESULTS, *EXTRA)),
-            "A target with more hazards than H1 to H3, or other actuator outputs, has for each "
-            "hazard its name and "
-            "`t_` and its name,\nfor each output `max_dev_` and the first word of its name (the "
-            "whole name where two "
-            "begin alike), before `variant`.\n",
+            "Hazards and compared channels are the target's: its [manifest](target-manifest.md) names them. "
+            "A hazard has two\ncolumns, its name in small letters and `t_` and that name. A channel has one, "
+            "`max_dev_` and the first word of its\nname, or its whole name where two channels begin with the "
+            "same word.\n",
+            *(line for manifest in manifests for line in _table_of(manifest)),
+            "## plan.csv\n",
             f"`plan.csv` has what is known before a run: {left_out}.\n",
             "## timings.parquet\n",
             "What each experiment cost, in its newest run. It is kept apart because it differs from "
@@ -44,6 +45,11 @@ def results(workspace: Workspace) -> str:
             *_columns(TIMINGS),
         ]
     )
+
+
+def _table_of(manifest: TargetManifest) -> Iterator[str]:
+    yield f"## Target {manifest.name}\n"
+    yield from _columns(result_columns(manifest.hazards, [channel.name for channel in manifest.compared]))
 
 
 def _columns(columns: Iterable[Column]) -> Iterator[str]:

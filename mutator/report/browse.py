@@ -5,7 +5,6 @@ Columns of words are dictionaries and codes, and a diff is its shape and what fi
 """
 
 import base64
-import csv
 import json
 import math
 import os
@@ -21,7 +20,8 @@ from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import Anchor, Experiment, Fault
 from mutator.mutants.readable_diffs import readable
-from mutator.outcomes.columns import type_of
+from mutator.outcomes.columns import is_text
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report import series as report_series
 from mutator.review.groups import Shape, shapes
@@ -77,8 +77,7 @@ def _is_filmed(folder: RunFolder, workspace: "Workspace | None") -> bool:
 
 def tables_of(folder: RunFolder, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
     """The table and the details of a run folder with these rows in its results.csv."""
-    with (folder.path / "results.csv").open(newline="", encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
+    lines = list(Results.of_run(folder.path).lines())
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
     rows, lines = [rows[i] for i in order], [lines[i] for i in order]
     experiments = {e.id: e for e in planfile.read_all(folder.path)}
@@ -91,11 +90,13 @@ def reading_order(row: Row) -> tuple[str, ...]:
 
 
 def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, Any]:
-    """The results, a column each, and those that are filtered by: `kind`, `ending`, `hazards`, `t_hazard`."""
+    """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
+    `t_hazard`."""
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ())
     }
     columns["kind"] = [f"{r.module}/{r.fault_type}" for r in rows]
+    columns["fault"] = [r.fault for r in rows]
     columns["ending"] = [r.ending for r in rows]
     columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
     columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
@@ -107,7 +108,7 @@ def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
     """Numbers as they are (None: empty), ids as texts, anything else as codes of its distinct values in their
     order. A name is never taken for a number, whatever it looks like: a variant may be called `nan`."""
-    if type_of(name) != "text" and any(values):
+    if not is_text(name) and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
         except ValueError:

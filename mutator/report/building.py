@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mutator._common.files import write_atomic
+from mutator._common.tables import Table
 from mutator.model import Status
 from mutator.outcomes import rows as tables
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Count, Row
 from mutator.report import stamp as report_stamp
 from mutator.store.run_folder import RunFolder
@@ -40,12 +42,11 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
-    """A table of counts, ready to be printed."""
+class Counts:
+    """A table of counts and its title."""
 
     title: str
-    heads: list[str]
-    lines: list[list[str]]
+    table: Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +57,7 @@ class Content:
     facts: list[tuple[str, str]]
     planned: str  # how many experiments and runs
     outcomes: dict[str, int]
-    tables: list[Table]
+    tables: list[Counts]
     observations: (
         "Told | None"  # of the paper; None: the library has none, or none of their fault types is here
     )
@@ -111,7 +112,7 @@ def _content(folder: RunFolder, out: Path, workspace: "Workspace | None") -> Con
     from mutator.statistics import sheets
     from mutator.statistics.frame import load
 
-    rows = tables.read_results(folder.path / "results.csv")
+    rows = Results.of_run(folder.path).rows()
     engine = report_engine.told(folder)
     frame = load(folder.path / "results.csv")
     statistics = sheets.run_sheets(folder, workspace)
@@ -191,7 +192,7 @@ def _facts(folder: RunFolder, rows: Sequence[Row], engine: "EngineTold | None") 
     return [(name, str(value)) for name, value in facts.items()]
 
 
-def _tables(rows: Sequence[Row]) -> list[Table]:
+def _tables(rows: Sequence[Row]) -> list[Counts]:
     keys = (
         ("By fault type", "fault type", tables.by_fault_type),
         ("By scenario", "scenario", tables.by_scenario),
@@ -202,5 +203,5 @@ def _tables(rows: Sequence[Row]) -> list[Table]:
     for title, head, key in keys:
         counts: tuple[Count, ...] = tables.counts_by(rows, key)
         heads, lines = tables.count_table(counts, head, hazards)
-        made.append(Table(title=title, heads=heads, lines=lines))
+        made.append(Counts(title=title, table=Table(heads=heads, rows=lines, right=range(1, len(heads)))))
     return made

@@ -1,22 +1,22 @@
-"""How the experiments of a run were run, and what their proof came to, as its report tells it."""
+"""RunMode the experiments of a run were run, and what their proof came to, as its report tells it."""
 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mutator.engines.reference import How
+from mutator._common.tables import Table
+from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence as proof
 
-HEADS = ["how", "experiments"]
 LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
 _WORDS = {
-    How.FORK: "a fork of the golden run, taken right before the fault is first active",
-    How.GOLDEN: "no run: the trigger never holds, so what came of the golden run comes of it",
-    How.WARM: "a fork of the loaded program, from the run's beginning",
-    How.REFERENCE: "a fresh interpreter (reference engine)",
+    RunMode.FORK: "a fork of the golden run, taken right before the fault is first active",
+    RunMode.GOLDEN: "no run: the trigger never holds, so what came of the golden run comes of it",
+    RunMode.WARM: "a fork of the loaded program, from the run's beginning",
+    RunMode.REFERENCE: "a fresh interpreter (reference engine)",
     None: "no run: there is no mutant",
 }
 
@@ -26,8 +26,7 @@ class Told:
     """A table of how many experiments were run how; what their proof came to, as a sentence and in few words;
     `failed`: it found an experiment that is another one on the reference engine."""
 
-    heads: list[str]
-    lines: list[list[str]]
+    table: Table
     proof: str
     state: str
     failed: bool
@@ -39,11 +38,12 @@ def told(folder: RunFolder) -> Told | None:
     if not ways and not (folder.path / proof.FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder)
-    return Told(heads=HEADS, lines=list(_lines(ways)), proof=sentence, state=state, failed=failed)
+    table = Table(heads=("how", "experiments"), rows=list(_lines(ways)), right=(1,))
+    return Told(table=table, proof=sentence, state=state, failed=failed)
 
 
 def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
-    """How many experiments were run how, and why not as was asked; the newest line of each counts."""
+    """RunMode many experiments were run how, and why not as was asked; the newest line of each counts."""
     newest: dict[str, tuple[str | None, str]] = {}
     for path in sorted((folder.path / "timings").glob("*.jsonl")):
         for line in read_lines(path, TIMINGS_SCHEMA):

@@ -11,6 +11,7 @@ from mutator.figures.actions import WANTED, Pair, Wanted
 from mutator.figures.figures import Drawing
 from mutator.figures.run_pair import draw
 from mutator.figures.run_plot import marks_of
+from mutator.model import fault_label
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -40,9 +41,15 @@ def drawings(
 
 
 def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
-    """The rows that the query finds, in the order they are looked at."""
+    """The rows that the query finds, in the order they are looked at; none where the target has no such
+    hazard or channel."""
     numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
-    found = numbers.query(wanted.query, engine="python")
+    try:
+        found = numbers.query(wanted.query, engine="python")
+    except pd.errors.UndefinedVariableError:
+        return numbers.iloc[:0]
+    if wanted.order not in numbers:
+        return numbers.iloc[:0]
     return found.sort_values([wanted.order, "experiment_id"], ascending=[False, True])
 
 
@@ -94,9 +101,9 @@ def _none(wanted: Wanted, why: str) -> Drawing:
 
 def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
     """What is shown, how it was found, and what the traces say."""
-    value = f" {row['value']} {row['unit']}".rstrip(" -") if row["value"] else ""
+    fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
     return (
-        f"{row['kind']}/{row['variant']}{value} in {row['scenario']}, {row['method']}, trigger "
+        f"{fault} in {row['scenario']}, {row['method']}, trigger "
         f"{row['trigger']}: experiment {row['experiment_id']}. It is number {number} of the {of} that the "
         f"query finds, largest {wanted.order} first: the first (of at most {LOOKED_AT} that are looked at) "
         f"whose traces show that {wanted.confirmed}."

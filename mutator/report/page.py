@@ -1,10 +1,10 @@
 """The two forms of a report: Markdown for reading anywhere, one HTML page without outside help."""
 
 import base64
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.model import Outcome, Status
 from mutator.web import asset
@@ -34,9 +34,6 @@ NOTES = """\
 could not be made, is counted apart. *Activated*: an injected statement ran while triggered. *Manifested*: an
 actuator output then differed from the fault-free run. *Hazard, no alert*: no counted alert at all."""
 
-# What Markdown would take for an element, for italics or for bold; not in `code`, where nothing is taken so.
-_MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-9])_+|_+(?![A-Za-z0-9])")
-
 
 def markdown(content: "Content") -> str:
     """The report as Markdown."""
@@ -49,7 +46,7 @@ def markdown(content: "Content") -> str:
         parts.append("Their claims, rules, numbers and queries are in [observations.md](observations.md).")
     parts += [NOTES.replace("\n", " ")]
     for table in content.tables:
-        parts += [f"## {table.title}", markdown_table(table.heads, table.lines)]
+        parts += [f"## {table.title}", table.table.as_markdown()]
     parts += [sheet.markdown().rstrip() for sheet in content.statistics]
     if content.figures:
         parts.append("## Figures")
@@ -62,10 +59,10 @@ def markdown(content: "Content") -> str:
         parts += ["## Runs that did not end well", _failed_text(content)]
     if content.engine:
         parts += ["## How the experiments were run", content.engine.proof]
-        parts.append(markdown_table(content.engine.heads, content.engine.lines))
+        parts.append(content.engine.table.as_markdown())
     parts += [
         "## Where this comes from",
-        markdown_table(["what", "value"], [list(f) for f in content.facts]),
+        Table(heads=("what", "value"), rows=content.facts).as_markdown(),
     ]
     parts.append("The table of all experiments is `results.csv`; `index.html` lists them with their diffs.")
     return "\n\n".join(parts) + "\n"
@@ -84,33 +81,10 @@ def _failed_text(content: "Content") -> str:
     lines = [
         [r.status.value, r.experiment_id, r.fault, r.scenario, r.detail] for r in content.failed[:LISTED]
     ]
-    table = markdown_table(["status", "experiment", "fault", "scenario", "what was said"], lines)
+    heads = ("status", "experiment", "fault", "scenario", "what was said")
+    table = Table(heads=heads, rows=lines).as_markdown()
     more = len(content.failed) - LISTED
     return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
-
-
-def markdown_line(text: str) -> str:
-    """A text as one line of Markdown: the `<class 'float'>` of a message is no element, which would not be
-    seen, and an `__init__` is not bold."""
-    return _MARKUP.sub(_plain, " ".join(text.splitlines()))
-
-
-def _plain(found: re.Match[str]) -> str:
-    """Markup as the characters that it is made of."""
-    text = found[0]
-    if text[0] == "`":
-        return text
-    return "&lt;" if text == "<" else "".join("\\" + character for character in text)
-
-
-def markdown_table(heads: list[str], lines: list[list[str]]) -> str:
-    """A table of texts in Markdown, whatever is in them."""
-
-    def row(cells: list[str]) -> str:
-        return "| " + " | ".join(markdown_line(c).replace("|", "\\|") for c in cells) + " |"
-
-    rule = "| " + " | ".join("---" for _ in heads) + " |"
-    return "\n".join([row(heads), rule, *(row(line) for line in lines)])
 
 
 def page(content: "Content", out: Path) -> str:

@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import mutator
 from mutator._common.files import read_json, write_json
 from mutator._common.hashing import digest
+from mutator._common.version import VERSION
 from mutator.errors import MutatorError
+from mutator.outcomes.reader import Results
 from mutator.review import gate
 from mutator.store.run_folder import HEAD, RunFolder
 from mutator.verification import equivalence as proof
@@ -22,9 +23,9 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
-    sources = Path(mutator.__file__).parent
-    own = [mutator.__version__, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
-    results = [digest((run / name).read_bytes()) for name in (HEAD, "results.csv")]
+    sources = Path(__file__).parents[1]
+    own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
+    results = [digest((run / HEAD).read_bytes()), digest(Results.of_run(run).csv())]
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", proof.FOLDER)]
     reviewed = _files(run, gate.FILE)

@@ -24,7 +24,7 @@ from mutator.mutants.readable_diffs import adds_file, file_patches
 from mutator.review import groups
 from mutator.review.groups import Shape
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 _HUNK_HEAD = re.compile(r"^@@ .*$", re.MULTILINE)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from mutator.model import Fault, Trigger
+from mutator.model import Trigger
 from mutator.review.catalogue import Group
 from mutator.review.groups import Shape
 
@@ -21,7 +21,7 @@ def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
             fault = faults.get(member)
             if fault is not None:
                 found = dict(zip(shape.holes, filled, strict=True))
-                rows.append([_fault(fault), fault.reading, *(found.get(name, "") for name in names)])
+                rows.append([fault.label, fault.reading, *(found.get(name, "") for name in names)])
     return ["fault", "reading", *names], rows
 
 
@@ -44,9 +44,3 @@ def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
     elif times:
         lines.append(f"from a time on, {len(set(times))} of them from {min(times)} s to {max(times)} s")
     return lines
-
-
-def _fault(fault: Fault) -> str:
-    if fault.value is None:
-        return fault.spec
-    return f"{fault.spec} {fault.value} {fault.unit}".removesuffix(" -")

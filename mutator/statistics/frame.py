@@ -9,20 +9,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.errors import MutatorError
+from mutator.outcomes.columns import hazards_in
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import UNUSABLE
 
-_NEEDED = (
-    "experiment_id",
-    "fault_id",
-    "module",
-    "fault_type",
-    "scenario",
-    "method",
-    "trigger",
-    "seed",
-    "status",
-)
 _TIMES = ("t_activation", "t_manifest", "t_alert")
 _RANDOM = "random/"  # what a random partner's trigger is named: random/C1
 
@@ -32,20 +22,7 @@ def load(results: Path) -> pd.DataFrame:
 
     Harness errors and mutants that could not be made are left out; a crash or timeout counts as injected.
     """
-    try:
-        frame = pd.read_csv(results, dtype=str, keep_default_na=False)
-    except (OSError, ValueError) as err:
-        raise MutatorError(
-            f"no results can be read here ({err})", where=results, remedy="make them: `mutator report DIR`"
-        ) from None
-    missing = [name for name in (*_NEEDED, *_TIMES) if name not in frame.columns]
-    if missing:
-        raise MutatorError(
-            f"not a results table: no column '{missing[0]}'",
-            where=results,
-            remedy="make it anew: `mutator report DIR`",
-        )
-    return prepare(frame)
+    return prepare(Results(results).texts())
 
 
 def prepare(frame: pd.DataFrame) -> pd.DataFrame:
@@ -69,4 +46,4 @@ def prepare(frame: pd.DataFrame) -> pd.DataFrame:
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
     """Hazards that the table has a flag and a time for, sorted: `H1`, with columns `h1` and `t_h1`."""
-    return tuple(sorted(name.upper() for name in frame.columns if f"t_{name}" in frame.columns))
+    return tuple(sorted(hazards_in(frame.columns)))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mutator.report.page import markdown_table
+from mutator._common.tables import Table
 from mutator.statistics.share import Share
 
 _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
@@ -32,13 +32,13 @@ class Sheet:
     heads: tuple[str, ...]
     lines: tuple[tuple[Cell, ...], ...]
 
-    def texts(self) -> list[list[str]]:
-        """The cells as they are read."""
-        return [[_text(cell) for cell in line] for line in self.lines]
+    def table(self) -> Table:
+        """The cells as texts to be read."""
+        return Table(heads=self.heads, rows=[[_text(cell) for cell in line] for line in self.lines])
 
     def markdown(self) -> str:
         """Title, note and table."""
-        return f"## {self.title}\n\n{self.note}\n\n{markdown_table(list(self.heads), self.texts())}\n"
+        return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"
 
     def csv(self) -> str:
         """A share becomes five columns: count, of, rate and both ends of its interval (all of 1, not %)."""

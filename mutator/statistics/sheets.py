@@ -7,7 +7,7 @@ import pandas as pd
 
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
-from mutator.outcomes.golden import golden_key, load_trace
+from mutator.outcomes.golden import load_trace
 from mutator.paper import published_tables as paper_tables
 from mutator.paper.published import Paper, has_paper, load_paper
 from mutator.statistics import compare_tables, time_tables
@@ -17,7 +17,7 @@ from mutator.statistics.sheet import Sheet
 from mutator.statistics.tally import by_kind, by_scenario
 from mutator.statistics.times import Alerts
 from mutator.store.records import read_records
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import RunFolder, golden_key
 from mutator.workspace import Workspace
 
 FOLDER = "tables"

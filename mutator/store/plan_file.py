@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import full_disk_told, write_atomic
+from mutator._common.files import raising_disk_full, write_atomic
 from mutator._common.hashing import canonical, plain
 from mutator.errors import MutatorError
 from mutator.model import (
@@ -30,7 +30,7 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
     """Write the plan's files; returns where each chunk is."""
     lines = [canonical(to_plain(experiment)).encode() + b"\n" for experiment in experiments]
     faults = {experiment.fault.id: experiment.fault for experiment in experiments}
-    with full_disk_told(run):
+    with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
     write_atomic(run / _EXPERIMENTS, b"".join(lines))
     write_atomic(run / _FAULTS, b"".join(canonical(plain(f)).encode() + b"\n" for f in faults.values()))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import check_schema, full_disk_told
+from mutator._common.files import check_schema, raising_disk_full
 from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, Status
@@ -43,7 +43,7 @@ class LineWriter:
         self.path = path
         self._unsynced = 0
         self._synced_at = time.monotonic()
-        with full_disk_told(path):
+        with raising_disk_full(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         self._end = 0
@@ -52,7 +52,7 @@ class LineWriter:
     def append(self, value: Any) -> None:
         """Append one line; it is on the disk after the next `sync` at the latest."""
         data = canonical(value).encode() + b"\n"
-        with full_disk_told(self.path):
+        with raising_disk_full(self.path):
             try:
                 written = 0
                 while written < len(data):
@@ -67,7 +67,7 @@ class LineWriter:
 
     def sync(self) -> None:
         """Make sure that what was appended survives a power cut."""
-        with full_disk_told(self.path):
+        with raising_disk_full(self.path):
             os.fsync(self._fd)
         self._unsynced = 0
         self._synced_at = time.monotonic()

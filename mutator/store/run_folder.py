@@ -19,6 +19,7 @@ DIR/
 """
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,13 +27,18 @@ from typing import Any
 
 from mutator._common.files import read_json
 from mutator._common.locks import owned
-from mutator.campaigns.campaign_files import Limits
 from mutator.errors import MutatorError
-from mutator.outcomes.golden import golden_key
+from mutator.model import Limits
+from mutator.store.plan_file import ids
 from mutator.store.shards import Shard
 
 SCHEMA = "run/1"
 HEAD = "run.json"
+
+
+def golden_key(scenario: str, changes: Sequence[str]) -> str:
+    """Name of a golden run: `S1`, `S1+no_lead`."""
+    return "+".join((scenario, *changes))
 
 
 @dataclass(frozen=True)
@@ -111,8 +117,6 @@ class RunFolder:
 
     def find(self, prefix: str) -> str:
         """The one planned experiment whose id starts with `prefix`; MutatorError for none or several."""
-        from mutator.store.plan_file import ids
-
         hits = [name for name in ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from pydantic import Field
 
-from mutator.config.problems import suggestion
+from mutator._common.text import suggestion
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.triggers.conditions import VARIABLES

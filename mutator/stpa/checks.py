@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Iterator
 
-from mutator.config.problems import suggestion
+from mutator._common.text import suggestion
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.specs import FaultSpec

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
-from mutator.outcomes.columns import COLUMNS
 from mutator.targets.observation import Observation, ObservationModel, observation
 from mutator.targets.source_tree import SourceTree, read_tree
 
@@ -67,6 +66,7 @@ class TargetManifest:
     observation: Observation
     hazards: tuple[str, ...]
     alerts: tuple[str, ...]  # alerts that count in experiments
+    source: Source = field(repr=False, compare=False)  # the file's lines, for errors
     film: Film | None = None
     # change -> scenarios that it makes the same: their traffic, say, is all they differ in, and it is gone
     same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -208,6 +208,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         observation=observation(model.observation, source, folder),
         hazards=tuple(model.hazards),
         alerts=tuple(model.alerts),
+        source=source,
         film=_film(model.film),
     )
 
@@ -227,16 +228,15 @@ def _check_names(model: ManifestModel, source: Source) -> None:
 
 
 def _check_events(model: ManifestModel, source: Source) -> None:
-    """Hazards become columns of the results, alerts one cell's words: names that fit there, each once."""
+    """Hazards and alerts have names that tables can take, each once."""
     for key in ("hazards", "alerts"):
         names = [name.lower() for name in getattr(model, key)]
         for i, name in enumerate(names):
-            taken = key == "hazards" and name not in ("h1", "h2", "h3") and {name, f"t_{name}"} & {*COLUMNS}
-            if not name.isidentifier() or taken or name in names[:i]:
+            if not name.isidentifier() or name in names[:i]:
                 raise source.error(
                     (key, i),
                     f"'{getattr(model, key)[i]}'",
-                    expected="a name of letters, digits and _, once, that is no column of the results",
+                    expected="a name of letters, digits and _, once",
                     remedy="rename it",
                 )
 

@@ -1,4 +1,4 @@
-"""Triggers: conditions over observed ground truth, checked, total, and never more than data.
+"""Conditions over observed ground truth: checked, total, and never more than data.
 
 A condition has one canonical text (`hwt <= 2.0 and rs > 0.0`), which is what ids are made of. All numbers are
 floats, and division cannot raise, so a condition is True or False for every observation.
@@ -9,9 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from mutator._common.random_streams import generator
 from mutator.errors import MutatorError
-from mutator.model import Hold, Trigger
 
 VARIABLES = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
 _FUNCTIONS = ("abs", "min", "max")
@@ -49,40 +47,6 @@ def evaluate(condition: str, values: Mapping[str, float]) -> bool:
         known["hwt"] = known["d_rel"] / known["v_ego"] if known["v_ego"] > 0.0 else math.inf
     arguments = [float(known.get(name, math.nan)) for name in VARIABLES]
     return bool(_function(condition)(*arguments))
-
-
-def always(*, armed_after_s: float = 0.0) -> Trigger:
-    """Fires at the first observation after arming and stays."""
-    return Trigger(name="always", condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
-
-
-def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
-    """Fires at the first step whose start is not before `time_s`; stays for `hold_s`, or to the end."""
-    if not math.isfinite(time_s):
-        raise MutatorError(f"time {time_s}", expected="a number of seconds")
-    hold = Hold.TO_END if hold_s is None else Hold.FOR
-    return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
-
-
-def time_of(trigger: Trigger) -> float | None:
-    """The time at which a trigger of `at_time` fires; None for any other."""
-    name, _, time = trigger.condition.partition(" >= ")
-    try:
-        return float(time) if name == "t" else None
-    except ValueError:
-        return None
-
-
-def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
-    """A time uniform on the steps from `first_s` to `last_s` (both included), drawn from (seed, key).
-
-    The result is the start of a step to nine decimals, so that it reads as one would write it.
-    """
-    first, last = round(first_s / step_s), round(last_s / step_s)
-    if last < first:
-        raise MutatorError(f"random times from {first_s} s to {last_s} s", expected="an interval")
-    frame = first + int(generator(seed, key).random() * (last - first + 1))
-    return round(frame * step_s, 9)
 
 
 def divide(a: float, b: float) -> float:

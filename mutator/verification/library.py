@@ -19,7 +19,7 @@ from mutator.mutants.splicing import apply_edits, joined, unsplice
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 EXAMPLE_TAG = "example"

@@ -3,51 +3,36 @@
 import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import full_disk_told, read_json, write_json
+from mutator._common.files import raising_disk_full, read_json, write_json
 from mutator._common.hashing import digest
 from mutator.campaigns.provenance import sources, versions
 from mutator.campaigns.shared_runs import same_in
-from mutator.engines.reference import Execution, Job, ReferenceEngine, prepare_base
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Status
 from mutator.mutants.building import InvalidMutant, build
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
-from mutator.outcomes.golden import BadOutput, golden_key
+from mutator.outcomes.golden import BadOutput
 from mutator.store import plan_file as planfile
+from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.records import Progress
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.verification import preflight_cache as check_cache
 from mutator.verification.preflight_rules import CheckRun, judge_golden, judge_null, judge_same
 from mutator.workspace import Workspace
 
-SCHEMA = "checks/1"
-FILE = "checks.json"
 _OTHER_HASH_SEED = 4242
 _GOLDEN, _AGAIN, _NULL, _CANARY = "golden", "golden again", "null mutant", "canary"
 
 Notify = Callable[[Progress], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckResult:
-    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` says what was found."""
-
-    name: str
-    passed: bool
-    detail: str
-
-
-def measured_cpu_s(folder: RunFolder) -> float | None:
-    """Mean CPU time of the golden runs in a folder; None before they ran."""
-    path = folder.path / FILE
-    return read_json(path, SCHEMA)["run_cpu_s"] if path.is_file() else None
 
 
 def run_checks(
@@ -62,7 +47,7 @@ def run_checks(
     known = checks.known()
     if known is not None:
         return known
-    with full_disk_told(folder.path):
+    with raising_disk_full(folder.path):
         results = tuple(checks.run(workers, notify or (lambda progress: None)))
     failed = [result for result in results if not result.passed]
     if failed:
@@ -111,7 +96,7 @@ class _Checks:
             return None  # none is there, or a damaged one
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            with full_disk_told(self.folder.path):
+            with raising_disk_full(self.folder.path):
                 check_cache.copy(place, self.folder.path, FILE)
         return results
 

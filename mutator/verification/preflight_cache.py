@@ -29,8 +29,7 @@ def copy(source: Path, to: Path, file: str) -> None:
 
 
 def store(place: Path, run: Path, file: str) -> None:
-    """Keep a run folder's passed checks at `place`. A cache that cannot be written to is no cache, and no
-    error."""
+    """Keep a run folder's passed checks at `place`. An unwritable cache is ignored."""
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:

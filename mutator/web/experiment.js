@@ -59,11 +59,11 @@ class Experiment {
 
   #fill(row) {
     const { el } = Dom;
-    const id = this.text("experiment_id"), value = `${this.text("value")} ${this.text("unit")}`.replace(/ -?$/, "");
+    const id = this.text("experiment_id");
     const section = (title, name) => el(`section.${name}`, {}, el("h3", {}, title), el("div.content", {}, el("p.quiet", {}, "…")));
     this.place.replaceChildren(
       el("header", {},
-        el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, `${this.text("kind")}/${this.text("variant")} ${value}`),
+        el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, this.text("fault")),
           el("p.under", {}, Grid.ending(this.text("ending")), ` in ${this.text("scenario")}, ${this.text("method")}, trigger ${this.text("trigger")} `)),
         this.#buttons()),
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),

@@ -37,6 +37,7 @@ class Grid {
     this.state = state;
     this.rows = [];
     this.current = 0; // place in `rows` of the row that has the keyboard
+    this.isOnPaper = false;
     this.#build();
     place.addEventListener("scroll", () => this.#soon(), { passive: true });
     new ResizeObserver(() => this.#soon()).observe(place);
@@ -88,20 +89,39 @@ class Grid {
     });
   }
 
-  /** Put the rows that are seen into the page. */
-  draw(all = false) {
+  /**
+   * Draw for paper from `beforeprint` to `afterprint`, for the screen otherwise. It is a state, not an argument of one
+   * drawing: printing scrolls and resizes the window, and the redraw that follows must not put the screen's rows back.
+   */
+  print(isOnPaper) {
+    if (isOnPaper === this.isOnPaper) return;
+    if (isOnPaper) this.scrolled = this.place.scrollTop; // paper has fewer rows, so the window loses its place
+    this.isOnPaper = isOnPaper;
+    this.draw();
+    if (isOnPaper) return;
+    this.place.scrollTop = this.scrolled;
+    this.draw();
+  }
+
+  /** The rows to put into the page: those that are seen, with some to spare; on paper the first ones. */
+  #span() {
+    if (this.isOnPaper) return [0, Math.min(this.rows.length, Grid.PRINTED)];
+    const seen = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
+    const first = Math.max(0, Math.floor(this.place.scrollTop / Grid.ROW_PX) - Grid.SPARE);
+    return [first, Math.min(this.rows.length, first + seen + 2 * Grid.SPARE)];
+  }
+
+  /** Put the rows of the span into the page. */
+  draw() {
     const { el } = Dom;
-    const top = this.place.scrollTop, seen = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
-    const first = all ? 0 : Math.max(0, Math.floor(top / Grid.ROW_PX) - Grid.SPARE);
-    const last = all ? Math.min(this.rows.length, Grid.PRINTED) : Math.min(this.rows.length, first + seen + 2 * Grid.SPARE);
+    const [first, last] = this.#span(), more = this.rows.length - last;
     const hadFocus = this.body.contains(document.activeElement);
     const space = (count) =>
       count > 0 ? el("tr.space", { "aria-hidden": "true", style: `height: ${count * Grid.ROW_PX}px` }, el("td")) : null;
     const shown = [];
     for (let at = first; at < last; at++) shown.push(this.#row(at));
-    this.body.replaceChildren(...[space(first), ...shown, all ? null : space(this.rows.length - last)].filter(Boolean));
-    const more = all ? this.rows.length - last : 0;
-    if (more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: Grid.COLUMNS.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
+    this.body.replaceChildren(...[space(first), ...shown, this.isOnPaper ? null : space(more)].filter(Boolean));
+    if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: Grid.COLUMNS.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
     if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, "No experiment fits these filters.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
   }

@@ -57,8 +57,8 @@ const Report = (() => {
     find("search").parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
     keyboard({ state, grid, experiment, search, close });
     links(state);
-    addEventListener("beforeprint", () => grid.draw(true));
-    addEventListener("afterprint", () => grid.draw());
+    addEventListener("beforeprint", () => grid.print(true));
+    addEventListener("afterprint", () => grid.print(false));
     update();
     if (state.experiment) grid.reveal();
     document.documentElement.dataset.ready = "yes";

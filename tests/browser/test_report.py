@@ -1,6 +1,8 @@
 """The report's page as a reader uses it."""
 
 import csv
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -240,13 +242,61 @@ def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> Non
     assert page.page.evaluate("document.querySelector('#grid').clientHeight") < 32 + 5 * 30
 
 
+# A low window, scrolled to the middle; paper gets five rows.
+SCROLLED = """() => {
+    const grid = document.querySelector('#grid');
+    Grid.PRINTED = 5;
+    grid.style.setProperty('--rows', 1);
+    grid.scrollTop = 300;
+}"""
+FIRST_ROW = "Number(document.querySelector('#grid tr[data-at]').dataset.at)"
+
+
+@pytest.fixture
+def scrolled(page: "Page") -> Iterator["Page"]:
+    """The table scrolled so far that its first rows are not in the page."""
+    page.page.evaluate(SCROLLED)
+    page.page.wait_for_function(f"{FIRST_ROW} === 2")
+    yield page
+
+
 def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
-    """Printing does not depend on how far the table was scrolled, and leaves out what is for a screen."""
+    """Paper gets every row that fits, up to a limit that it names, and nothing that is for a screen only."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == COUNT
     assert not page.page.is_visible("#facets")
+    page.page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.page.evaluate("Grid.PRINTED = 10")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.texts("#grid tbody tr")[10:] == ["and 14 more, which are not printed"]
-    page.page.evaluate("dispatchEvent(new Event('afterprint'))")
+
+
+@pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
+def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due: str) -> None:
+    """Scrolling or resizing right before printing leaves the first rows on paper, not those last seen."""
+    printing = f"""async () => {{
+        const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
+        {due};
+        dispatchEvent(new Event('beforeprint'));
+        for (let k = 0; k < 4; k++) await frame();
+        return [...grid.querySelectorAll('tr[data-at]')].map((tr) => Number(tr.dataset.at));
+    }}"""
+    assert scrolled.page.evaluate(printing) == list(range(5))
+
+
+def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
+    """Printed right after a scroll, the page has five rows; then the window is back where it was."""
+    page = scrolled.page
+    page.evaluate("document.querySelector('#grid').hidden = true")
+    others = rows_of(page.pdf(tagged=True))
+    page.evaluate("document.querySelector('#grid').hidden = false")
+    page.evaluate("document.querySelector('#grid').scrollTop = 310")
+    assert rows_of(page.pdf(tagged=True)) - others == 7  # with the head, and the line of what is not printed
+    assert page.evaluate(FIRST_ROW) == 2
+    assert page.evaluate("document.querySelector('#grid').scrollTop") == 310
+
+
+def rows_of(pdf: bytes) -> int:
+    """How many rows the tables of a tagged PDF have."""
+    return len(re.findall(rb"/S\s*/TR\b", pdf))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.locks import living_workers
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.store.records import read_records
 from mutator.verification.equivalence import Proof
 from mutator.workspace import Workspace
@@ -25,7 +25,7 @@ def expected(
 ) -> dict[str, bytes]:
     """The tables of a campaign on the reference engine."""
     folder = tmp_path_factory.mktemp("reference")
-    campaign_run.run(copy_toycar(folder), "toy", folder / "run", engine="reference")
+    run_campaign(copy_toycar(folder), "toy", folder / "run", engine="reference")
     return {name: (folder / "run" / name).read_bytes() for name in TABLES}
 
 
@@ -35,7 +35,7 @@ def test_every_engine_gives_the_same_tables(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], engine: str, workers: int
 ) -> None:
     """The tables of a campaign are the same bytes from each engine and any number of workers."""
-    summary = campaign_run.run(toy, "toy", tmp_path / "run", engine=engine, workers=workers)
+    summary = run_campaign(toy, "toy", tmp_path / "run", engine=engine, workers=workers)
     assert (summary.exit_code, summary.problem) == (0, "")
     assert summary.proof == Proof(sampled=20, same=20)
     assert {name: (tmp_path / "run" / name).read_bytes() for name in TABLES} == expected
@@ -74,7 +74,7 @@ def test_killed_again_and_again(
                 for pid in _victims(out, victim):
                     os.kill(pid, signal.SIGKILL)
         process.wait()
-    summary = campaign_run.run(toy, "toy", out, engine="fork")
+    summary = run_campaign(toy, "toy", out, engine="fork")
     assert (summary.exit_code, summary.done) == (0, 24)
     assert {name: (out / name).read_bytes() for name in TABLES} == expected
     assert _victims(out, "fork_server") == []

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.workspace import Workspace
 
@@ -21,7 +21,7 @@ CopyToycar = Callable[[Path], Workspace]
 def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Bytes:
     """What the small campaign gives when it is run in one process, in one go."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    summary = campaign_run.run(copy_toycar(folder), "small", folder / "run")
+    summary = run_campaign(copy_toycar(folder), "small", folder / "run")
     assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
     assert {"hazard", "sdc", "not_activated"} <= set(summary.outcomes)
     return results(folder / "run")
@@ -30,7 +30,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToyca
 @pytest.mark.parametrize("workers", [1, 2])
 def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Bytes, workers: int) -> None:
     """One or two xdist workers give the bytes of a run without workers."""
-    summary = campaign_run.run(toy, "small", tmp_path / "run", workers=workers)
+    summary = run_campaign(toy, "small", tmp_path / "run", workers=workers)
     assert summary.exit_code == 0
     assert len(list((tmp_path / "run" / "records").iterdir())) == workers
     assert results(tmp_path / "run") == undisturbed
@@ -47,7 +47,7 @@ def test_any_order(
         self.pending = tuple(random.Random(3).sample(self.pending, len(self.pending)))
 
     monkeypatch.setattr(Session, "prepare", shuffled)
-    assert campaign_run.run(toy, "small", tmp_path / "run").exit_code == 0
+    assert run_campaign(toy, "small", tmp_path / "run").exit_code == 0
     assert results(tmp_path / "run") == undisturbed
 
 
@@ -63,10 +63,10 @@ def test_one_by_one(
 
     with monkeypatch.context() as patch:
         patch.setattr(Session, "prepare", one_chunk)
-        summary = campaign_run.run(toy, "small", tmp_path / "run")
+        summary = run_campaign(toy, "small", tmp_path / "run")
         assert summary.exit_code == 3
         while summary.ran:
-            summary = campaign_run.run(toy, "small", tmp_path / "run")
+            summary = run_campaign(toy, "small", tmp_path / "run")
     assert (summary.done, summary.exit_code) == (12, 0)
     assert results(tmp_path / "run") == undisturbed
 
@@ -74,11 +74,11 @@ def test_one_by_one(
 def test_lost_records_run_again(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """Lines lost at the end of a records file are run again, what is in the others is not."""
     out = tmp_path / "run"
-    campaign_run.run(toy, "small", out, workers=2)
+    run_campaign(toy, "small", out, workers=2)
     path = max((out / "records").iterdir(), key=lambda p: p.stat().st_size)
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-3]) + lines[-3][:25])
-    summary = campaign_run.run(toy, "small", out)
+    summary = run_campaign(toy, "small", out)
     assert (summary.exit_code, summary.ran) == (0, 3)
     assert results(out) == undisturbed
 
@@ -86,10 +86,10 @@ def test_lost_records_run_again(toy: Workspace, tmp_path: Path, undisturbed: Byt
 def test_derived_files_can_be_made_again(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """Tables deleted from a complete run come back from its records, byte for byte."""
     out = tmp_path / "run"
-    campaign_run.run(toy, "small", out)
+    run_campaign(toy, "small", out)
     for name in DERIVED:
         (out / name).unlink()
-    summary = campaign_run.run(toy, "small", out)
+    summary = run_campaign(toy, "small", out)
     assert (summary.exit_code, summary.ran) == (0, 0)
     assert results(out) == undisturbed
 
@@ -122,7 +122,7 @@ def test_killed_during_the_checks(toy: Workspace, tmp_path: Path, undisturbed: B
     command.wait_for(out / "work" / "checks")
     command.process.kill()
     command.end()
-    assert campaign_run.run(toy, "small", out).exit_code == 0
+    assert run_campaign(toy, "small", out).exit_code == 0
     assert results(out) == undisturbed
 
 
@@ -136,7 +136,7 @@ def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> 
     printed = command.end()
     assert command.process.returncode == 3, printed
     assert "died" in printed
-    assert campaign_run.run(toy, "small", out).exit_code == 0
+    assert run_campaign(toy, "small", out).exit_code == 0
     assert results(out) == undisturbed
 
 
@@ -189,13 +189,13 @@ def test_the_controller_that_ships(clone: Workspace, tmp_path: Path, reading: st
     campaign = tmp_path / "part.yaml"
     campaign.write_text(text)
     one, disturbed = tmp_path / "one", tmp_path / "disturbed"
-    assert campaign_run.run(clone, campaign, one, workers=1).exit_code == 0
+    assert run_campaign(clone, campaign, one, workers=1).exit_code == 0
     for count, number in ((3, signal.SIGTERM), (9, signal.SIGKILL)):
         command = Command(clone, disturbed, *pytest_words(disturbed, campaign))
         command.wait_for_records(count)
         command.process.send_signal(number)
         command.end()
-    summary = campaign_run.run(clone, campaign, disturbed, workers=2)
+    summary = run_campaign(clone, campaign, disturbed, workers=2)
     assert summary.exit_code == 0
     assert 0 < summary.ran < 10
     assert results(disturbed) == results(one)

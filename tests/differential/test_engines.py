@@ -8,12 +8,23 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.campaign_files import Limits
-from mutator.engines import choice as engines
-from mutator.engines.reference import Engine, Execution, How, Job, prepare_base
-from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Status, Trigger, Value
+from mutator.engines.jobs import Engine, Execution, Job, RunMode, Setting
+from mutator.engines.reference import prepare_base
+from mutator.engines.registry import ENGINES, make_engine
+from mutator.model import (
+    Anchor,
+    AnchorKind,
+    Fault,
+    FaultLocation,
+    Hold,
+    Injection,
+    Limits,
+    Status,
+    Trigger,
+    Value,
+)
 from mutator.mutants.building import build
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500)
@@ -80,11 +91,12 @@ class Engines:
         self.limits = limits
         base = prepare_base(self.manifest, folder / "base")
         self.made: dict[str, Any] = {}
-        for name in engines.ENGINES:
+        for name in ENGINES:
             work = folder / name
             work.mkdir()
-            self.made[name] = engines.make(
-                name, self.manifest, self.models, base=base, work=work, limits=limits, parent=None
+            self.made[name] = make_engine(
+                name,
+                Setting(manifest=self.manifest, models=self.models, base=base, work=work, limits=limits),
             )
         self._goldens: dict[str, Path] = {}
 
@@ -136,7 +148,7 @@ def three(
     made.close()
 
 
-def check_same(three: Engines, job: Job, how: How | None = None) -> Execution:
+def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Execution:
     """Status, words, probe and files are those of the reference engine; the fork engine's execution."""
     expected, files = three.run("reference", job)
     for name in ("warm", "fork"):
@@ -146,17 +158,17 @@ def check_same(three: Engines, job: Job, how: How | None = None) -> Execution:
             assert execution.probe is not None
             assert expected.probe is not None
             never = all(not told["count"] for told in expected.probe["injections"].values())
-            assert never if execution.how is How.GOLDEN else execution.probe == expected.probe
+            assert never if execution.mode is RunMode.GOLDEN else execution.probe == expected.probe
             assert found == files
     if how is not None:
-        assert (execution.how, execution.why) == (how, "")
+        assert (execution.mode, execution.why) == (how, "")
     return execution
 
 
 @pytest.mark.parametrize("model", ["offset", "omission", "image_effect"])
 def test_same_bytes(three: Engines, model: str) -> None:
     """A fault that is active in a context gives the reference engine's bytes, without its interpreter."""
-    execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), How.FORK)
+    execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), RunMode.FORK)
     assert execution.start > 20
 
 
@@ -166,7 +178,7 @@ def test_same_bytes(three: Engines, model: str) -> None:
 def test_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
     """Every fault model under every kind of trigger gives the reference engine's bytes; one whose trigger
     never holds gives them without being run."""
-    how = How.GOLDEN if trigger == "never" else How.FORK
+    how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
         check_same(
             three,
@@ -181,18 +193,18 @@ def test_every_bad_end(three: Engines, model: str) -> None:
     """A run that crashes, hangs, hoards, leaves or breaks the interpreter ends in the same words."""
     execution = check_same(three, three.job(fault(model, GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"]))
     assert execution.status is (Status.TIMEOUT if model == "hang" else Status.CRASHED)
-    check_same(three, three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]), How.FORK)
+    check_same(three, three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]), RunMode.FORK)
 
 
 def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
     """What does not end well is run again by the reference engine, and its server goes on."""
     job = three.job(fault("crash", GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"])
     execution, _ = three.run("fork", job)
-    assert (execution.status, execution.how) == (Status.CRASHED, How.REFERENCE)
+    assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
     assert execution.detail == "IndexError: list index out of range (toycar/sensing.py:14)"
     assert execution.why.startswith("ended as crashed: IndexError")
     execution, _ = three.run("fork", three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]))
-    assert (execution.how, execution.status) == (How.FORK, Status.OK)
+    assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
 
 
 def test_the_limit_of_steps_counts_golden_ones(

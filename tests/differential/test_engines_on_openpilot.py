@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import make_plan
-from mutator.engines import choice as engines
-from mutator.engines.reference import Job, ReferenceEngine, prepare_base
+from mutator.campaigns.plans import Choices, make_plan
+from mutator.engines.jobs import Job, Setting
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.registry import ENGINES, make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
-from mutator.outcomes.golden import golden_key
+from mutator.store.run_folder import golden_key
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -22,7 +23,7 @@ def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
     """Experiments of every kind, with ideal vision and with pictures, have the same records, trace digests
     included, and are forked rather than run anew."""
     clone = Workspace.find(root=CLONE)
-    plan = make_plan(clone, campaign, limit=limit)
+    plan = make_plan(clone, campaign, Choices(limit=limit))
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     base = prepare_base(manifest, tmp_path / "base")
     (tmp_path / "work").mkdir()
@@ -34,10 +35,11 @@ def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
         reference.execute(job, tmp_path / name)
     goldens = Goldens(manifest, lambda scenario, changes: tmp_path / golden_key(scenario, changes) / "out")
     found: dict[str, dict[str, Record]] = {}
-    for name in engines.ENGINES:
+    for name in ENGINES:
         work = tmp_path / name
         work.mkdir()
-        engine = engines.make(name, manifest, models, base=base, work=work, limits=limits, parent=None)
+        setting = Setting(manifest=manifest, models=models, base=base, work=work, limits=limits)
+        engine = make_engine(name, setting)
         done = list(Runner(manifest, models, engine, goldens, clone.scenario).run(plan.experiments))
         engine.close()
         found[name] = {finished.experiment.id: finished.record for finished in done}

@@ -9,8 +9,8 @@ import pytest
 
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution import session as campaign_run
 from mutator.execution.merging import merge
+from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
@@ -28,7 +28,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
     made = {"whole": folder / "whole", "1/2": folder / "one", "2/2": folder / "two"}
     for shard, out in made.items():
         choices = Choices(shard=None if shard == "whole" else shard)
-        summary = campaign_run.run(toy, "small", out, choices=choices)
+        summary = run_campaign(toy, "small", out, choices=choices)
         assert summary.exit_code == 0
         assert summary.done == summary.planned == RunFolder.open(out).planned
     return made
@@ -78,16 +78,16 @@ def test_shards_are_disjoint_and_all(runs: Runs) -> None:
 
 def test_a_shard_goes_on_as_what_it_was(copies: Runs, toy: Workspace) -> None:
     """The shard need not be said again, and another one is refused in its folder."""
-    summary = campaign_run.run(toy, "small", copies["1/2"])
+    summary = run_campaign(toy, "small", copies["1/2"])
     assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
     with pytest.raises(MutatorError, match="shard 2/2"):
-        campaign_run.run(toy, "small", copies["1/2"], choices=Choices(shard="2/2"))
+        run_campaign(toy, "small", copies["1/2"], choices=Choices(shard="2/2"))
 
 
 def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> None:
     """A merged folder is complete: running its campaign there again finds nothing to do."""
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
-    summary = campaign_run.run(toy, "small", tmp_path / "out")
+    summary = run_campaign(toy, "small", tmp_path / "out")
     assert (summary.exit_code, summary.ran, summary.done) == (0, 0, 12)
 
 
@@ -189,7 +189,7 @@ def fail(run: Path) -> Path:
 def test_a_shard_that_cannot_be(toy: Workspace, shard: str) -> None:
     """A share that is none, or more shares than chunks, is refused before anything runs."""
     with pytest.raises(MutatorError, match=f"shard '?{shard}"):
-        make_plan(toy, "small", shard=shard)
+        make_plan(toy, "small", Choices(shard=shard))
 
 
 @pytest.mark.slow
@@ -199,9 +199,7 @@ def test_shards_of_the_controller_that_ships(tmp_path: Path) -> None:
 
     def ran(name: str, workers: int, shard: str | None = None) -> Path:
         choices = Choices(limit=40, shard=shard)
-        summary = campaign_run.run(
-            clone, "paper_reference", tmp_path / name, workers=workers, choices=choices
-        )
+        summary = run_campaign(clone, "paper_reference", tmp_path / name, workers=workers, choices=choices)
         assert summary.exit_code == 0
         return tmp_path / name
 

@@ -10,7 +10,7 @@ import pytest
 from mutator.campaigns.plans import freeze, load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.store.run_folder import RunFolder
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
@@ -44,7 +44,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> t
     for name, changes in (("shared", SHARED), ("apart", ALONE)):
         folder = tmp_path_factory.mktemp(name)
         toy = two_scenarios(copy_toycar(folder), changes)
-        assert campaign_run.run(toy, "small", folder / "run").exit_code == 0
+        assert run_campaign(toy, "small", folder / "run").exit_code == 0
         made.append(folder / "run")
     return made[0], made[1]
 
@@ -83,7 +83,7 @@ def test_they_are_run_once(
 
     monkeypatch.setattr(ReferenceEngine, "execute", counted)
     two_scenarios(toy, SHARED)
-    summary = campaign_run.run(toy, "small", tmp_path / "run")
+    summary = run_campaign(toy, "small", tmp_path / "run")
     assert summary.done == 16
     ids = {e.id for e in load_plan(tmp_path / "run").experiments}
     assert sum(name in ids for name in driven) == 14

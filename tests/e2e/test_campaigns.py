@@ -12,9 +12,10 @@ import pytest
 
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
-from mutator.engines.reference import Execution, Job, ReferenceEngine
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
@@ -36,7 +37,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def finished_once(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
     folder = tmp_path_factory.mktemp("finished")
-    assert campaign_run.run(copy_toycar(folder), "small", folder / "run").exit_code == 0
+    assert run_campaign(copy_toycar(folder), "small", folder / "run").exit_code == 0
     return folder / "run"
 
 
@@ -48,7 +49,7 @@ def finished(finished_once: Path, tmp_path: Path) -> Path:
 
 def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
     """Loops, crashes, exits, greed and mutants that do not compile have a status; none is the harness's."""
-    summary = campaign_run.run(toy, "hostile", tmp_path / "run", workers=2)
+    summary = run_campaign(toy, "hostile", tmp_path / "run", workers=2)
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
     found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}
     assert found == {
@@ -68,7 +69,7 @@ def test_a_run_leaves_what_it_should(toy: Workspace, tmp_path: Path) -> None:
     before = contents(tree)
     out = tmp_path / "run"
     told: list[Progress] = []
-    summary = campaign_run.run(toy, "small", out, workers=2, notify=told.append)
+    summary = run_campaign(toy, "small", out, workers=2, notify=told.append)
     assert contents(tree) == before
     assert {stage.stage for stage in told} == {"plan", "checks", "experiments", "results"}
     assert told[-2].done == 12
@@ -103,7 +104,7 @@ def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path
     (finished / "report" / "tables").mkdir(parents=True)
     for path in (*left, mine):
         path.touch()
-    assert campaign_run.run(toy, "small", finished).ran == 0
+    assert run_campaign(toy, "small", finished).ran == 0
     assert [path.exists() for path in (*left, mine)] == [False, False, False, True]
 
 
@@ -146,7 +147,7 @@ def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_p
     assert (single.golden / "log.npz").is_file()
     assert (tmp_path / "alone" / "mutant.patch").is_file()
     hostile = Choices(only='fault_type == "unsound"')
-    campaign_run.run(toy, "hostile", tmp_path / "hostile", choices=hostile)
+    run_campaign(toy, "hostile", tmp_path / "hostile", choices=hostile)
     unsound = planfile.read_all(tmp_path / "hostile")[0]
     refused = run_single(toy, toy.manifest("toycar"), unsound, tmp_path / "alone")
     assert (refused.mutant, refused.record.status) == (None, Status.INVALID_MUTANT)
@@ -171,14 +172,14 @@ def test_harness_errors_are_tried_again(
 
     monkeypatch.setattr(ReferenceEngine, "execute", flaky)
     out = tmp_path / "run"
-    summary = campaign_run.run(toy, "small", out)
+    summary = run_campaign(toy, "small", out)
     assert (summary.exit_code, summary.done, summary.ran) == (3, 10, 10)
     assert dict(summary.harness_errors).keys() == set(hit)
     assert summary.outcomes["harness_error"] == 2
     assert sum(row["status"] == "harness_error" and row["outcome"] == "" for row in rows_of(out)) == 2
-    again = campaign_run.run(toy, "small", out)
+    again = run_campaign(toy, "small", out)
     assert (again.exit_code, again.done, again.ran) == (0, 12, 2)
-    assert campaign_run.run(toy, "small", out).ran == 0
+    assert run_campaign(toy, "small", out).ran == 0
 
 
 def test_a_defect_in_a_worker_is_told(
@@ -194,7 +195,7 @@ def test_a_defect_in_a_worker_is_told(
         return run(self, pending)
 
     monkeypatch.setattr(Worker, "run", broken)
-    summary = campaign_run.run(toy, "small", tmp_path / "run")
+    summary = run_campaign(toy, "small", tmp_path / "run")
     assert (summary.exit_code, summary.done) == (3, 12 - len(seen[1].places))
     assert "chunk-00001 was given up by a defect of mutator" in summary.problem
     assert "ZeroDivisionError: seven" in summary.problem
@@ -207,7 +208,7 @@ def test_the_users_pytest_is_another_matter(
     told = {"PYTEST_ADDOPTS": "--no-such-option", "PYTEST_PLUGINS": "no_such_plugin"}
     for name, value in told.items():
         monkeypatch.setenv(name, value)
-    summary = campaign_run.run(toy, "small", tmp_path / "run", workers=1, choices=Choices(limit=2))
+    summary = run_campaign(toy, "small", tmp_path / "run", workers=1, choices=Choices(limit=2))
     assert (summary.exit_code, summary.problem) == (0, "")
     assert {name: os.environ[name] for name in told} == told
 
@@ -218,7 +219,7 @@ def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) ->
     shutil.move(toy.scenario("A"), toy.library / "scenarios" / "more" / "A.yaml")
     path = toy.campaign("small")
     path.write_text(path.read_text().replace("[A]", "[more/A]").replace("scenario: A", "scenario: more/A"))
-    summary = campaign_run.run(toy, "small", tmp_path / "run", choices=Choices(limit=2))
+    summary = run_campaign(toy, "small", tmp_path / "run", choices=Choices(limit=2))
     assert (summary.exit_code, summary.done) == (0, 2)
 
 
@@ -227,15 +228,15 @@ def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path)
     (tmp_path / "old").mkdir()
     for out in (tmp_path / "new", tmp_path / "old"):
         with pytest.raises(MutatorError, match="no campaign"):
-            campaign_run.run(toy, "nosuch", out)
+            run_campaign(toy, "nosuch", out)
         with pytest.raises(MutatorError, match="not approved"):
-            campaign_run.run(toy, "small", out, reviewed=True)
+            run_campaign(toy, "small", out, reviewed=True)
     assert [path.name for path in tmp_path.iterdir() if path.name in ("new", "old")] == ["old"]
 
 
 def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
     """A run goes on without saying its choices again; other ones, or another text, are refused."""
-    assert campaign_run.run(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
+    assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
         Choices(seed=4),
         Choices(limit=3),
@@ -243,11 +244,11 @@ def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
         Choices(reading="as_coded"),
     ):
         with pytest.raises(MutatorError, match="planned with") as caught:
-            campaign_run.run(toy, "small", finished, choices=choices)
+            run_campaign(toy, "small", finished, choices=choices)
         assert "None" not in str(caught.value)
     with pytest.raises(MutatorError, match="another text"):
-        campaign_run.run(toy, "toy", finished)
-    assert campaign_run.run(toy, finished / "campaign.yaml", finished).exit_code == 0
+        run_campaign(toy, "toy", finished)
+    assert run_campaign(toy, finished / "campaign.yaml", finished).exit_code == 0
 
 
 def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
@@ -255,7 +256,7 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
     with (toy.library.parent / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("# edited\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
-        campaign_run.run(toy, "small", finished)
+        run_campaign(toy, "small", finished)
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
         rerun(toy, finished, rows_of(finished)[0]["experiment_id"])
 
@@ -263,7 +264,7 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
 FULL_DISK = """
 import os, sys, threading, time
 from pathlib import Path
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.workspace import Workspace
 out, workers = Path(sys.argv[2]) / "run", int(sys.argv[3])
 toy = Workspace.find(root=Path(sys.argv[1]))
@@ -280,9 +281,9 @@ def fill():
             pass
 
 threading.Thread(target=fill).start()
-first = campaign_run.run(toy, "small", out, workers=workers)
+first = run_campaign(toy, "small", out, workers=workers)
 filler.unlink()
-again = campaign_run.run(toy, "small", out, workers=workers)
+again = run_campaign(toy, "small", out, workers=workers)
 print(first.exit_code, 2 <= first.done < 12, "no space left" in first.problem)
 print(again.exit_code, again.done, again.ran == 12 - first.done)
 sys.stdout.flush()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 def test_a_hundredth_of_the_paper(tmp_path: Path) -> None:
     """All 113 experiments end as results, in every scenario and by both methods; again, none is run."""
     workspace, out = Workspace.find(root=Path(__file__).parents[2]), tmp_path / "run"
-    summary = campaign_run.run(workspace, "paper_smoke", out, workers=2)
+    summary = run_campaign(workspace, "paper_smoke", out, workers=2)
     assert (summary.exit_code, summary.done, summary.planned) == (0, 113, 113)
     assert (summary.harness_errors, summary.problem) == ((), "")
     rows = list(csv.DictReader((out / "results.csv").open()))
@@ -22,6 +22,6 @@ def test_a_hundredth_of_the_paper(tmp_path: Path) -> None:
     seen = {(row["scenario"], row["method"]) for row in rows}
     assert seen == {(f"S{i}", method) for i in range(1, 6) for method in ("guided", "random")}
     before = (out / "results.csv").read_bytes()
-    again = campaign_run.run(workspace, "paper_smoke", out, workers=2)
+    again = run_campaign(workspace, "paper_smoke", out, workers=2)
     assert (again.exit_code, again.ran, again.done) == (0, 0, 113)
     assert (out / "results.csv").read_bytes() == before

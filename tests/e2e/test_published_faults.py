@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.plans import Choices
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -37,7 +37,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, s
     """Rows of the results table by variant."""
     out = tmp_path_factory.mktemp("published") / "run"
     workspace = Workspace.find(root=Path(__file__).parents[2])
-    summary = campaign_run.run(workspace, "published_s1", out, workers=2, choices=Choices(only=MEASURED))
+    summary = run_campaign(workspace, "published_s1", out, workers=2, choices=Choices(only=MEASURED))
     assert summary.exit_code == 0
     found: dict[str, list[dict[str, str]]] = {}
     for row in csv.DictReader((out / "results.csv").open()):

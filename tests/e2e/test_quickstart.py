@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.outcomes.golden import load_trace
 from mutator.triggers.conditions import VARIABLES, evaluate
 from mutator.workspace import Workspace
@@ -26,7 +26,7 @@ def workspace() -> Workspace:
 def quickstart(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run folder of the quickstart, run by two workers."""
     out = tmp_path_factory.mktemp("quickstart") / "run"
-    summary = campaign_run.run(workspace, "quickstart", out, workers=2)
+    summary = run_campaign(workspace, "quickstart", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 60)
     return out
 

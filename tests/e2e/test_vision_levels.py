@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.plans import Choices
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.store.records import read_records
 from mutator.workspace import Workspace
 
@@ -23,7 +23,7 @@ def workspace() -> Workspace:
 
 def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
     """How many levels of each fault type led out of the lane; every run must have ended well."""
-    summary = campaign_run.run(workspace, f"vision_levels_{detector}", out, workers=2)
+    summary = run_campaign(workspace, f"vision_levels_{detector}", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 69)
     rows = list(csv.DictReader((out / "results.csv").open()))
     assert {(row["status"], row["activated"]) for row in rows} == {("ok", "1")}
@@ -48,7 +48,7 @@ def test_the_cache_of_pictures_changes_nothing(
     runs = [tmp_path / "cold", tmp_path / "warm"]
     for out in runs:
         assert not (out.name == "cold" and (tmp_path / ".cache").exists())
-        assert campaign_run.run(workspace, "vision_levels_paper", out, workers=2, choices=FEW).exit_code == 0
+        assert run_campaign(workspace, "vision_levels_paper", out, workers=2, choices=FEW).exit_code == 0
     assert (tmp_path / ".cache" / "selfdrive").is_dir()
     cold, warm = runs
     assert len(read_records(cold)) == 2

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
@@ -119,7 +119,7 @@ def test_reused_changes_give_what_splicing_gives(fault: Fault, trigger: Trigger)
 @pytest.mark.parametrize("reading", READINGS)
 def test_the_whole_library(reading: str) -> None:
     """Every mutant of the paper's campaign is the one that splicing makes."""
-    plan = make_plan(Workspace.find(root=ROOT), "paper", reading=reading)
+    plan = make_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
     pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
     assert len(pairs) > 6000
     for experiment in pairs.values():

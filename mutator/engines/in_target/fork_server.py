@@ -65,7 +65,7 @@ def main(connection: int, start_file: str) -> int:
             return 0
 
 
-class Over(Exception):
+class Abandoned(Exception):
     """Nobody waits for this process any more."""
 
 
@@ -97,7 +97,7 @@ class Process:
             "load": self.load,
             "mutant": self.mutant,
         }
-        with suppress(Over):
+        with suppress(Abandoned):
             while True:
                 request = self.receive()
                 reap()
@@ -115,9 +115,9 @@ class Process:
             try:
                 part = self.connection.recv(count - len(data))
             except ConnectionError:
-                raise Over from None
+                raise Abandoned from None
             if not part:
-                raise Over
+                raise Abandoned
             data += part
         return data
 
@@ -130,7 +130,7 @@ class Process:
             poll.register(one, select.POLLIN)
         ready = {fd for fd, _ in poll.poll(None if seconds is None else seconds * 1000)}
         if ready & ends:
-            raise Over
+            raise Abandoned
         return handle in ready
 
     def branch(self, step: int, args: list[str] | None = None) -> None:

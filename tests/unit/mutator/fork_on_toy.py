@@ -4,14 +4,14 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from mutator.campaigns.campaign_files import Limits
 from mutator.engines.fork import ForkEngine
 from mutator.engines.fork_pool import Pool
-from mutator.engines.reference import Execution, Job, prepare_base
-from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Trigger
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import prepare_base
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
 from mutator.mutants.building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 Edit = Callable[[str, str, str], None]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Plan, freeze, load_plan, make_plan
+from mutator.campaigns.plans import Choices, Plan, freeze, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Hold, Method
 from mutator.workspace import Workspace
@@ -41,7 +41,7 @@ def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
     """Guided triggers wait until they are armed; random times lie on steps from there to the last."""
     for reading, armed in (("as_described", 1.0), ("as_coded", 0.0)):
         times = set()
-        for experiment in make_plan(whole, "toy", reading=reading).experiments:
+        for experiment in make_plan(whole, "toy", Choices(reading=reading)).experiments:
             if experiment.method is Method.GUIDED:
                 assert experiment.trigger.armed_after_s == armed
                 assert experiment.trigger.hold is Hold.WHILE
@@ -69,7 +69,7 @@ def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_p
         elsewhere.chunks,
         elsewhere.digest,
     )
-    other = make_plan(toycar, "toy", seed=8)
+    other = make_plan(toycar, "toy", Choices(seed=8))
     assert other.digest != plan.digest
     assert all(e.seed == 8 for e in other.experiments)
 
@@ -115,13 +115,13 @@ def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
 def test_filters_and_limit(whole: Workspace) -> None:
     """--only keeps, --exclude drops, --limit takes an even part of what is left."""
     plan = make_plan(
-        whole, "toy", only='scenario == "A"', exclude='method == "random" or value > 60', limit=5
+        whole, "toy", Choices(only='scenario == "A"', exclude='method == "random" or value > 60', limit=5)
     )
     assert len(plan.experiments) == 5
     assert all(e.scenario == "A" and e.method is Method.GUIDED for e in plan.experiments)
     assert len({e.fault.fault_type for e in plan.experiments}) == 3
     with pytest.raises(MutatorError, match="no experiment is left"):
-        make_plan(whole, "toy", only="value > 1000")
+        make_plan(whole, "toy", Choices(only="value > 1000"))
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_filters_and_limit(whole: Workspace) -> None:
 def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> None:
     """Choices that cannot be are errors before anything is expanded."""
     with pytest.raises(MutatorError, match=told):
-        make_plan(toycar, "toy", **choices)
+        make_plan(toycar, "toy", Choices(**choices))
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_some_values_of_a_variant(whole: Workspace) -> None:
 
 def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> None:
     """What is frozen comes back equal, with plan.csv beside it."""
-    plan = make_plan(toycar, "toy", limit=9)
+    plan = make_plan(toycar, "toy", Choices(limit=9))
     folder = freeze(plan, tmp_path / "run", toycar)
     back = load_plan(folder.path)
     for name in ("experiments", "chunks", "canary", "digest", "seed", "reading", "choices"):
@@ -218,7 +218,7 @@ def test_freezing_again_changes_nothing(toycar: Workspace, tmp_path: Path) -> No
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
     assert before == {p: p.stat().st_mtime_ns for p in before}
     with pytest.raises(MutatorError, match="holds another plan"):
-        freeze(make_plan(toycar, "toy", seed=8), tmp_path / "run", toycar)
+        freeze(make_plan(toycar, "toy", Choices(seed=8)), tmp_path / "run", toycar)
 
 
 @pytest.mark.parametrize("path", ["tree/toycar/driver.py", "templates/offset.py.j2"])
@@ -282,7 +282,7 @@ def test_quickstart_shows_everything(clone: Workspace) -> None:
 def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
     path = tmp_path / "all.yaml"
     path.write_text(clone.campaign("quickstart").read_text().replace("sample: 60\n", ""))
-    return make_plan(clone, path, **choices)
+    return make_plan(clone, path, Choices(**choices))
 
 
 def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:

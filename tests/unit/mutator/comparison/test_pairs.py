@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mutator.comparison.pairs import Change, Pair, match
-from mutator.comparison.sides import Side, drive, words
+from mutator.comparison.sides import Side
 from mutator.model import Experiment, Method, Outcome, Status
 from mutator.outcomes.rows import Row
 from mutator.store.run_folder import RunFolder
@@ -139,9 +139,3 @@ def test_changes(experiment: Make, a: dict[str, Any], b: dict[str, Any], changes
     pair = Pair(e, e, row(**a), row(**b))
     assert pair.changes == {Change(name) for name in changes.split()}
     assert pair.usable == (not {"harness-error", "mended"} & set(changes.split()) and a != BROKEN)
-
-
-def test_an_experiment_in_words(experiment: Make) -> None:
-    """An experiment is named by its fault, value, scenario and trigger, each once."""
-    assert words(experiment(value=35)) == "radar/chaff/distance 35 m, S1, guided C1"
-    assert drive(experiment(method=Method.RANDOM, trigger="random/C2")) == "S1, random C2"

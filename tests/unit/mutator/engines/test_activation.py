@@ -10,7 +10,7 @@ from mutator.engines.activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.probe import probe_path, state_after
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from mutator.engines.activation import Observed
-from mutator.engines.reference import How
+from mutator.engines.jobs import RunMode
 from mutator.model import Status, Trigger
-from mutator.triggers.conditions import at_time
+from mutator.triggers.kinds import at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import LIMITS, Edit, Fork
@@ -36,7 +36,7 @@ def gone(pid: int) -> bool:
 def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
     """Every process that forks has one OS thread; when the engine is closed, none is left, and no scratch."""
     for time_s in (2.0, 4.0, 3.0):
-        assert fork.run(fork.job(at_time(time_s))).how is How.FORK
+        assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
     assert len(pids) >= 3, "the server, a golden run at its start, and some further on"
     for pid in pids:
@@ -69,7 +69,7 @@ def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
 def test_a_never_active_fault_is_not_run(fork: Fork) -> None:
     """An experiment whose trigger never holds has golden's files as its own, and costs nothing."""
     execution = fork.run(fork.job(at_time(100.0)))
-    assert (execution.how, execution.status, execution.cpu_s) == (How.GOLDEN, Status.OK, 0.0)
+    assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
@@ -112,7 +112,7 @@ from fork_on_toy import Fork
 from mutator.triggers.conditions import at_time
 toy = Workspace(library=Path(sys.argv[1]), templates=Path(sys.argv[2]))
 fork = Fork(toy, Path(sys.argv[3]))
-print(fork.run(fork.job(at_time(2.0))).how, flush=True)
+print(fork.run(fork.job(at_time(2.0))).mode, flush=True)
 time.sleep(60)
 """
 
@@ -143,11 +143,11 @@ def test_the_cpu_limit_is_a_childs_own(fork: Fork, edit: Edit) -> None:
         "        now = self.frame",
         "        sum(range(1_500_000))\n        now = self.frame",
     )
-    assert fork.run(fork.job(at_time(5.5))).how is How.FORK
+    assert fork.run(fork.job(at_time(5.5))).mode is RunMode.FORK
     fork.pool.close()
     fork.engine._pool, fork.engine._limits = None, replace(LIMITS, cpu_s=1)
     execution = fork.run(fork.job(at_time(5.5)))
-    assert (execution.how, execution.status) == (How.FORK, Status.OK)
+    assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
     execution = fork.run(fork.job(at_time(0.5)))
-    assert (execution.how, execution.status) == (How.FORK, Status.TIMEOUT)
+    assert (execution.mode, execution.status) == (RunMode.FORK, Status.TIMEOUT)
     assert execution.detail == "CPU time limit of 1 s"

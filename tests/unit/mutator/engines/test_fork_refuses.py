@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.engines.reference import How
+from mutator.engines.jobs import RunMode
 from mutator.model import Status
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 
 from ..fork_on_toy import LIMITS, Edit, Fork
 
@@ -20,7 +20,7 @@ def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
         "class Drive:",
     )
     execution = fork.run(fork.job(at_time(2.0)))
-    assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+    assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert "2 threads" in execution.why
 
 
@@ -32,7 +32,7 @@ def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
         "if __name__ != '__main__':\n    raise ValueError(3)\n\n\nclass Drive:",
     )
     execution = fork.run(fork.job(at_time(2.0)))
-    assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+    assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
 
 
@@ -45,7 +45,7 @@ def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> No
         "    drive = begin(arguments)\n    drive.steps -= 1\n",
     )
     execution = fork.run(fork.job(at_time(2.0)))
-    assert execution.how is How.REFERENCE
+    assert execution.mode is RunMode.REFERENCE
     assert "log.npz is another one" in execution.why
 
 
@@ -60,7 +60,7 @@ def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
         "            threading.Thread(target=time.sleep, args=(100,)).start()\n        self.publish((gap",
     )
     execution = fork.run(fork.job(at_time(5.9)))
-    assert (execution.status, execution.how) == (Status.TIMEOUT, How.REFERENCE)
+    assert (execution.status, execution.mode) == (Status.TIMEOUT, RunMode.REFERENCE)
     assert execution.why == "it leaves threads behind"
 
 
@@ -73,7 +73,7 @@ def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
         "        if gap > 45.0:\n            open(__file__, 'a').write('x')\n        self.publish((gap",
     )
     execution = fork.run(fork.job(at_time(5.9)))
-    assert (execution.status, execution.how) == (Status.HARNESS_ERROR, How.REFERENCE)
+    assert (execution.status, execution.mode) == (Status.HARNESS_ERROR, RunMode.REFERENCE)
     assert execution.why == "it writes into its own tree"
     assert "toycar/sensing.py in the tree that ran" in execution.detail
 
@@ -86,7 +86,7 @@ def test_what_cannot_be_exchanged_is_told(fork: Fork, edit: Edit) -> None:
         "    def walk(self):\n        gap = 0.0\n        yield gap\n\n    def publish(self",
     )
     execution = fork.run(fork.job(at_time(2.0), function="Sensor.walk"))
-    assert (execution.status, execution.how) == (Status.OK, How.REFERENCE)
+    assert (execution.status, execution.mode) == (Status.OK, RunMode.REFERENCE)
     assert execution.why == "Sensor.walk in toycar/sensing.py may be suspended between two steps"
 
 
@@ -99,7 +99,7 @@ def test_a_golden_run_that_does_not_end_well(fork: Fork, edit: Edit) -> None:
         "    return Drive(case if __name__ == '__main__' else {})",
     )
     execution = fork.run(fork.job(at_time(2.0)))
-    assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+    assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert execution.why.startswith("its golden run cannot be driven step by step: KeyError: ")
 
 
@@ -121,5 +121,5 @@ def test_a_target_that_observes_before_its_first_step(fork: Fork, edit: Edit) ->
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
     for trigger in (always(armed_after_s=-2.0), at_time(2.0)):
         execution = fork.run(fork.job(trigger))
-        assert (execution.how, execution.status) == (How.REFERENCE, Status.OK)
+        assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
         assert execution.why == "it observes before its first step"

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from mutator._common.files import DiskFull
-from mutator.campaigns.campaign_files import Limits
-from mutator.engines.reference import Execution, Job, ReferenceEngine, prepare_base
-from mutator.model import Status
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -234,8 +234,9 @@ def ended(pid: int) -> bool:
 SLEEPER = """
 import sys
 from pathlib import Path
-from mutator.campaigns.campaign_files import Limits
-from mutator.engines.reference import Job, ReferenceEngine
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine
+from mutator.model import Limits
 from mutator.workspace import Workspace
 library, templates, folder, note = map(Path, sys.argv[1:])
 toycar = Workspace(library=library, templates=templates)

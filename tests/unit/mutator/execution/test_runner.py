@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.campaigns.plans import make_plan
-from mutator.engines.reference import Execution, Job
+from mutator.campaigns.plans import Choices, make_plan
+from mutator.engines.jobs import Execution, Job
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.workspace import Workspace
@@ -56,7 +56,7 @@ def write(out: Path, **channels: np.ndarray) -> None:
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
     """The record of an experiment whose run left the given outputs."""
     manifest = toycar.manifest("toycar")
-    experiment = make_plan(toycar, "small", only='fault_type == "distance"', limit=1).experiments[0]
+    experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     (tmp_path / "golden").mkdir()
     write(tmp_path / "golden")
 

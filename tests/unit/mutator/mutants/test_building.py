@@ -17,7 +17,7 @@ from mutator.mutants.building import InvalidMutant, Mutant, write_tree
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 GOLDEN = Path(__file__).parents[1] / "toy" / "golden"

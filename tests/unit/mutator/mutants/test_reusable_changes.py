@@ -19,7 +19,7 @@ from mutator.mutants.reusable_changes import (
     known_changes,
     reuse_key,
 )
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 TEXTS = [

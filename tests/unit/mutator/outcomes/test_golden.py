@@ -8,15 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.outcomes.golden import (
-    BadOutput,
-    alerts_of,
-    compare,
-    golden_key,
-    hazards_of,
-    load_record,
-    load_trace,
-)
+from mutator.outcomes.golden import BadOutput, alerts_of, compare, hazards_of, load_record, load_trace
+from mutator.store.run_folder import golden_key
 from mutator.targets.manifest import Channel
 
 T = np.arange(5) * 0.1

@@ -5,18 +5,18 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
-from mutator.outcomes.results import COLUMNS
+from mutator.outcomes.columns import result_columns
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import (
     by_fault_type,
     count_table,
     counts_by,
     hazard_names,
     outcome_counts,
-    read_results,
 )
 
+COLUMNS = [column.name for column in result_columns(("H1", "H2", "H3"), ("gas",))]
 SEEN = {
     "module": "radar",
     "fault_type": "chaff",
@@ -34,7 +34,7 @@ SEEN = {
 
 def write_table(path: Path, *lines: dict[str, str]) -> Path:
     with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
+        table = csv.DictWriter(file, COLUMNS, restval="")
         table.writeheader()
         for i, line in enumerate(lines):
             table.writerow({"experiment_id": f"{i:016x}"} | line)
@@ -47,7 +47,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
     warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
     masked = SEEN | {"outcome": "masked", "t_manifest": ""}
-    rows = read_results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked))
+    rows = Results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked)).rows()
 
     [chaff, total] = counts_by(rows, by_fault_type)
 
@@ -62,7 +62,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Path, status: Status) -> None:
     """A harness error or an invalid mutant is counted as unusable and nowhere else."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
-    rows = read_results(write_table(tmp_path / "results.csv", SEEN, bad))
+    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).rows()
 
     [count, _] = counts_by(rows, by_fault_type)
 
@@ -75,7 +75,7 @@ def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Pa
 def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
     """A crashed or hanging controller stays among the injected and has a column of its own."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
-    rows = read_results(write_table(tmp_path / "results.csv", SEEN, bad))
+    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).rows()
 
     heads, lines = count_table(counts_by(rows, by_fault_type), "fault type", hazard_names(rows))
 
@@ -86,7 +86,7 @@ def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
 
 def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
     """A clean campaign's table has no columns of zeros for crashes, timeouts, unusable runs."""
-    rows = read_results(write_table(tmp_path / "results.csv", SEEN))
+    rows = Results(write_table(tmp_path / "results.csv", SEEN)).rows()
     heads, _ = count_table(counts_by(rows, by_fault_type), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
@@ -94,7 +94,7 @@ def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> N
 def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
     """A hazard that was looked for is named though it never came; one that nobody looked for is not."""
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
-    assert hazard_names(read_results(write_table(tmp_path / "results.csv", seen, seen))) == ("H2",)
+    assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).rows()) == ("H2",)
 
 
 def test_rows_are_typed(tmp_path: Path) -> None:
@@ -107,22 +107,8 @@ def test_rows_are_typed(tmp_path: Path) -> None:
         "t_h3": "11.25",
         "alerts": "fcw;can_error",
     }
-    [row] = read_results(write_table(tmp_path / "results.csv", line))
+    [row] = Results(write_table(tmp_path / "results.csv", line)).rows()
     assert row.outcome is Outcome.HAZARD
     assert row.hazards == (("H3", 11.25), ("H1", 18.5))
     assert row.alerts == ("fcw", "can_error")
     assert row.reaction_time is None
-
-
-def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
-    """A missing table is a user's error that names the folder."""
-    with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
-        read_results(tmp_path / "results.csv")
-
-
-def test_a_table_of_another_shape_is_refused(tmp_path: Path) -> None:
-    """A CSV without the columns is a user's error, not a KeyError."""
-    file = tmp_path / "results.csv"
-    file.write_text("a,b\n1,2\n", encoding="utf-8")
-    with pytest.raises(MutatorError, match="not a results table"):
-        read_results(file)

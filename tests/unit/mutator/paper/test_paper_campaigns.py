@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Plan, make_plan
+from mutator.campaigns.plans import Choices, Plan, make_plan
 from mutator.model import Experiment, Method
 from mutator.workspace import Workspace
 
@@ -96,7 +96,7 @@ def test_one_method_alone_is_its_half(library: Workspace, paper: Plan, method: M
 
 def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
     """The other reading has the same numbers, and its triggers do not wait for the controller."""
-    coded = make_plan(library, "paper_guided", reading="as_coded")
+    coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
 
@@ -132,11 +132,11 @@ def test_the_reference_campaign_takes_all_of_five_types(library: Workspace) -> N
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
     """Another interpreter with another hash seed and locale makes the plan of the same digest."""
     code = (
-        "from pathlib import Path; from mutator.campaigns.plans import make_plan;"
+        "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"
         "from mutator.workspace import Workspace;"
         f"print(make_plan(Workspace.find(root=Path({str(ROOT)!r})), 'paper_sample').digest)"
     )
     env = os.environ | {"PYTHONHASHSEED": "99", "LC_ALL": "C", "TZ": "Asia/Tokyo"}
     made = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     assert made.stdout.strip() == sample.digest
-    assert make_plan(Workspace.find(root=ROOT), "paper_sample", seed=2).digest != sample.digest
+    assert make_plan(Workspace.find(root=ROOT), "paper_sample", Choices(seed=2)).digest != sample.digest

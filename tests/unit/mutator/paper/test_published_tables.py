@@ -71,7 +71,7 @@ def test_wilson_interval_of_a_published_example() -> None:
 def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
     """Ours is counted by scenario and beneath the paper's; what the paper does not have is left empty."""
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
-    lines = summary_sheet("guided", by_scenario(frame), paper).texts()
+    lines = summary_sheet("guided", by_scenario(frame), paper).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
     assert hazards[0][:3] == ["paper", "35.1 % (215/613; 31.4 to 38.9)", "-"]
     assert hazards[1][0] == "here"
@@ -90,7 +90,7 @@ def test_coverage_has_both_denominators(paper: Paper) -> None:
     sheet = coverage_sheet("guided", by_kind(frame), paper)
     kinds = [line[0] for line in sheet.lines]
     assert kinds == [k for k in ("radar/chaff", "radar/jamming", "radar/zeta", "total") for _ in range(2)]
-    chaff = sheet.texts()[1]
+    chaff = sheet.table().rows[1]
     assert [cell.split(";")[0] for cell in chaff[2:]] == ["50.0 % (1/2", "100.0 % (1/1", "50.0 % (1/2"]
 
 

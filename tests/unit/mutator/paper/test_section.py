@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.paper.published import load_paper
 from mutator.paper.section import told
 from mutator.store.run_folder import RunFolder
@@ -20,7 +20,7 @@ REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, shard: str | None) -> None:
     """Claims of all faults wait for the last experiment of the plan, of which a shard is but a part."""
     shutil.copytree(REFERENCES, toycar.library / "references")
-    freeze(make_plan(toycar, "small", shard=shard), tmp_path / "run", toycar)
+    freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
     kinds = [kind.split("/") for _, kind in load_paper(REFERENCES).coverage]
     frame = results(*({"module": m, "fault_type": kind, "seed": i} for i, (m, kind) in enumerate(kinds)))

@@ -12,13 +12,14 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.columns import COLUMNS
+from mutator.outcomes.columns import result_columns
 from mutator.report import building as report
 from mutator.report import page as report_page
 from mutator.review import gate
 from mutator.store import plan_file as planfile
 from mutator.workspace import Workspace
 
+COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
 HERE = Workspace.find(Path(__file__).parents[4])
 HEAD = {
     "schema": "run/1",
@@ -82,7 +83,7 @@ def run(tmp_path: Path) -> Path:
     """A run folder with a hazard, a crash and a harness error; the hazard has its patch and a still."""
     (tmp_path / "run.json").write_text(json.dumps(HEAD))
     with (tmp_path / "results.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="")
+        table = csv.DictWriter(file, COLUMNS, restval="")
         table.writeheader()
         for i, line in enumerate((OK, BAD, CRASHED)):
             table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
@@ -159,7 +160,7 @@ def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> 
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}
     assert table["count"] == 3
-    assert {*COLUMNS, "variant", "detail"} < columns.keys()
+    assert {*COLUMNS} < columns.keys()
     ids = columns["experiment_id"]["texts"]
     at = ids.index("0" * 16)
     assert columns["t_h1"]["numbers"][at] == 18.25
@@ -225,7 +226,7 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
     """Two fault types and two scenarios: three figures, in the Markdown and the page, all of them there."""
     with (run / "results.csv").open("a", newline="") as file:
         other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
-        csv.DictWriter(file, [*COLUMNS, "variant", "detail"], restval="").writerow(other)
+        csv.DictWriter(file, COLUMNS, restval="").writerow(other)
     written = report.write(run, None)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
@@ -305,16 +306,3 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
         assert "t_h1 > t_activation" in text
     assert "action_" not in written.markdown.read_text()
     assert "<figure" not in written.page.read_text().replace('el("figure"', "")
-
-
-def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
-    """Whatever ends a line, or would be taken for an element, italics or bold, in a cell is text."""
-    lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"], ["no *x* in __init__"], ["a * b_c_d * `_e`"]]
-    table = report_page.markdown_table(["said"], lines)
-    assert table.splitlines()[2:] == [
-        "| a b c |",
-        "| &lt;class 'float'> |",
-        "| p < 0.05 |",
-        r"| no \*x\* in \_\_init\_\_ |",
-        "| a * b_c_d * `_e` |",
-    ]

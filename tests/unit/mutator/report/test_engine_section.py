@@ -47,7 +47,7 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
         proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
     ) -> Path:
         run = tmp_path / "run"
-        plan = make_plan(toycar, "small", **asdict(Choices(limit=4)))
+        plan = make_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
         freeze(plan, run, toycar)
         records = [record(experiment) for experiment in plan.experiments]
         write(run / "records/0001-main.jsonl", SCHEMA, [asdict(r) for r in records])
@@ -79,7 +79,7 @@ def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
     """There is a line for each way, and one for each reason why an experiment was not forked."""
     told = report_engine.told(RunFolder.open(finish(4)))
     assert told is not None
-    ways = dict(told.lines)
+    ways = dict(told.table.rows)
     assert list(ways.values()) == ["1"] * 4
     assert "a fork of the golden run, taken right before the fault is first active" in ways
     assert any("cannot be forked: its golden run has <two> threads" in way for way in ways)
@@ -92,8 +92,8 @@ def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
     told = report_engine.told(RunFolder.open(run))
     assert told is not None
-    assert len(told.lines) == 3 + report_engine.LISTED + 1
-    assert sum(int(count) for _, count in told.lines) == 34
+    assert len(told.table.rows) == 3 + report_engine.LISTED + 1
+    assert sum(int(count) for _, count in told.table.rows) == 34
 
 
 def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
@@ -103,8 +103,8 @@ def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
     told = report_engine.told(RunFolder.open(run))
     assert told is not None
-    assert sum(int(count) for _, count in told.lines) == 4
-    assert not any("fork of the golden run" in way for way, _ in told.lines)
+    assert sum(int(count) for _, count in told.table.rows) == 4
+    assert not any("fork of the golden run" in way for way, _ in told.table.rows)
 
 
 def record_ids(run: Path) -> list[str]:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from mutator.campaigns.plans import Choices
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.figures.actions import WANTED, Pair, Wanted
 from mutator.figures.figures import Drawing, write
 from mutator.report.examples import candidates, drawings
@@ -38,7 +38,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path
     """A toy car's place with a run of shifted lanes, of which one was driven again for its trace."""
     place = tmp_path_factory.mktemp("driven")
     only = Choices(only='fault_type == "lane"')
-    assert campaign_run.run(copy_toycar(place), "small", place / "run", choices=only).exit_code == 0
+    assert run_campaign(copy_toycar(place), "small", place / "run", choices=only).exit_code == 0
     assert not (place / "run" / "traces").exists()
     drawn(place, BRAKE)
     return place

@@ -15,7 +15,7 @@ from mutator.report.series import BUCKETS, chosen, keep, series, thinned
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-from .test_report_browse import row
+from .test_browse import row
 
 HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Group, fault_hunks, of_library, of_plan
 from mutator.workspace import Workspace
@@ -44,7 +44,7 @@ def test_a_library_is_few_groups(groups: Groups) -> None:
 
 def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) -> None:
     """What was approved for the library is approved for a campaign of it, whatever it picks."""
-    picked = of_plan(toycar, make_plan(toycar, "small", limit=3))
+    picked = of_plan(toycar, make_plan(toycar, "small", Choices(limit=3)))
     assert 1 < len(picked) <= 5
     for group in picked:
         assert group.bound == groups[group.id].bound
@@ -55,7 +55,7 @@ def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) ->
 
 def test_the_canary_is_reviewed_too(toycar: Workspace) -> None:
     """It runs before all others, so its group is there even where no experiment is of it."""
-    plan = make_plan(toycar, "small", only='fault_type == "silence" and method == "guided"')
+    plan = make_plan(toycar, "small", Choices(only='fault_type == "silence" and method == "guided"'))
     canary = next(g for g in of_plan(toycar, plan) if "after_assign offset" in g.what)
     assert canary.runs == 0
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Plan, make_plan
+from mutator.campaigns.plans import Choices, Plan, make_plan
 from mutator.errors import CheckFailed
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.review.catalogue import of_plan
 from mutator.review.decisions import Verdict, load_review
@@ -15,7 +15,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def plan(toycar: Workspace) -> Plan:
-    return make_plan(toycar, "small", limit=2)
+    return make_plan(toycar, "small", Choices(limit=2))
 
 
 def decide(toy: Workspace, plan: Plan, verdict: Verdict = Verdict.APPROVED, count: int | None = None) -> None:
@@ -43,7 +43,7 @@ def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
     template = toycar.templates / "omission.py.j2"
     template.write_text(template.read_text().replace("not ", "not not not "))
     with pytest.raises(CheckFailed) as caught:
-        gate.approvals(toycar, make_plan(toycar, "small", limit=2, reading="as_coded"))
+        gate.approvals(toycar, make_plan(toycar, "small", Choices(limit=2, reading="as_coded")))
     review = load_review(toycar, "toycar")
     refused = [group for group in of_plan(toycar, plan) if review.state(group) != "approved"]
     for group in refused:
@@ -67,12 +67,12 @@ def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: P
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:
-        gate.approvals(toycar, make_plan(toycar, mine, limit=1))
+        gate.approvals(toycar, make_plan(toycar, mine, Choices(limit=1)))
     assert f"--campaign '{mine}'" in str(caught.value.remedy)
 
 
 def test_nothing_is_planned_without_approval(toycar: Workspace, tmp_path: Path) -> None:
     """A refused run leaves no plan behind, so that it can be given other options."""
     with pytest.raises(CheckFailed):
-        campaign_run.run(toycar, "small", tmp_path / "run", reviewed=True)
+        run_campaign(toycar, "small", tmp_path / "run", reviewed=True)
     assert not (tmp_path / "run" / "run.json").exists()

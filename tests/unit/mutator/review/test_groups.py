@@ -8,7 +8,7 @@ from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.building import build
 from mutator.review.groups import Shape, group_label, parameter_values, shapes, without_values
-from mutator.triggers.conditions import always, at_time
+from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 NEAR = Trigger(name="near", condition="hwt <= 2.0")

@@ -75,5 +75,5 @@ def test_files_are_the_same_each_time(tmp_path: Path) -> None:
 def test_numbers_are_written_plainly() -> None:
     """What is not known is empty or a dash, a tiny p-value no false zero, a p-value in the CSV a number."""
     sheet = Sheet(name="n", title="T", note="N.", heads=("a", "b", "c"), lines=((math.nan, P(1e-20), None),))
-    assert sheet.texts() == [["-", "< 0.0001", "-"]]
+    assert sheet.table().rows == [["-", "< 0.0001", "-"]]
     assert sheet.csv() == "a,b,c\n,1e-20,\n"

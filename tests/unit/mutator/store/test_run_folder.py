@@ -17,7 +17,7 @@ from mutator.workspace import Workspace
 HOLDER = """
 import sys, time
 from pathlib import Path
-from mutator import locks
+from mutator._common import locks
 run = Path(sys.argv[1])
 if sys.argv[2] == "owner":
     with locks.owned(run):

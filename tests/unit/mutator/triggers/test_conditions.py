@@ -5,8 +5,7 @@ import math
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.model import Hold
-from mutator.triggers.conditions import always, at_time, check_condition, divide, draw_time, evaluate, to_code
+from mutator.triggers.conditions import check_condition, divide, evaluate, to_code
 
 FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
@@ -79,32 +78,3 @@ def test_division_by_zero_is_infinite(a: float, b: float, result: float) -> None
     assert math.isnan(divide(0.0, b))
     assert evaluate("1 / t > 5", {**FOLLOWING, "t": 0.0})
     assert to_code("1 / t > 5") == "_div(1.0, t) > 5.0"
-
-
-def test_ready_made_triggers() -> None:
-    """`always` and a point in time both last to the end of the run."""
-    assert always().hold is Hold.TO_END
-    assert at_time(3).condition == "t >= 3.0"
-    assert at_time(3).hold is Hold.TO_END
-    assert (at_time(3, hold_s=2.0).hold, at_time(3, hold_s=2.0).hold_s) == (Hold.FOR, 2.0)
-    with pytest.raises(MutatorError, match="time nan"):
-        at_time(math.nan)
-    assert evaluate(at_time(3).condition, FOLLOWING)
-    assert not evaluate(at_time(3.01).condition, FOLLOWING)
-
-
-def test_random_times_are_starts_of_steps() -> None:
-    """A drawn time depends on seed and key alone, lies in its interval, and is the start of a step."""
-    times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
-    assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
-    assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)
-    assert min(times) < 3.0 and max(times) > 28.0
-    assert {draw_time(i, "k", first_s=0.1, last_s=0.2, step_s=0.1) for i in range(50)} == {0.1, 0.2}
-
-
-def test_random_times_need_an_interval() -> None:
-    """An interval that ends before it starts, and a negative seed, are refused."""
-    with pytest.raises(MutatorError, match="seed -1; expected 0 or more"):
-        draw_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
-    with pytest.raises(MutatorError, match="expected an interval"):
-        draw_time(1, "k", first_s=2.0, last_s=1.0, step_s=0.01)

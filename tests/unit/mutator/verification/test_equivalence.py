@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.plans import Choices
-from mutator.engines import choice as engines
+from mutator.engines.registry import choose_engine
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution import session as campaign_run
+from mutator.execution.running import run_campaign
 from mutator.model import Experiment
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
@@ -35,7 +35,7 @@ def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., 
 @pytest.fixture
 def proven(toycar: Workspace, tmp_path: Path) -> Path:
     """A run folder of two experiments from the fork engine, with its proof."""
-    summary = campaign_run.run(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
+    summary = run_campaign(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
     assert summary.proof == proof.Proof(sampled=2, same=2)
     assert summary.exit_code == 0
     return tmp_path / "run"
@@ -49,7 +49,7 @@ def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Pat
     record = json.loads(lines[1])
     path.write_text("\n".join([lines[0], json.dumps(record | {"trace_digest": "0" * 64}), *lines[2:], ""]))
     with pytest.raises(CheckFailed, match=f"experiment {record['experiment_id']} .*trace_digest '000"):
-        campaign_run.run(toycar, "small", proven)
+        run_campaign(toycar, "small", proven)
 
 
 @pytest.mark.slow
@@ -61,7 +61,7 @@ def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -
     assert [len(piece.ids) for piece in proof.left(folder)] == [2]
     records = read_records(proven)
     assert proof.judge(folder, records) == proof.Proof(sampled=2, same=0)
-    summary = campaign_run.run(toycar, "small", proven, engine="reference")
+    summary = run_campaign(toycar, "small", proven, engine="reference")
     assert (summary.proof, summary.ran, summary.exit_code) == (proof.Proof(sampled=2, same=2), 0, 0)
     assert proof.left(folder) == ()
 
@@ -69,7 +69,7 @@ def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -
 @pytest.mark.slow
 def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) -> None:
     """A run that the reference engine alone has driven has none."""
-    summary = campaign_run.run(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
+    summary = run_campaign(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
     assert summary.proof is None
     assert not (tmp_path / "run" / "proof").exists()
 
@@ -113,7 +113,7 @@ def test_the_proof_believes_nothing_that_runs_share(
     (tmp_path / "kept").write_text(kept)
     out = tmp_path / "run"
     try:
-        summary = campaign_run.run(sharing, "small", out, engine="fork", choices=Choices(limit=1))
+        summary = run_campaign(sharing, "small", out, engine="fork", choices=Choices(limit=1))
         found, code = " ".join(map(": ".join, summary.harness_errors)), summary.exit_code
     except CheckFailed as err:
         found, code = str(err), err.exit_code
@@ -127,12 +127,12 @@ def test_the_proof_believes_nothing_that_runs_share(
 def test_which_engine_runs(toycar: Workspace) -> None:
     """Forking is the default where it is possible and worth it; what is asked for is used, or refused."""
     manifest = toycar.manifest("toycar")
-    assert engines.choose(None, manifest, 1000) == "fork"
-    assert engines.choose(None, manifest, 10) == "reference"
-    assert engines.choose("fork", manifest, 10) == "fork"
-    assert engines.choose("reference", manifest, 1000) == "reference"
+    assert choose_engine(None, manifest, 1000) == "fork"
+    assert choose_engine(None, manifest, 10) == "reference"
+    assert choose_engine("fork", manifest, 10) == "fork"
+    assert choose_engine("reference", manifest, 1000) == "reference"
     plain = replace(manifest, stepwise=None)
-    assert engines.choose(None, plain, 1000) == "reference"
+    assert choose_engine(None, plain, 1000) == "reference"
     for asked, told in (("fork", "names no `entry.stepwise`"), ("turbo", "engine 'turbo'")):
         with pytest.raises(MutatorError, match=told):
-            engines.choose(asked, plain, 1000)
+            choose_engine(asked, plain, 1000)

@@ -13,7 +13,7 @@ from mutator.mutants.building import build
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import matches
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 

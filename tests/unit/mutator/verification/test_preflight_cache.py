@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.store.run_folder import RunFolder
 from mutator.verification import preflight_cache as check_cache
@@ -53,7 +53,7 @@ def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     """A second folder of the same sources has results and golden runs at once, the same bytes."""
     toy, before = checked
-    folder = freeze(make_plan(toy, "small", only='method == "guided"'), tmp_path / "run", toy)
+    folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
     assert all(result.passed for result in run_checks(toy, folder))
     assert (folder.path / "checks.json").read_bytes() == (before.path / "checks.json").read_bytes()
     files = [p.relative_to(before.path) for p in (before.path / "golden").rglob("*") if p.is_file()]
@@ -95,7 +95,7 @@ def test_other_sources_are_checked(
     if changed == "target":
         with (toycar.library.parent / "tree" / "toycar" / "go.py").open("a") as file:
             file.write("# another\n")
-    plan = make_plan(toycar, "small", seed=9 if changed == "seed" else None)
+    plan = make_plan(toycar, "small", Choices(seed=9 if changed == "seed" else None))
     with pytest.raises(Driven):
         run_checks(toycar, freeze(plan, tmp_path / "run", toycar))
 

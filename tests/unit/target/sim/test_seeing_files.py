@@ -21,7 +21,7 @@ from selfdrive.visiond.compiled_hog import C_SOURCE, made_of
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
 from mutator.mutants.building import build, write_tree
 from mutator.targets.source_tree import matches
-from mutator.triggers.conditions import at_time
+from mutator.triggers.kinds import at_time
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[4]

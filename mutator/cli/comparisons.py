@@ -90,7 +90,7 @@ def _show(terminal: Terminal, found: "Comparison") -> None:
         terminal.say()
     for sheet in found.sheets[:SHOWN]:
         terminal.say(sheet.title, style="bold")
-        heads, lines = list(sheet.heads), sheet.texts()
+        heads, lines = list(sheet.heads), sheet.table().rows
         terminal.table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")
         terminal.say()
     terminal.say(pages.summary(found))

@@ -1,0 +1,28 @@
+"""Which faults a forking engine can run: their mutants' code can be put into a loaded program."""
+
+from collections.abc import Iterable
+
+from mutator.engines.code_swap import NotSwappable, plan_swap
+from mutator.engines.registry import not_forkable
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Fault
+from mutator.mutants.building import build
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import always
+
+
+def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
+    """Variants that the reference engine runs, whatever is asked for, and why; one fault of each is tried."""
+    variants = {fault.spec: fault for fault in faults}
+    if why := not_forkable(manifest):
+        return dict.fromkeys(variants, why)
+    found = {}
+    for name, fault in variants.items():
+        try:
+            plan_swap(manifest, build(manifest, models, fault, always()).files, "")
+        except NotSwappable as reason:
+            found[name] = str(reason)
+        except MutatorError:
+            continue  # the checks before the campaign tell it, or it is not run at all
+    return found

@@ -1,0 +1,85 @@
+"""The engines there are, and which one runs a campaign."""
+
+import os
+import sys
+from dataclasses import dataclass
+from pkgutil import resolve_name
+
+from mutator.engines.jobs import Engine, Setting
+from mutator.errors import MutatorError
+from mutator.targets.manifest import TargetManifest
+
+_WORTH_IT = 40  # experiments; of fewer, the equivalence check alone would repeat most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EngineKind:
+    """An engine: its name, what a run of it is, and the function that makes one from a `Setting`.
+
+    `factory` is `module:function`, imported only when the engine is made. `forks` says that the engine
+    needs a target that can be forked.
+    """
+
+    name: str
+    about: str
+    factory: str
+    forks: bool = False
+
+
+REFERENCE, WARM, FORK = "reference", "warm", "fork"
+ENGINES = {
+    kind.name: kind
+    for kind in (
+        EngineKind(
+            name=REFERENCE,
+            about="a fresh interpreter for each run",
+            factory="mutator.engines.reference:make_reference",
+        ),
+        EngineKind(
+            name=WARM,
+            about="a fork of the loaded target",
+            factory="mutator.engines.fork:make_warm",
+            forks=True,
+        ),
+        EngineKind(
+            name=FORK,
+            about="a fork of its golden run",
+            factory="mutator.engines.fork:make_fork",
+            forks=True,
+        ),
+    )
+}
+
+
+def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:
+    """Name of the engine for so many experiments: the one asked for, or the fastest that pays off.
+
+    MutatorError when the one asked for is unknown or cannot run this target here.
+    """
+    why = not_forkable(manifest)
+    if asked is None:
+        return REFERENCE if why or experiments < _WORTH_IT else FORK
+    if asked not in ENGINES:
+        raise MutatorError(f"engine '{asked}'", expected=f"one of {', '.join(ENGINES)}")
+    if ENGINES[asked].forks and why:
+        raise MutatorError(f"engine '{asked}': {why}", remedy=f"use --engine {REFERENCE}")
+    return asked
+
+
+def make_engine(name: str, setting: Setting) -> Engine:
+    """An engine of that name."""
+    engine: Engine = resolve_name(ENGINES[name].factory)(setting)
+    return engine
+
+
+def not_forkable(manifest: TargetManifest) -> str:
+    """Why nothing of this target can be forked here; empty if it can."""
+    if manifest.stepwise is None:
+        return f"{manifest.path.name} names no `entry.stepwise`"
+    if sys.platform != "linux":
+        return "processes are forked on Linux only"
+    try:
+        os.close(os.pidfd_open(os.getpid()))
+    except OSError:
+        return "this kernel has no pidfd_open"
+    return ""

@@ -1,0 +1,57 @@
+"""Work dealt out on this machine: a pytest session in this process, with the workers of pytest-xdist."""
+
+import io
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import metadata
+
+import pytest
+
+from mutator.execution.pytest_session import Controller
+from mutator.execution.session import Session
+
+_PLUGIN = "mutator.execution.pytest_plugin"
+
+
+class LocalWorkers:
+    """The distributor of `mutator run`: `session.workers` processes, or this one alone when that is 0."""
+
+    def run(self, session: Session) -> None:
+        """Run the pending pieces as pytest items, without anything of the user's pytest configuration."""
+        installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
+        folder = session.folder.path
+        arguments = [
+            *("--campaign", str(folder / "campaign.yaml"), "--campaign-out", str(folder)),
+            *("--disable-plugin-autoload", "-p", "xdist", "-p", "mutator" if installed else _PLUGIN),
+            *("-p", "no:cacheprovider", "-p", "no:tmpdir", "--noconftest", "--assert=plain"),
+            *("-c", os.devnull, "--rootdir", str(folder), "-s", "-n", str(session.workers)),
+        ]
+        output = _Silent()
+        with _without("PYTEST_ADDOPTS", "PYTEST_PLUGINS"):
+            code = pytest.main(arguments, plugins=[Controller(session), output])
+        if code in (pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR) and not session.problem:
+            session.problem = output.text.getvalue().strip()[-2000:] or f"pytest ended with {code!r}"
+
+
+@contextmanager
+def _without(*names: str) -> Iterator[None]:
+    """Without these variables in the environment, also that of the workers."""
+    kept = {name: os.environ.pop(name) for name in names if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(kept)
+
+
+class _Silent:
+    """Pytest plugin: the terminal reporter writes into a buffer, so the terminal is the caller's."""
+
+    def __init__(self) -> None:
+        self.text = io.StringIO()
+
+    @pytest.hookimpl(trylast=True)  # after the reporter was made, before xdist (registered later) takes it
+    def pytest_configure(self, config: pytest.Config) -> None:
+        manager = config.pluginmanager
+        manager.unregister(name="terminalreporter")
+        manager.register(pytest.TerminalReporter(config, self.text), "terminalreporter")

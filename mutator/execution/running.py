@@ -1,0 +1,76 @@
+"""Run a campaign: plan if needed, check, run what lacks a record, build the table.
+
+`mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` share all of it but who starts pytest.
+"""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mutator.campaigns.plans import Choices
+from mutator.execution.distribution import Distributor
+from mutator.execution.local import LocalWorkers
+from mutator.execution.session import Notify, Session, Summary, open_session
+from mutator.store.records import Tail
+from mutator.workspace import Workspace
+
+LOCAL = LocalWorkers()
+_NOTIFY_S = 0.5
+
+
+def run_campaign(
+    workspace: Workspace,
+    campaign: str | Path,
+    out: Path,
+    *,
+    workers: int = 0,
+    choices: Choices | None = None,
+    engine: str | None = None,
+    reviewed: bool = False,
+    distributor: Distributor = LOCAL,
+    notify: Notify | None = None,
+) -> Summary:
+    """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
+
+    A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
+    MutatorError, as is a changed campaign file or target. `engine` is a name in `engines.registry` (None: the
+    fastest that is worth it). With `reviewed`, nothing runs that is not approved (`mutator.review.gate`).
+    `notify` is called from another thread about twice a second. MutatorError for wrong input, CheckFailed
+    when something is not approved, and when the preflight or the equivalence check fails.
+    """
+    with open_session(
+        workspace,
+        campaign,
+        out,
+        workers=workers,
+        choices=choices or Choices(),
+        engine=engine,
+        reviewed=reviewed,
+        notify=notify,
+    ) as session:
+        session.prepare()
+        if session.pending or session.proof:
+            with _followed(session):
+                distributor.run(session)
+        return session.finish()
+
+
+@contextmanager
+def _followed(session: Session) -> Iterator[None]:
+    """Report progress while the session runs."""
+    tail = Tail(session.folder.path, session.folder.planned)
+    stop = threading.Event()
+
+    def follow() -> None:
+        while not stop.wait(_NOTIFY_S):
+            session.notify(tail.poll())
+
+    thread = threading.Thread(target=follow, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        session.notify(tail.poll())

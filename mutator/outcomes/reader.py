@@ -1,0 +1,159 @@
+"""The one reader of a run's results: rows, pandas frames and bytes of results.csv and results.parquet.
+
+pandas is imported only where a frame is asked for.
+"""
+
+import csv
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Outcome, Record, Status
+from mutator.outcomes import results
+from mutator.outcomes.columns import hazards_in
+from mutator.outcomes.rows import Row, row_from
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+_NEEDED = (
+    "experiment_id",
+    "fault_id",
+    "module",
+    "fault_type",
+    "scenario",
+    "method",
+    "trigger",
+    "seed",
+    "status",
+    "t_activation",
+    "t_manifest",
+    "t_alert",
+)
+_NAMES = ("module", "fault_type", "reading", "unit", "scenario", "method", "trigger", "variant", "aim")
+_SCALES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
+_REMEDY = "make it anew: `mutator report DIR`"
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """A results table: the results.csv at `path`, and the results.parquet beside it.
+
+    Files are read when asked for, each time anew. MutatorError for a file that is missing or is no results
+    table.
+    """
+
+    path: Path
+
+    @classmethod
+    def of_run(cls, run: Path) -> "Results":
+        """The table of a run folder, as it was last built."""
+        return cls(run / results.CSV)
+
+    @classmethod
+    def up_to_date(cls, run: Path) -> "Results":
+        """The table of a run folder, built first where it is missing or older than the records."""
+        return cls(results.ensure(run))
+
+    def csv(self) -> bytes:
+        """The bytes of results.csv."""
+        return self._read(self.path)
+
+    def parquet(self) -> bytes:
+        """The bytes of results.parquet."""
+        return self._read(self.path.with_name(results.PARQUET))
+
+    def _read(self, path: Path) -> bytes:
+        try:
+            return path.read_bytes()
+        except FileNotFoundError:
+            raise MutatorError(
+                f"no results here (no {path.name})",
+                where=path.parent,
+                expected="a run folder",
+                remedy="make them: `mutator report DIR`; for a run folder see `mutator run --help`",
+            ) from None
+        except OSError as err:
+            raise MutatorError(f"the results cannot be read ({err.strerror})", where=path) from None
+
+    def lines(self) -> Iterator[dict[str, str]]:
+        """The cells of each row as text, by column, in the order of the table."""
+        reader = csv.DictReader(io.TextIOWrapper(io.BytesIO(self.csv()), encoding="utf-8", newline=""))
+        try:
+            self._check_header(reader.fieldnames or ())
+            for line in reader:
+                if None in line or None in line.values():
+                    raise self._no_table(f"line {reader.line_num} has another number of cells than the head")
+                yield line
+        except (ValueError, csv.Error) as err:
+            raise self._no_table(str(err)) from None
+
+    def rows(self) -> tuple[Row, ...]:
+        """The rows, typed, in the order of the table."""
+        try:
+            return tuple(map(row_from, self.lines()))
+        except (KeyError, TypeError, ValueError) as err:
+            raise self._no_table(str(err)) from None
+
+    def texts(self) -> "pd.DataFrame":
+        """A frame of the cells as text, '' where there is nothing, in the order of the table."""
+        import pandas as pd
+
+        try:
+            frame = pd.read_csv(io.BytesIO(self.csv()), dtype=str, keep_default_na=False)
+        except ValueError as err:
+            raise self._no_table(str(err)) from None
+        self._check_header(frame.columns)
+        return frame
+
+    def frame(self) -> "pd.DataFrame":
+        """A frame of all columns, typed, by experiment id.
+
+        Names are categories (`outcome` and `status` in their order), flags nullable booleans (NA: the run did
+        not end well), times floats in s of simulation (NaN: did not happen). `kind` (`radar/chaff`), `hazard`
+        and `t_hazard` (any, the first) are added. `frame.attrs["units"]` has the unit of each number.
+        """
+        import pandas as pd
+
+        frame = pd.read_parquet(io.BytesIO(self.parquet())).set_index("experiment_id")
+        hazards = [name.lower() for name in hazards_in(frame.columns)]
+        frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
+        for name in ("activated", "manifested", *hazards):
+            frame[name] = frame[name].astype("boolean")
+        for name in _NAMES:
+            frame[name] = frame[name].astype("category")
+        for name, order in _SCALES.items():
+            frame[name] = pd.Categorical(frame[name], categories=order, ordered=True)
+        came = frame[hazards].any(axis=1).astype("boolean")
+        frame["hazard"] = came.mask(frame["status"] != Status.OK.value)
+        frame["t_hazard"] = frame[[f"t_{name}" for name in hazards]].min(axis=1).astype(float)
+        frame.attrs["units"] = _units(frame)
+        return frame
+
+    def _check_header(self, columns: "Sequence[str] | pd.Index[str]") -> None:
+        known = set(columns)
+        if missing := [name for name in _NEEDED if name not in known]:
+            raise self._no_table(f"no column '{missing[0]}'")
+
+    def _no_table(self, why: str) -> MutatorError:
+        return MutatorError(f"not a results table: {why}", where=self.path, remedy=_REMEDY)
+
+
+def row_of(experiment: Experiment, record: Record, hazards: "Sequence[str]") -> Row:
+    """The row that results.csv has, or would have, for an experiment and its record."""
+    cells = results.row(experiment, record, hazards)
+    return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
+
+
+def _units(frame: "pd.DataFrame") -> dict[str, str]:
+    """The unit of each column of numbers; `unit` names that of `value`, row by row."""
+    numbers = frame.select_dtypes("number").columns
+    times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
+    known = {name: "s" if name in times else "-" for name in numbers}
+    known |= {name: "as its channel" for name in numbers if name.startswith("max_dev_")}
+    return known | {"value": "as the column `unit` says"}

@@ -1,0 +1,24 @@
+"""`checks.json`: what the preflight of a run folder found."""
+
+from dataclasses import dataclass
+
+from mutator._common.files import read_json
+from mutator.store.run_folder import RunFolder
+
+SCHEMA = "checks/1"
+FILE = "checks.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckResult:
+    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` says what was found."""
+
+    name: str
+    passed: bool
+    detail: str
+
+
+def measured_cpu_s(folder: RunFolder) -> float | None:
+    """Mean CPU time in s of the golden runs in a folder; None before they ran."""
+    path = folder.path / FILE
+    return read_json(path, SCHEMA)["run_cpu_s"] if path.is_file() else None

@@ -1,0 +1,24 @@
+"""Where in a target a fault may be injected."""
+
+from mutator.errors import MutatorError
+from mutator.model import FaultLocation
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.paths import inside
+from mutator.targets.source_tree import matches
+
+
+def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
+    """MutatorError (without place) unless a fault may be injected into the location's file."""
+    path = inside(manifest.root, location.path)
+    if path != location.path or not path.endswith(".py") or path not in manifest.tree.files:
+        raise MutatorError(
+            f"no Python file '{location.path}' in target {manifest.name}",
+            expected="a path relative to the target's root, among the manifest's files",
+            remedy=f"correct the path, or the `files` of {manifest.path.name}",
+        )
+    if matches(path, manifest.forbid):
+        raise MutatorError(
+            f"file '{path}' is forbidden to faults",
+            expected=f"a file that `forbid` of {manifest.path.name} does not match",
+            remedy="inject somewhere else",
+        )

@@ -1,0 +1,72 @@
+"""The kinds of triggers: each makes a `Trigger` of a condition and of how long it holds.
+
+A kind is a function that makes its triggers and, if people may type it, a reader in `READERS`.
+"""
+
+import math
+from collections.abc import Callable
+
+from mutator._common.random_streams import generator
+from mutator.errors import MutatorError
+from mutator.model import Hold, Trigger
+from mutator.triggers.conditions import check_condition
+
+
+def always(*, armed_after_s: float = 0.0) -> Trigger:
+    """Fires at the first observation after arming and stays."""
+    return Trigger(name="always", condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
+
+
+def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
+    """Fires at the first step whose start is not before `time_s`; stays for `hold_s`, or to the end."""
+    if not math.isfinite(time_s):
+        raise MutatorError(f"time {time_s}", expected="a number of seconds")
+    hold = Hold.TO_END if hold_s is None else Hold.FOR
+    return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
+
+
+def time_of(trigger: Trigger) -> float | None:
+    """The time at which a trigger of `at_time` fires; None for any other."""
+    name, _, time = trigger.condition.partition(" >= ")
+    try:
+        return float(time) if name == "t" else None
+    except ValueError:
+        return None
+
+
+def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
+    """A time uniform on the steps from `first_s` to `last_s` (both included), drawn from (seed, key).
+
+    The result is the start of a step to nine decimals, so that it reads as one would write it.
+    """
+    first, last = round(first_s / step_s), round(last_s / step_s)
+    if last < first:
+        raise MutatorError(f"random times from {first_s} s to {last_s} s", expected="an interval")
+    frame = first + int(generator(seed, key).random() * (last - first + 1))
+    return round(frame * step_s, 9)
+
+
+def _read_always(text: str, armed_after_s: float) -> Trigger | None:
+    return always(armed_after_s=armed_after_s) if text == "always" else None
+
+
+def _read_time(text: str, armed_after_s: float) -> Trigger | None:
+    try:
+        return at_time(float(text))
+    except ValueError:
+        return None
+
+
+def _read_condition(text: str, armed_after_s: float) -> Trigger:
+    return Trigger(name="condition", condition=check_condition(text), armed_after_s=armed_after_s)
+
+
+# in this order; a reader returns None for what is not of its kind, and the last one raises MutatorError
+READERS: tuple[Callable[[str, float], Trigger | None], ...] = (_read_always, _read_time, _read_condition)
+TYPED = "a time in s, `always`, or a condition, e.g. 'hwt <= 2'"
+
+
+def read_trigger(text: str, armed_after_s: float) -> Trigger:
+    """The trigger that somebody typed (`TYPED`); MutatorError for anything else."""
+    found = (reader(text, armed_after_s) for reader in READERS)
+    return next(trigger for trigger in found if trigger is not None)

@@ -1,0 +1,25 @@
+"""The list of engines, and which one a campaign gets."""
+
+from pkgutil import resolve_name
+
+import pytest
+
+from mutator.engines.registry import ENGINES, FORK, REFERENCE, choose_engine
+from mutator.errors import MutatorError
+from mutator.workspace import Workspace
+
+
+def test_each_engine_can_be_made() -> None:
+    """The factory of every engine in the list is there, and the name is the one it is listed under."""
+    for name, kind in ENGINES.items():
+        assert kind.name == name and kind.about
+        assert callable(resolve_name(kind.factory))
+
+
+def test_the_default_is_the_fastest_that_pays(toycar: Workspace) -> None:
+    """A small campaign runs on the reference engine, a large one is forked; an unknown name is refused."""
+    manifest = toycar.manifest("toycar")
+    assert choose_engine(None, manifest, 3) == REFERENCE
+    assert choose_engine(None, manifest, 1000) == FORK
+    with pytest.raises(MutatorError, match="engine 'quick'; expected one of reference, warm, fork"):
+        choose_engine("quick", manifest, 3)

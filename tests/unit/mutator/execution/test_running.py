@@ -1,0 +1,41 @@
+"""Campaigns on a way of one's own to deal out the work."""
+
+from pathlib import Path
+
+from mutator.execution.running import run_campaign
+from mutator.execution.session import Session
+from mutator.execution.worker import Assignment, Worker
+from mutator.workspace import Workspace
+
+
+class InOrder:
+    """A distributor that runs every piece in this process, without pytest."""
+
+    def run(self, session: Session) -> None:
+        name = session.worker_name("mine")
+        worker = Worker(
+            session.workspace, Assignment(run=session.folder.path, name=name, engine=session.engine)
+        )
+        for piece in session.pending:
+            worker.run(piece)
+        for sample in session.proof:
+            worker.prove(sample)
+        worker.close()
+
+
+class Idle:
+    """A distributor that gives up at once."""
+
+    def run(self, session: Session) -> None:
+        session.problem = "no machine answered"
+
+
+def test_another_distributor_gives_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
+    """Who deals out the work changes no byte of the results, and resume takes over what another one left."""
+    assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
+    summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=Idle())
+    assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")
+    summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=InOrder())
+    assert summary.exit_code == 0
+    local, other = (tmp_path / name / "results.csv" for name in ("local", "idle"))
+    assert other.read_bytes() == local.read_bytes()

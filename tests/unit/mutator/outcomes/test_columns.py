@@ -1,0 +1,103 @@
+"""Columns of the results come from the manifest alone."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.outcomes.columns import deviation_columns, hazards_in, is_text, result_columns
+from mutator.workspace import Workspace
+
+OF_OPENPILOT = (
+    "experiment_id, fault_id, module, fault_type, reading, value, unit, scenario, method, trigger, seed, "
+    "status, outcome, activated, t_activation, activations, manifested, t_manifest, h1, t_h1, h2, t_h2, "
+    "h3, t_h3, alerts, t_alert, reaction_time, max_dev_gas, max_dev_brake, max_dev_steer, "
+    "variant, aim, condition, detail"
+)
+
+
+def names(hazards: list[str], compared: list[str]) -> list[str]:
+    return [column.name for column in result_columns(hazards, compared)]
+
+
+def test_the_shipped_target_has_these_columns_in_this_order(clone: Workspace) -> None:
+    """Whoever reads results.csv of the shipped target by position finds what was always there."""
+    manifest = clone.manifest("openpilot")
+    made = names(list(manifest.hazards), [channel.name for channel in manifest.compared])
+    assert ", ".join(made) == OF_OPENPILOT
+
+
+def test_another_target_has_its_own_columns_in_the_same_places() -> None:
+    """Hazards stand before the alerts, channels after the reaction time; there is no column of a car's."""
+    made = names(["CRUSHED"], ["gripper_force"])
+    at = made.index("t_manifest")
+    assert made[at + 1 : at + 4] == ["crushed", "t_crushed", "alerts"]
+    assert made[-6:] == ["reaction_time", "max_dev_gripper", "variant", "aim", "condition", "detail"]
+    assert not {"h1", "t_h1", "max_dev_gas", "max_dev_brake", "max_dev_steer"} & {*made}
+
+
+def test_a_target_may_have_no_hazards() -> None:
+    """Without hazards and channels the fixed columns are left, and no hazard is found among them."""
+    made = names([], [])
+    assert hazards_in(made) == ()
+    assert not [name for name in made if name.startswith("max_dev_")]
+
+
+def test_hazards_are_known_by_their_columns() -> None:
+    """The columns of a table name its hazards, in the order of the manifest."""
+    assert hazards_in(names(["H3", "TOO_FAST", "H1"], ["gas"])) == ("H3", "TOO_FAST", "H1")
+
+
+@pytest.mark.parametrize(
+    ("channels", "columns"),
+    [
+        (["gas", "brake", "steer_torque"], ["max_dev_gas", "max_dev_brake", "max_dev_steer"]),
+        (["gas_left", "gas_right", "horn"], ["max_dev_gas_left", "max_dev_gas_right", "max_dev_horn"]),
+    ],
+)
+def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
+    """A channel's column is named by its first word where that is enough."""
+    assert list(deviation_columns(channels).values()) == columns
+
+
+@pytest.mark.parametrize(
+    ("column", "text"),
+    [
+        ("trigger", True),
+        ("kind", True),
+        ("fault", True),
+        ("hazards", True),
+        ("value", False),
+        ("t_crushed", False),
+    ],
+)
+def test_text_is_told_from_numbers(column: str, text: bool) -> None:
+    """Names are text whatever they look like; a target's own columns are numbers."""
+    assert is_text(column) is text
+
+
+@pytest.mark.parametrize(
+    ("hazards", "at"),
+    [
+        ("[alert]", "alert"),  # t_alert is the time of the first alert
+        ("[H1, Status]", "Status"),
+        ("[max_dev_speed]", "max_dev_speed"),
+        ("[hazard]", "hazard"),  # derived: any hazard
+        ("[kind]", "kind"),
+        ("[H1, t_h1]", "t_h1"),
+    ],
+)
+def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: str) -> None:
+    """A hazard whose columns exist already is refused at its line of the manifest."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: {hazards}"))
+    with pytest.raises(MutatorError, match=rf"{Path(path).name}:23: '{at}'; expected a name whose columns"):
+        toy.manifest("toy")
+
+
+@pytest.mark.parametrize("name", ["h1", "H2", "too_fast"])
+def test_no_name_is_special(toy: Workspace, name: str) -> None:
+    """Any other name will do."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: [{name}]"))
+    assert toy.manifest("toy").hazards == (name,)

@@ -1,0 +1,183 @@
+"""The one reader of a run's results."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+import mutator
+from mutator.comparison.sides import read_side
+from mutator.errors import MutatorError
+from mutator.execution.single_run import run_single
+from mutator.exports import Format
+from mutator.exports.write import export
+from mutator.model import Experiment, Outcome, Status
+from mutator.outcomes import results
+from mutator.outcomes.columns import result_columns
+from mutator.outcomes.reader import Results
+from mutator.report import building as report
+from mutator.statistics.frame import load
+from mutator.store import plan_file
+from mutator.workspace import Workspace
+
+SOURCES = Path(mutator.__file__).parent
+WriteRun = Callable[..., Path]
+# What the toy car's words become in a target that has no gas, no brake and no H1.
+OF_A_CRANE = {r"\bH1\b": "CRUSHED", r"\bH3\b": "DROPPED", r"\bgas\b": "winch", r"\bbrake\b": "clamp"}
+
+
+@pytest.fixture
+def crane(toycar: Workspace) -> Workspace:
+    """The toy with other names for its hazards and channels, in its library and its tree."""
+    for path in toycar.library.parent.rglob("*"):
+        if path.suffix in (".py", ".yaml") and "templates" not in path.parts:
+            text = path.read_text()
+            for old, new in OF_A_CRANE.items():
+                text = re.sub(old, new, text)
+            path.write_text(text)
+    return toycar
+
+
+def became(e: Experiment) -> dict[str, Any] | None:
+    """Faults of the lane are hazardous, silence crashes the controller, the rest is masked."""
+    if e.fault.fault_type == "silence":
+        return {"status": Status.CRASHED, "outcome": None, "max_dev": ()}
+    hazard = {"outcome": Outcome.HAZARD, "hazards": (("DROPPED", 4.0), ("CRUSHED", 4.5))}
+    return hazard if e.fault.fault_type == "lane" else {}
+
+
+@pytest.fixture
+def run(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> Path:
+    """A run of the crane with made-up records."""
+    return write_run(crane, tmp_path / "run", became)
+
+
+def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> None:
+    """CSV, Parquet and frames have the target's hazards and channels, where the shipped ones have theirs."""
+    table = Results.up_to_date(run)
+    columns = list(next(table.lines()))
+    at = columns.index("t_manifest")
+    assert columns[at + 1 : at + 7] == [
+        "crushed",
+        "t_crushed",
+        "dropped",
+        "t_dropped",
+        "too_fast",
+        "t_too_fast",
+    ]
+    at = columns.index("reaction_time")
+    assert columns[at + 1 : at + 4] == ["max_dev_winch", "max_dev_clamp", "max_dev_wheel"]
+    assert not [name for name in columns if re.search(r"h[123]\b|gas|brake|steer", name)]
+    assert list(table.texts().columns) == columns
+    frame = table.frame()
+    assert [frame.index.name, *frame.columns][: len(columns)] == columns
+    assert frame.attrs["units"]["max_dev_winch"] == "as its channel"
+
+
+def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
+    """Whichever way the results are read, the same experiments had the same hazards at the same times."""
+    table = Results.up_to_date(run)
+    rows = table.rows()
+    frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
+    assert [row.experiment_id for row in rows] == list(frame.index)
+    assert read_side(run).rows == {row.experiment_id: row for row in rows}
+    assert {row.hazards for row in rows} == {(), (("DROPPED", 4.0), ("CRUSHED", 4.5))}
+    for row in rows:
+        first = row.hazards[0][1] if row.hazards else None
+        for time in (frame.loc[row.experiment_id, "t_hazard"], statistics.loc[row.experiment_id, "t_hazard"]):
+            assert (None if pd.isna(time) else time) == first
+        assert row.checked == (("CRUSHED", "DROPPED", "TOO_FAST") if row.status is Status.OK else ())
+
+
+def test_of_a_crash_it_is_not_known_whether_a_hazard_would_have_come(run: Path) -> None:
+    """`hazard` is unknown exactly where the run did not end well."""
+    frame = Results.up_to_date(run).frame()
+    assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
+    assert frame["hazard"].isna().any()
+
+
+def test_a_target_that_checks_no_hazard(run: Path) -> None:
+    """No hazard came where none was looked for, and its time is a number that is not there."""
+    head = run / "run.json"
+    head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
+    results.build(run)
+    table = Results.of_run(run)
+    frame = table.frame()
+    assert frame["hazard"].dropna().eq(False).all()
+    assert frame["hazard"].notna().any()
+    assert frame["t_hazard"].dtype == float
+    assert not load(run / "results.csv")["is_hazard"].any()
+    assert {row.checked for row in table.rows()} == {()}
+
+
+def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> None:
+    """The tables that other tools get, and the report, name the target's hazards."""
+    table = Results.up_to_date(run)
+    assert export(run, Format.CSV).read_bytes() == table.csv()
+    assert export(run, Format.PARQUET).read_bytes() == table.parquet()
+    assert "hazard CRUSHED [s]" in export(run, Format.JUNIT).read_text()
+    elements = export(run, Format.MUTATION_ELEMENTS, workspace=crane).read_text()
+    assert "CRUSHED, DROPPED in" in elements
+    text = report.write(run, crane).markdown.read_text()
+    assert "CRUSHED" in text
+    assert "H1" not in text
+
+
+def test_a_run_fills_the_columns_that_its_manifest_promises(
+    crane: Workspace, tmp_path: Path, write_run: WriteRun
+) -> None:
+    """A row of an experiment that was really driven has a cell for each column and no other."""
+    only = 'fault_type == "lane" and method == "random"'
+    folder = write_run(crane, tmp_path / "one", lambda e: None, campaign="small", only=only, limit=1)
+    [experiment] = plan_file.read_all(folder)
+    manifest = crane.manifest("toycar")
+    record = run_single(crane, manifest, experiment, tmp_path / "single").record
+    assert record.status is Status.OK
+    columns = result_columns(manifest.hazards, [channel.name for channel in manifest.compared])
+    cells = results.row(experiment, record, manifest.hazards)
+    assert {*cells} == {column.name for column in columns}
+    assert cells["max_dev_wheel"]
+
+
+def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
+    """A missing table is a user's error that names the folder, however it is asked for."""
+    table = Results.of_run(tmp_path)
+    for read in (table.rows, table.texts, table.csv, table.frame):
+        with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
+            read()
+
+
+@pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
+def test_a_table_of_another_shape_is_refused(tmp_path: Path, text: str) -> None:
+    """A file that is no results table is a user's error, not a KeyError or a decoding error."""
+    table = Results.of_run(tmp_path)
+    table.path.write_bytes(text.encode("latin-1"))
+    for read in (table.rows, table.texts):
+        with pytest.raises(MutatorError, match="not a results table"):
+            read()
+
+
+def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
+    """A table with a status that there is not, or a line cut short, is no results table."""
+    table = Results.up_to_date(run)
+    whole = table.csv()
+    for damaged in (whole.replace(b",crashed,", b",melted,"), whole[: whole.rindex(b",")]):
+        table.path.write_bytes(damaged)
+        with pytest.raises(MutatorError, match="not a results table"):
+            table.rows()
+
+
+def test_nothing_else_opens_the_tables() -> None:
+    """Verification of what is read can stand in one place: no other module parses or opens the tables."""
+    allowed = {"outcomes/reader.py"}
+    opens = re.compile(r"read_csv|read_parquet|read_table\(|ParquetFile")
+    named = re.compile(r"results\.(csv|parquet)\"\)?\.(open|read_)|open\([^)]*results\.(csv|parquet)")
+    found = {
+        path.relative_to(SOURCES).as_posix()
+        for path in SOURCES.rglob("*.py")
+        if opens.search(path.read_text()) or named.search(path.read_text())
+    }
+    assert found == allowed

@@ -1,0 +1,52 @@
+"""What tables, messages and reports call faults and experiments."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.model import Experiment, Method, Value, fault_label
+from mutator.outcomes.reader import row_of
+
+SOURCES = Path(mutator.__file__).parent
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "label"),
+    [
+        (35, "m", "radar/chaff/distance 35 m"),
+        (35.0, "m", "radar/chaff/distance 35.0 m"),
+        ("35", "m", "radar/chaff/distance 35 m"),
+        (0, "m", "radar/chaff/distance 0 m"),
+        (-3, "-", "radar/chaff/distance -3"),
+        ("left-", "-", "radar/chaff/distance left-"),
+        ("left", "", "radar/chaff/distance left"),
+        (False, "-", "radar/chaff/distance False"),
+        (None, "m", "radar/chaff/distance"),
+        ("", "-", "radar/chaff/distance"),
+    ],
+)
+def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
+    """Spec, value and unit; a plain number has no unit, and a fault without a value is its spec."""
+    assert fault_label("radar/chaff/distance", value, unit) == label
+
+
+@pytest.mark.parametrize("value", [35, 35.5, -0.0])
+def test_a_fault_and_its_row_of_the_results_have_the_same_label(
+    experiment: Callable[..., Experiment], record: Callable[..., object], value: float
+) -> None:
+    """Whether it is read from the plan or from results.csv, a fault is called the same."""
+    one = experiment(value=value)
+    assert row_of(one, record(one.id), ("H1",)).fault == one.fault.label  # type: ignore[arg-type]
+
+
+def test_an_experiment_has_one_label(experiment: Callable[..., Experiment]) -> None:
+    """An experiment is named by its fault, value, scenario and trigger, each once."""
+    assert experiment(value=35).label == "radar/chaff/distance 35 m, S1, guided C1"
+    assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
+
+
+def test_nobody_else_strips_a_unit() -> None:
+    """No other module puts value and unit together: that is how six labels came about."""
+    assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []
