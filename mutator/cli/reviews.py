@@ -180,7 +180,7 @@ def _decide(
     if terminal.as_json:
         terminal.emit([view.data(decided, group) for group in groups])
     for group in groups:
-        terminal.say(f"{group.id} {decided.told(group)}", style=view.STYLES[verdict.value])
+        terminal.say(f"{group.id} {decided.describe(group)}", style=view.STYLES[verdict.value])
     terminal.say(f"{short_path(decided.path)}: {view.counts(decided, found.groups)}")
 
 

@@ -7,6 +7,8 @@ from pydantic import Field
 from mutator.config.yaml_files import Keys, Source, StrictModel
 from mutator.model import Anchor, AnchorKind, FaultLocation
 
+PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target does (mutants/probe.py)
+
 
 class AtModel(StrictModel, title="A place"):
     """Exactly one anchor is given. It must be found exactly once in the function, in statement position; if
@@ -56,4 +58,4 @@ class AtModel(StrictModel, title="A place"):
 def dotted_name(text: str) -> bool:
     """Whether `text` is a chain of identifiers that are no keywords and not the probe's name."""
     parts = text.split(".")
-    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != "_fi"
+    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_NAME

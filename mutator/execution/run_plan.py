@@ -29,7 +29,7 @@ def open_frozen(
         approvals = gate.approvals(workspace, plan) if reviewed else None
         folder = freeze_owned(plan, out, workspace)
     if approvals is not None:
-        gate.write(folder.path, approvals)
+        gate.write_approvals(folder.path, approvals)
     return folder
 
 

@@ -11,12 +11,13 @@ from pydantic import Field
 from mutator._common import hashing as ids
 from mutator._common.text import suggestion
 from mutator.config import units
+from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionModel, InjectionSpec
 
 SCHEMA = "fault_model/1"
-PROBE_TEMPLATE = "_fi.py.j2"
+PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
 ParamType = Literal["variable", "import", "number", "integer", "boolean", "seed"]

@@ -174,7 +174,7 @@ def _facts(folder: RunFolder, rows: Sequence[Row], engine: "EngineTold | None") 
     """What the results come from, and what they could be made again with."""
     from mutator.review import gate
 
-    reviewed = gate.told(folder.path)
+    reviewed = gate.approval_summary(folder.path)
     head, versions = folder.head, folder.provenance
     facts = {
         "experiments": f"{len(rows)} of {folder.planned} planned",

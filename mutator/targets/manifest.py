@@ -47,7 +47,7 @@ class TargetManifest:
     name: str
     path: Path  # the manifest file
     root: Path  # absolute source root: goes on sys.path
-    package: str  # the import package in it; the probe becomes <package>/_fi.py
+    package: str  # the import package in it, to which mutants add the probe
     files: tuple[str, ...]  # globs, relative to root: what makes up the tree
     forbid: tuple[str, ...]  # globs: no fault may be injected there
     entry_module: str  # run as `python -m`
@@ -82,11 +82,6 @@ class TargetManifest:
                 remedy="correct `root`, `package` or `files`",
             )
         return tree
-
-    @property
-    def probe_path(self) -> str:
-        """Path of the probe in a mutated tree, relative to its root."""
-        return f"{self.package}/_fi.py"
 
     def arguments(
         self,

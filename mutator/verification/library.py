@@ -13,9 +13,9 @@ from mutator.faults.fault_models import Example, FaultModel, FaultModels
 from mutator.faults.parameters import resolve
 from mutator.faults.specs import READINGS, FaultSpec, Variant
 from mutator.model import Fault
-from mutator.mutants import splicing as splice
-from mutator.mutants.anchors import parse_file
-from mutator.mutants.building import build, injection_edit, unsplice
+from mutator.mutants.anchors import parse_file, parsed
+from mutator.mutants.building import build, injection_edit
+from mutator.mutants.splicing import apply_edits, joined, unsplice
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -96,7 +96,8 @@ def _unbuildable(
     try:
         for i, injection in enumerate(fault.injections):
             keys = (*variant.keys, fault.reading, "injections", i, "at")
-            injection_edit(manifest.tree.parsed(injection.location.path), models, injection, EXAMPLE_TAG)
+            file = parsed(manifest.tree, injection.location.path)
+            injection_edit(file, models, injection, EXAMPLE_TAG)
         keys = (*variant.keys, fault.reading)
         build(manifest, models, fault, always())
     except MutatorError as error:
@@ -155,7 +156,7 @@ def run_example(model: FaultModel, models: FaultModels, example: Example) -> str
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
-    after = splice.joined(splice.apply(file, [edit]))
+    after = joined(apply_edits(file, [edit]))
     if unsplice(after) != file.data:
         raise MutatorError("the example does not un-splice to its `before`")
     return after.decode()

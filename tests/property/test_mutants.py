@@ -1,4 +1,4 @@
-"""Mutants from molds are those of the direct way, byte for byte, for the faults of the paper and others."""
+"""Mutants from reused changes equal spliced ones, byte for byte, for the faults of the paper and others."""
 
 import math
 from dataclasses import replace
@@ -15,6 +15,7 @@ from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.faults.specs import READINGS
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
+from mutator.mutants.anchors import parsed
 from mutator.mutants.building import Mutant, build, build_directly
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import VARIABLES
@@ -81,7 +82,7 @@ def others(draw: st.DrawFn) -> Fault:
     if model.kind is SnippetKind.GUARD:
         kind = AnchorKind(location.anchor.kind.replace("after_", "before_"))
         location = replace(location, anchor=replace(location.anchor, kind=kind))
-    names = sorted(manifest.tree.parsed(location.path).resolve(location).names)
+    names = sorted(parsed(manifest.tree, location.path).resolve(location).names)
     params = tuple((p.name, draw(values(p, names))) for p in model.params)
     return replace(fault, injections=(Injection(location=location, model=model.name, params=params),))
 
@@ -108,16 +109,16 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 
 @settings(max_examples=50, deadline=None)
 @given(varied() | others(), triggers())
-def test_molds_give_what_the_direct_way_gives(fault: Fault, trigger: Trigger) -> None:
+def test_reused_changes_give_what_splicing_gives(fault: Fault, trigger: Trigger) -> None:
     """Files, patch, ids and digest are the same whatever numbers, models and triggers are; errors too."""
-    made(build, fault, trigger)  # leaves a mold, if it is the first of its shape
+    made(build, fault, trigger)  # leaves a reusable change, if it is the first of its kind
     assert made(build, fault, trigger) == made(build_directly, fault, trigger)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", READINGS)
 def test_the_whole_library(reading: str) -> None:
-    """Every mutant of the paper's campaign is the one that the direct way makes."""
+    """Every mutant of the paper's campaign is the one that splicing makes."""
     plan = make_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
     pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
     assert len(pairs) > 6000

@@ -12,7 +12,7 @@ from mutator.faults.expansion import expand
 from mutator.faults.specs import READINGS
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.building import build
-from mutator.review.groups import label, parameters, shapes
+from mutator.review.groups import group_label, parameter_values, shapes
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])
@@ -58,11 +58,11 @@ def test_every_patch_is_given_back(families: list[list[tuple[Fault, Trigger]]]) 
     for family in families:
         for fault, trigger in family:
             patch = build(manifest, models, fault, trigger).patch  # type: ignore[arg-type]
-            made[str(len(made))] = (fault, label(fault, trigger), patch)
+            made[str(len(made))] = (fault, group_label(fault, trigger), patch)
     found = shapes((key, name, patch) for key, (_, name, patch) in made.items())
     assert len(found) == len({name for _, name, _ in made.values()})
     for shape in found:
-        named = shape.named(parameters(made[key][0]) for key in shape.members)
+        named = shape.with_named_holes(parameter_values(made[key][0]) for key in shape.members)
         assert len(set(named.holes)) == len(named.holes)
         for i, key in enumerate(named.members):
             assert named.patch(i) == made[key][2]

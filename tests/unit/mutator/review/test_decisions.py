@@ -1,4 +1,4 @@
-"""The file of decisions: what stands in it is what was said; a mistake is told at its line."""
+"""The file of decisions: it holds what was decided; a mistake is reported at its line."""
 
 import subprocess
 from pathlib import Path
@@ -55,16 +55,16 @@ def test_states(toycar: Workspace) -> None:
     assert states == list(State)
     assert found.in_turn([group("a"), group("b"), group("c")]) == [group("c"), group("b"), group("a")]
     assert (
-        found.told(group("a", other))
+        found.describe(group("a", other))
         == "approved by Jane Doe: fine (changed since: template, target function)"
     )
-    assert (found.told(group("b")), found.told(group("c"))) == ("rejected by Jane", "")
+    assert (found.describe(group("b")), found.describe(group("c"))) == ("rejected by Jane", "")
 
 
 def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
     """A group has one block in the file."""
     found = review(toycar, "a").decided([group("a")], Verdict.REJECTED, "Joe", "no")
-    assert found.told(group("a")) == "rejected by Joe: no"
+    assert found.describe(group("a")) == "rejected by Joe: no"
     assert len(found.decisions) == 1
 
 

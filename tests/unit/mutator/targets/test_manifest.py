@@ -16,7 +16,6 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     """Root, package, entry, channels and the place of observation come from the file."""
     manifest = toy.manifest("toy")
     assert manifest.root == (toy.library.parent / "target").resolve()
-    assert manifest.probe_path == "toycar/_fi.py"
     assert manifest.step_s == 0.1
     assert [(c.name, c.unit, c.tolerance) for c in manifest.compared] == [("speed", "m/s", 0.5)]
     assert manifest.observation.location.anchor.kind is AnchorKind.AFTER_ASSIGN

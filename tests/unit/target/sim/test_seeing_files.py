@@ -19,7 +19,7 @@ from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.compiled_hog import C_SOURCE, made_of
 
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build, write_tree
 from mutator.targets.source_tree import matches
 from mutator.triggers.kinds import at_time
 from mutator.workspace import Workspace
@@ -55,9 +55,9 @@ def drive(tmp_path: Path) -> Drive:
         params = (("by", -1000.0), ("target", name))
         injection = Injection(location=location, model="offset", params=params)
         fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
-        made = mutant.build(manifest, models, fault, at_time(time_s))
+        made = build(manifest, models, fault, at_time(time_s))
         tree, out = tmp_path / made.id, tmp_path / "out"
-        mutant.write_tree(manifest, made, tree)
+        write_tree(manifest, made, tree)
         command = [
             sys.executable,
             "-c",

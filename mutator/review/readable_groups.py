@@ -1,4 +1,4 @@
-"""What fills the holes of a group, and what triggers it, in words: for the terminal and the page."""
+"""Groups for readers, on the terminal and the page: a table of their values, their triggers in words."""
 
 import re
 from collections.abc import Sequence
@@ -8,30 +8,29 @@ from mutator.review.catalogue import Group
 from mutator.review.groups import Shape
 
 _TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
-_NOT_TOLD = re.compile(r"id(_\d+)?\Z")  # ids say nothing to a reader
+_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # ids mean nothing to a reader
 
 
-def values(group: "Group") -> tuple[list[str], list[list[str]]]:
-    """What fills the holes: a row for each fault; the ids in the lines are left out."""
+def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows: what fills the holes, but for ids, a row for each fault."""
     faults = {fault.id: fault for fault in group.faults}
-    names = list(dict.fromkeys(name for shape in group.shapes for name in _told(shape)))
+    names = list(dict.fromkeys(name for shape in group.shapes for name in _shown_holes(shape)))
     rows = []
     for shape in group.shapes:
         for member, filled in zip(shape.members, shape.values, strict=True):
             fault = faults.get(member)
             if fault is not None:
                 found = dict(zip(shape.holes, filled, strict=True))
-                words = [fault.label, fault.reading]
-                rows.append([*words, *(found.get(name, "") for name in names)])
+                rows.append([fault.label, fault.reading, *(found.get(name, "") for name in names)])
     return ["fault", "reading", *names], rows
 
 
-def _told(shape: "Shape") -> list[str]:
-    return [name for name in shape.holes if not _NOT_TOLD.match(name)]
+def _shown_holes(shape: Shape) -> list[str]:
+    return [name for name in shape.holes if not _ID_HOLE.match(name)]
 
 
-def conditions(triggers: Sequence["Trigger"]) -> list[str]:
-    """The conditions, each once, with the names that they have; random times as the span they lie in."""
+def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
+    """Each condition once, with the names of its triggers; random times as one range."""
     named: dict[str, list[str]] = {}
     times: list[float] = []
     for trigger in triggers:

@@ -1,10 +1,10 @@
-"""Texts of one skeleton compile together or not at all."""
+"""Sources with the same normalized source compile together."""
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mutator.mutants.skeletons import compiles, skeleton
+from mutator.mutants.normalized_source import compiles, normalized
 
 NUMBERS = st.one_of(
     st.floats(allow_nan=False, allow_infinity=False).map(lambda x: repr(abs(x))), st.integers(0).map(str)
@@ -30,24 +30,24 @@ IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
     ],
 )
 def test_what_counts_as_a_number(text: str, kept: str) -> None:
-    """Whole decimal literals of a usual length give way to a zero of their kind, and nothing else does."""
-    assert skeleton(text, ()) == kept
+    """Whole decimal literals of a usual length become a zero of their kind; nothing else changes."""
+    assert normalized(text, ()) == kept
 
 
 def test_ids_stay_apart() -> None:
     """Equal ids stay equal and different ones different, whatever they are."""
     ids = ("00000001", "deadbeef")
     text = "a('00000001'); b('deadbeef', '00000001')"
-    assert skeleton(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
-    assert skeleton(text, ids) != skeleton("a('00000001'); b('00000001', 'deadbeef')", ids)
+    assert normalized(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
+    assert normalized(text, ids) != normalized("a('00000001'); b('00000001', 'deadbeef')", ids)
 
 
-def test_what_no_skeleton_can_prove() -> None:
-    """Where it matters which id or number stands there, the skeleton does not compile."""
+def test_where_the_value_matters() -> None:
+    """Where the compiler cares which id or number it is, the normalized source does not compile."""
     assert compiles(b"x = 12345678")
-    assert not compiles(skeleton("x = 12345678", ["12345678"]).encode())
-    assert not compiles(skeleton("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
-    assert not compiles(skeleton(r"x = '\U0000abcd'", ["0000abcd"]).encode())
+    assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
+    assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
+    assert not compiles(normalized(r"x = '\U0000abcd'", ["0000abcd"]).encode())
 
 
 @pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
@@ -55,9 +55,9 @@ def test_what_no_skeleton_can_prove() -> None:
 @given(st.sampled_from(AROUND), NUMBERS)
 @example("x = {}", "07")
 def test_numbers(around: str, number: str) -> None:
-    """Where the skeleton of a text compiles, the text does."""
+    """If the normalized source compiles, so does the source."""
     text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
-    if compiles(skeleton(text, ()).encode()):
+    if compiles(normalized(text, ()).encode()):
         compile(text, "x", "exec")
 
 
@@ -68,7 +68,7 @@ def test_numbers(around: str, number: str) -> None:
 @example("x = {}", "abcdefab")
 @example("x = 1{}", "00000000")
 def test_ids(around: str, name: str) -> None:
-    """The same for ids: with this one in a place, or with any other."""
+    """The same for ids: this one in a place, or any other."""
     text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
-    if compiles(skeleton(text, [name]).encode()):
+    if compiles(normalized(text, [name]).encode()):
         compile(text, "x", "exec")

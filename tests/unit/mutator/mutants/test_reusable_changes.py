@@ -1,4 +1,4 @@
-"""Molds give what splicing gives, in files of every form."""
+"""Reusable changes give what splicing gives, in files of every form."""
 
 import shutil
 from pathlib import Path
@@ -7,11 +7,18 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Value
-from mutator.mutants import splicing as splice
+from mutator.mutants import splicing
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.building import InvalidMutant, build, build_directly
 from mutator.mutants.patches import changed_file
-from mutator.mutants.shapes import Change, Mold, lines_of, proven, shape_of
+from mutator.mutants.reusable_changes import (
+    Change,
+    ReusableChange,
+    always_compiles,
+    inserted_lines,
+    known_changes,
+    reuse_key,
+)
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
@@ -26,33 +33,34 @@ TEXTS = [
 SENSOR = "toycar/sensor.py"
 
 
-def change(text: str, code: str, name: str, guard: bool) -> tuple[Mold, Change, list[bytes], bool]:
-    """A direct change with its mold and lines, and whether the mold is proven."""
+def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange, Change, list[bytes], bool]:
+    """The reusable change, the spliced one, its inserted lines, and whether all of its kind compile."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
     kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
     site = file.resolve(FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name="x")))
-    make = splice.guard if guard else splice.insertion
-    edits = [make(file, site, [code], name), splice.probe_import(file, "pack")]
-    pieces = splice.apply(file, edits)
-    made = Change(data=splice.joined(pieces), patch=changed_file("m.py", pieces))
-    mold = Mold.of(made)
-    return mold, made, lines_of(edits), proven(file, mold, shape_of(file, edits, [name]))
+    make = splicing.guard if guard else splicing.insertion
+    edits = [make(file, site, [code], name), splicing.probe_import(file, "pack")]
+    pieces = splicing.apply_edits(file, edits)
+    made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
+    reusable = ReusableChange.of(made)
+    compiles = always_compiles(file, reusable, reuse_key(file, edits, [name]))
+    return reusable, made, inserted_lines(edits), compiles
 
 
 @pytest.mark.parametrize("guard", [False, True])
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_mold_filled_is_the_change(text: str, guard: bool) -> None:
-    """The mold of one change, filled with the lines of another of its shape, gives the other."""
+def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
+    """The reusable change of one mutant, filled with the lines of another of its kind, equals the other's."""
     code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
-    mold, _, _, good = change(text, code.format("00000001", 3.25), "00000001", guard)
+    reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
-    assert good
-    assert mold == other
-    assert mold.filled(lines) == made
+    assert compiles
+    assert reusable == other
+    assert reusable.filled(lines) == made
 
 
-def test_a_mold_that_proves_nothing_is_not_proven() -> None:
-    """What compiles with these numbers, but not with all, is never taken for proven."""
+def test_a_change_that_compiles_only_with_some_values() -> None:
+    """A change that compiles with these values, but not with all, is not said to compile always."""
     assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
 
 
@@ -73,21 +81,21 @@ def fault(value: Value, **location: object) -> Fault:
     )
 
 
-def test_a_shape_is_made_once(toy: Workspace) -> None:
-    """Another number needs no other mold; a sign or a number that is none does."""
+def test_a_change_is_spliced_once(toy: Workspace) -> None:
+    """Another number reuses the change; a sign, another type or a value that is not finite does not."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
-    molds = manifest.tree.parsed(SENSOR).molds
+    known = known_changes(manifest.tree, SENSOR)
     counts = []
     for value in (1.0, 2.5, 1e-9, -1.0, float("nan"), 3, None):
         assert build(manifest, models, fault(value), always()) == build_directly(
             manifest, models, fault(value), always()
         )
-        counts.append(len(molds))
+        counts.append(len(known))
     assert counts == [1, 1, 1, 2, 3, 4, 5]
 
 
-def test_errors_are_those_of_the_direct_way(toy: Workspace, tmp_path: Path) -> None:
-    """A mutant that cannot be made is refused in the same words, also when its like was made before."""
+def test_errors_are_those_of_splicing(toy: Workspace, tmp_path: Path) -> None:
+    """A mutant that cannot be built gets the same error, even if one of its kind was built before."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
         "match {{ target }}:\n    case {1: a, {{ value }}: b}:\n        {{ target }} = a\n"
