@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from mutator.campaigns.studies import study_names
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.specs import AS_CODED, AS_DESCRIBED
@@ -57,6 +58,7 @@ class Campaign:
 
     `sample` is how many experiments are taken: each variant as often, or, with `proportional`, each fault
     type in each scenario in proportion to its number, guided and random ones in pairs.
+    `study` names the published work that reports of the campaign stand beside (None: none).
     `setting` names changes of the manifest that every run of the campaign is made with.
     `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
@@ -65,6 +67,7 @@ class Campaign:
 
     name: str
     about: str
+    study: str | None
     path: Path
     source: bytes
     target: str
@@ -134,6 +137,7 @@ class CampaignModel(StrictModel):
 
     name: str = Field(pattern=r"^[a-z0-9_]+$")
     about: str
+    study: str | None = None
     target: str
     scenarios: list[str] = Field(min_length=1)
     setting: list[str] = Field(default_factory=list)
@@ -165,10 +169,18 @@ def load_campaign(path: Path) -> Campaign:
                 raise source.error(
                     (key, i), f"'{value}' stands here a second time", remedy="remove one of the two"
                 )
+    if model.study is not None and model.study not in (known := study_names()):
+        raise source.error(
+            ("study",),
+            f"study '{model.study}' is not installed",
+            expected=f"one of {', '.join(known) or 'none'}",
+            remedy="correct the name, or install the package that provides the study",
+        )
     triggers = model.triggers
     return Campaign(
         name=model.name,
         about=model.about.strip(),
+        study=model.study,
         path=path,
         source=path.read_bytes(),
         target=model.target,

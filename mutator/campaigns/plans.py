@@ -252,6 +252,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dic
         "plan": plan.digest,
         "campaign": plan.campaign.name,
         "campaign_digest": digest(plan.campaign.source),
+        "study": plan.campaign.study,
         "target": plan.campaign.target,
         "seed": plan.seed,
         "reading": plan.reading,

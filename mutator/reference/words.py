@@ -133,6 +133,7 @@ ABOUT = {
     "At.nth": "Which of several hits, counted from 1.",
     "Campaign.name": "Its name: small letters, digits and `_`.",
     "Campaign.about": "What it is for.",
+    "Campaign.study": "The [study](../how-to/add-a-study.md) that its reports compare the results with.",
     "Campaign.target": "The target, by the name of its manifest.",
     "Campaign.scenarios": "Names of scenarios, each once.",
     "Campaign.setting": "Changes of the manifest that every run is made with, fault-free ones included.",

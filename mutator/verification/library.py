@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.campaigns.studies import find_study
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
@@ -31,11 +33,9 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 
     Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
     that every spec expands in both readings; that every anchor is found in the target exactly once; that one
-    mutant of every shape compiles and un-splices; that published numbers, if any are cited, agree with one
-    another and with the library; and that a hazard analysis, if there is one, has no gap.
+    mutant of every shape compiles and un-splices; that campaigns load and the studies that they ask for find
+    their data in order; and that a hazard analysis, if there is one, has no gap.
     """
-    from mutator.paper.published_checks import check_paper  # pandas takes long to import
-
     found = _Found()
     manifest = found.tried(lambda: workspace.manifest(target))
     models = found.tried(workspace.fault_models)
@@ -49,7 +49,11 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     if manifest and models and found.tried(lambda: build(manifest, models, None, always())):
         for spec in specs:
             found.problems += check_spec(spec, models, manifest) if spec else ()
-    found.problems += check_paper(workspace)
+    campaigns = [
+        found.tried(partial(load_campaign, workspace.campaign(name))) for name in workspace.campaign_names()
+    ]
+    for study in sorted({campaign.study for campaign in campaigns if campaign and campaign.study}):
+        found.problems += find_study(study).check(workspace)
     if not found.problems:
         checked = found.tried(workspace.specs)
         analysis = found.tried(workspace.analysis)
