@@ -3,17 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
 from mutator.campaigns.studies import study_names
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
-from mutator.faults.specs import AS_CODED, AS_DESCRIBED
+from mutator.faults.readings import FILE, Readings
 from mutator.model import Method
 
 SCHEMA = "campaign/1"
+EVERY_READING = "*"  # whose time is in `armed_after_s` if that is one number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +61,8 @@ class Campaign:
     type in each scenario in proportion to its number, guided and random ones in pairs.
     `study` names the published work that reports of the campaign stand beside (None: none).
     `setting` names changes of the manifest that every run of the campaign is made with.
-    `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
+    `reading` is None for the library's default. Before `armed_after(reading)` no trigger fires and no random
+    time is drawn.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
     random time to the end).
     """
@@ -74,7 +76,7 @@ class Campaign:
     scenarios: tuple[str, ...]
     setting: tuple[str, ...]
     faults: tuple[Selection, ...]
-    reading: str
+    reading: str | None
     methods: tuple[Method, ...]
     table: str
     rows: tuple[str, ...] | None
@@ -89,6 +91,11 @@ class Campaign:
     chunk: int
     yaml: Source
 
+    def armed_after(self, reading: str) -> float:
+        """When triggers are armed under a reading."""
+        times = self.armed_after_s
+        return times[reading] if reading in times else times[EVERY_READING]
+
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
         """An error (not raised) that points into the campaign file."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
@@ -99,21 +106,28 @@ class _SelectionModel(StrictModel):
     values: int | None = Field(None, ge=1)
 
 
-class _ArmingModel(StrictModel):
-    as_described: float = Field(ge=0.0, allow_inf_nan=False)
-    as_coded: float = Field(ge=0.0, allow_inf_nan=False)
+_Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_SECONDS = {"type": "number", "minimum": 0.0}
 
 
 class _TriggersModel(StrictModel):
     table: str
     rows: list[str] | None = Field(None, min_length=1)
-    armed_after_s: _ArmingModel
+    armed_after_s: Annotated[
+        dict[str, _Seconds],
+        WithJsonSchema({"anyOf": [_SECONDS, {"type": "object", "additionalProperties": _SECONDS}]}),
+    ] = Field(min_length=1)
     random_until_s: float = Field(gt=0.0, allow_inf_nan=False)
     hold_s: float | None = Field(None, gt=0.0, allow_inf_nan=False)
 
+    @field_validator("armed_after_s", mode="before")
+    @classmethod
+    def _by_reading(cls, given: object) -> object:
+        return given if isinstance(given, dict) else {EVERY_READING: given}
+
     @model_validator(mode="after")
     def _check(self) -> "_TriggersModel":
-        if self.random_until_s <= max(self.armed_after_s.as_described, self.armed_after_s.as_coded):
+        if self.random_until_s <= max(self.armed_after_s.values()):
             raise ValueError("random_until_s must be later than armed_after_s")
         return self
 
@@ -137,12 +151,14 @@ class CampaignModel(StrictModel):
 
     name: str = Field(pattern=r"^[a-z0-9_]+$")
     about: str
-    study: str | None = None
+    study: str | None = Field(
+        None, description="The [study](../how-to/add-a-study.md) that its reports compare the results with."
+    )
     target: str
     scenarios: list[str] = Field(min_length=1)
     setting: list[str] = Field(default_factory=list)
     faults: list[_SelectionModel] = Field(min_length=1)
-    reading: Literal["as_described", "as_coded"] = "as_described"
+    reading: str | None = None
     methods: list[Literal["guided", "random"]] = Field(min_length=1)
     triggers: _TriggersModel
     sample: int | None = Field(None, ge=1)
@@ -191,10 +207,7 @@ def load_campaign(path: Path) -> Campaign:
         methods=tuple(Method(name) for name in model.methods),
         table=triggers.table,
         rows=tuple(triggers.rows) if triggers.rows else None,
-        armed_after_s={
-            AS_DESCRIBED: triggers.armed_after_s.as_described,
-            AS_CODED: triggers.armed_after_s.as_coded,
-        },
+        armed_after_s=triggers.armed_after_s,
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
         sample=model.sample,
@@ -205,3 +218,27 @@ def load_campaign(path: Path) -> Campaign:
         chunk=model.chunk,
         yaml=source,
     )
+
+
+def check_readings(campaign: Campaign, readings: Readings) -> None:
+    """MutatorError with file and line for a reading that the library does not declare, or for one that
+    `armed_after_s` leaves out."""
+    known, keys = ", ".join(readings.names), ("triggers", "armed_after_s")
+    remedy = f"correct the name, or declare the reading in the library's {FILE}"
+    if campaign.reading is not None and campaign.reading not in readings.names:
+        raise campaign.error(
+            ("reading",), f"reading '{campaign.reading}'", expected=f"one of {known}", remedy=remedy
+        )
+    if EVERY_READING in campaign.armed_after_s:
+        return
+    for name in campaign.armed_after_s:
+        if name not in readings.names:
+            raise campaign.error(
+                (*keys, name), f"reading '{name}'", expected=f"one of {known}", remedy=remedy
+            )
+    for name in readings.names:
+        if name not in campaign.armed_after_s:
+            remedy = f"add `{name}: ...`, or write one number for all of them"
+            raise campaign.error(
+                keys, f"no time for reading '{name}'", expected=f"one for each of {known}", remedy=remedy
+            )

@@ -23,13 +23,14 @@ SECTIONS = {
         "ranges [15, 24], [25, 34] ... [245, 254]; one value is drawn from each, both ends included.",
     ),
     "Reading": ("A reading", ""),
+    "Readings": ("readings.yaml", ""),
+    "DeclaredReading": ("A declared reading", ""),
     "Campaign": ("The file", ""),
     "Selection": ("A selection", "Faults of the library, by the names of their specs."),
     "Triggers": (
         "Triggers",
         "Guided experiments wait for the contexts of a table, random ones for a time that is drawn.",
     ),
-    "Arming": ("Arming", "In seconds since the start of a run, for each reading."),
     "Canary": (
         "The canary",
         "A fault known to be harmful. It must reach its hazard, or the campaign does not start.",
@@ -103,8 +104,6 @@ ABOUT = {
     "Variant.hold": "How long the fault stays active, where it does not follow the trigger: "
     "`to_end` for a fault that latches.",
     "Variant.draw": "One draw: name and unit -> draw. Without it the variant is a single fault.",
-    "Variant.as_described": "The injections in the reading of the text.",
-    "Variant.as_coded": "The injections in the reading of the code, where they differ.",
     "Draw.integers_from": "One whole number from each range of a sweep.",
     "Draw.reals_from": "One number from each range of a sweep.",
     "Draw.decimals": "Round numbers of `reals_from` to so many decimals.",
@@ -133,12 +132,11 @@ ABOUT = {
     "At.nth": "Which of several hits, counted from 1.",
     "Campaign.name": "Its name: small letters, digits and `_`.",
     "Campaign.about": "What it is for.",
-    "Campaign.study": "The [study](../how-to/add-a-study.md) that its reports compare the results with.",
     "Campaign.target": "The target, by the name of its manifest.",
     "Campaign.scenarios": "Names of scenarios, each once.",
     "Campaign.setting": "Changes of the manifest that every run is made with, fault-free ones included.",
     "Campaign.faults": "Which faults; each selection adds some.",
-    "Campaign.reading": "Which of the two [readings](../explanation/concepts.md#readings); "
+    "Campaign.reading": "One of the library's [readings](fault-spec.md#readings); without it, the first. "
     "`--reading` overrides it.",
     "Campaign.methods": "`guided`, `random` or both.",
     "Campaign.triggers": "When faults become active.",
@@ -153,13 +151,12 @@ ABOUT = {
     "Selection.values": "How many of each variant's values, spread evenly; without it, all.",
     "Triggers.table": "A context table, by its name.",
     "Triggers.rows": "Which of its contexts; without it, all.",
-    "Triggers.armed_after_s": "Before that time no trigger fires and no random time is drawn.",
+    "Triggers.armed_after_s": "Before that time no trigger fires and no random time is drawn, in s since the "
+    "start of a run: one number, or one for each reading by its name.",
     "Triggers.random_until_s": "The latest random time. One past the end of a scenario never comes.",
     "Triggers.hold_s": "How long a fault stays active once triggered; without it, while its context "
     "holds, or "
     "from its random time to the end.",
-    "Arming.as_described": "With the reading of the text.",
-    "Arming.as_coded": "With the reading of the code.",
     "Canary.spec": "A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken.",
     "Canary.scenario": "The scenario.",
     "Canary.hazard": "The hazard that must come.",

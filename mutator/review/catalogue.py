@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from mutator._common.hashing import content_id
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
-from mutator.faults.specs import READINGS, FaultSpec
+from mutator.faults.specs import FaultSpec
 from mutator.model import Fault, FaultLocation, Injection, Trigger
 from mutator.mutants.building import OBSERVE_TAG, build
 from mutator.mutants.splicing import PROBE_TAG
@@ -97,13 +97,14 @@ def of_library(
     manifest: TargetManifest,
     *,
     specs: Sequence[str] = (),
-    readings: Sequence[str] = READINGS,
+    reading: str | None = None,
     seed: int = 0,
 ) -> tuple[Group, ...]:
     """The groups of the library's faults; the probe's comes last.
 
     Under every context of its tables, and at a random time: what campaigns make of them, but for those that
-    say how long a fault stays. `specs` are spec files or globs over specs (none: all); MutatorError for one
+    say how long a fault stays. Without
+    `reading` they are in every reading. `specs` are spec files or globs over specs (none: all); MutatorError for one
     that matches nothing.
     """
     models = workspace.fault_models()
@@ -113,8 +114,8 @@ def of_library(
     faults = [
         fault
         for spec in _specs(workspace, specs)
-        for reading in readings
-        for fault in expand(spec, seed, reading, models=models, manifest=manifest)
+        for name in ((reading,) if reading else spec.readings.names)
+        for fault in expand(spec, seed, name, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
     return _Catalogue(models, manifest).groups(members, None)

@@ -13,10 +13,11 @@ from mutator.cli.main import GROUPS, app
 from mutator.config import yaml_files as yamlio
 from mutator.reference import words
 from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files
-from mutator.reference.schemas import FORMATS, Format, definitions
+from mutator.reference.schemas import Format, definitions, file_formats, short_name
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
+FORMATS = file_formats(Workspace.find(CLONE).readings())
 CHAFF = CLONE / "fault_library" / "faults" / "radar" / "chaff.yaml"
 
 
@@ -26,6 +27,13 @@ def validator(kind: str) -> jsonschema.Draft7Validator:
 
 def told(kind: Format) -> dict[str, dict[str, Any]]:
     return {name: part for name, part in definitions(kind.model).items() if "properties" in part}
+
+
+def described(kind: Format) -> dict[str, Any]:
+    """The parts of a file as its model describes them itself."""
+    whole = kind.model.model_json_schema()
+    parts = {kind.model.__name__: whole} | whole.get("$defs", {})
+    return {short_name(name): part for name, part in parts.items() if "properties" in part}
 
 
 @pytest.mark.parametrize(
@@ -61,7 +69,15 @@ def test_every_key_is_told_and_none_that_is_gone() -> None:
     """The words know exactly the models and keys of the file formats."""
     parts = {name: part for kind in FORMATS for name, part in told(kind).items()}
     assert {*words.SECTIONS} == {*parts}
-    assert {*words.ABOUT} == {f"{name}.{key}" for name, part in parts.items() for key in part["properties"]}
+    own = {
+        f"{name}.{key}"
+        for kind in FORMATS
+        for name, part in described(kind).items()
+        for key, value in part["properties"].items()
+        if "description" in value
+    }
+    keys = {f"{name}.{key}" for name, part in parts.items() for key in part["properties"]}
+    assert {*words.ABOUT} == keys - own
 
 
 def test_every_verb_is_in_a_group() -> None:
