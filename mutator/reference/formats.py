@@ -105,9 +105,10 @@ def _readings() -> Iterator[str]:
     yield "## Readings\n"
     yield (
         "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
-        "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has one, "
-        f"`{UNDECLARED.default}`. The first one is the\ndefault: every variant is written in it, and it "
-        f"holds where another is not written. The first key of the file is `schema: {READINGS_SCHEMA}`.\n"
+        "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
+        f"one, `{UNDECLARED.default}`. The first is the\ndefault: every variant is written in it, and it "
+        "holds where another is not written. The first key of the file is\n"
+        f"`schema: {READINGS_SCHEMA}`.\n"
     )
     yield from sections("fault-spec.md", ReadingsModel, below=2)
 

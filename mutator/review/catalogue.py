@@ -103,9 +103,8 @@ def of_library(
     """The groups of the library's faults; the probe's comes last.
 
     Under every context of its tables, and at a random time: what campaigns make of them, but for those that
-    say how long a fault stays. Without
-    `reading` they are in every reading. `specs` are spec files or globs over specs (none: all); MutatorError for one
-    that matches nothing.
+    say how long a fault stays; without `reading` in every reading of the library. `specs` are spec files or
+    globs over specs (none: all); MutatorError for one that matches nothing.
     """
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_table_names())
