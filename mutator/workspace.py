@@ -7,6 +7,7 @@ from pathlib import Path
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.faults.readings import Readings, load_readings
 from mutator.faults.specs import FaultSpec, load_spec
 from mutator.outcomes.columns import check_names
 from mutator.stpa.analysis import Analysis, load_analysis
@@ -63,17 +64,22 @@ class Workspace:
         """The fault models of the templates folder."""
         return load_fault_models(self.templates)
 
+    def readings(self) -> Readings:
+        """The readings that the library declares."""
+        return load_readings(self.library)
+
     def spec_files(self) -> tuple[Path, ...]:
         """Every fault spec of the library, sorted."""
         return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
         """The spec `<module>/<fault_type>`, or the spec file of that path."""
-        return load_spec(self._file("faults", name, "fault spec"))
+        return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
         """All specs of the library, in the order of `spec_files`; each is at `<module>/<fault_type>.yaml`."""
-        specs = tuple(load_spec(path) for path in self.spec_files())
+        readings = self.readings()
+        specs = tuple(load_spec(path, readings) for path in self.spec_files())
         for spec in specs:
             expected = self.library / "faults" / f"{spec.name}.yaml"
             if spec.path != expected:

@@ -9,7 +9,7 @@ from typing import Any
 from mutator._common.files import is_half_written, make_folder, write_atomic, write_json
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
-from mutator.campaigns.campaign_files import Campaign, load_campaign
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
@@ -17,6 +17,7 @@ from mutator.campaigns.provenance import check_sources, sources, versions
 from mutator.campaigns.sampling import pick, pick_in_proportion
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
+from mutator.faults.readings import Readings
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file as planfile
@@ -113,8 +114,10 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     loaded = load_campaign(workspace.campaign(campaign))
     choices = choices or Choices()
     seed = loaded.seed if choices.seed is None else choices.seed
-    reading = choices.reading or loaded.reading
-    _check(choices, loaded)
+    readings = workspace.readings()
+    check_readings(loaded, readings)
+    reading = choices.reading or loaded.reading or readings.default
+    _check(choices, readings)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
     once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
@@ -140,10 +143,9 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     )
 
 
-def _check(choices: Choices, campaign: Campaign) -> None:
-    if choices.reading is not None and choices.reading not in campaign.armed_after_s:
-        known = " or ".join(campaign.armed_after_s)
-        raise MutatorError(f"reading '{choices.reading}'", expected=known, remedy="correct --reading")
+def _check(choices: Choices, readings: Readings) -> None:
+    if choices.reading is not None:
+        readings.check(choices.reading)
     for name in ("seed", "limit"):
         value = getattr(choices, name)
         if value is not None and value < (name == "limit"):
@@ -246,6 +248,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dic
         "plan": plan.digest,
         "campaign": plan.campaign.name,
         "campaign_digest": digest(plan.campaign.source),
+        "study": plan.campaign.study,
         "target": plan.campaign.target,
         "seed": plan.seed,
         "reading": plan.reading,

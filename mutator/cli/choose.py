@@ -33,14 +33,12 @@ class FaultChoice:
     ) -> tuple["Fault", ...]:
         """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line."""
         from mutator.faults.expansion import expand
-        from mutator.faults.specs import AS_DESCRIBED
         from mutator.verification.library import check_spec
 
         spec = self._narrowed(workspace.spec(self.spec))
         for problem in check_spec(spec, models, manifest):
             raise problem
-        reading = self.reading or AS_DESCRIBED
-        return expand(spec, self.seed or 0, reading, models=models, manifest=manifest)
+        return expand(spec, self.seed or 0, self.reading, models=models, manifest=manifest)
 
     def _narrowed(self, spec: "FaultSpec") -> "FaultSpec":
         variants = tuple(v for v in spec if self.variant in (None, v.name))

@@ -43,14 +43,13 @@ class Wanted:
                 groups = catalogue.of_plan(workspace, plan)
             else:
                 from mutator.cli.choose import target_name
-                from mutator.faults.specs import READINGS
 
                 target = target_name(workspace, self.manifest)
                 groups = catalogue.of_library(
                     workspace,
                     workspace.manifest(target),
                     specs=self.specs,
-                    readings=(self.reading,) if self.reading else READINGS,
+                    reading=self.reading,
                     seed=self.seed or 0,
                 )
         manifest = workspace.manifest(target)

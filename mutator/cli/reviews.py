@@ -40,7 +40,7 @@ Remark = Annotated[str, typer.Option(metavar="TEXT", help="Kept with the decisio
 EXAMPLES = """\b
 Examples:
   mutator review                                   all of the library: new and changed groups first
-  mutator review --campaign paper_smoke            what one campaign runs
+  mutator review --campaign quickstart             what one campaign runs
   mutator review --only 'state == "new" and match(file, "*radar*")'
   mutator review show 3f9a                         one group: diff with holes, values
   mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"

@@ -3,20 +3,19 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from mutator.config import units
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.faults.readings import Readings
 from mutator.model import Hold
 
 SCHEMA = "fault_spec/1"
-AS_DESCRIBED = "as_described"
-AS_CODED = "as_coded"
-READINGS = (AS_DESCRIBED, AS_CODED)
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
@@ -46,7 +45,7 @@ class Draw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """One row of the library: injections that share a trigger and a draw, in one or both readings."""
+    """One row of the library: injections that share a trigger and a draw, by reading, the default first."""
 
     name: str
     aim: str
@@ -58,8 +57,9 @@ class Variant:
     keys: Keys
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
-        """The injections under `reading`; a variant without `as_coded` is the same in both."""
-        return self.readings.get(reading, self.readings[AS_DESCRIBED])
+        """The injections under `reading`; where it is not written, those of the default."""
+        default = next(iter(self.readings.values()))
+        return self.readings.get(reading, default)
 
     @property
     def count(self) -> int:
@@ -75,6 +75,7 @@ class FaultSpec:
     fault_type: str
     about: str
     variants: tuple[Variant, ...]
+    readings: Readings  # of the library
     source: Source
 
     @property
@@ -146,7 +147,7 @@ class _ReadingModel(StrictModel, title="A reading"):
     )
 
 
-class _VariantModel(StrictModel, title="A variant"):
+class _VariantBase(StrictModel, title="A variant"):
     """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
 
     aim: str = Field(description="The hazard it aims at, one of the target's.")
@@ -164,35 +165,51 @@ class _VariantModel(StrictModel, title="A variant"):
     draw: dict[str, _DrawModel] | None = Field(
         None, description="One draw: name and unit -> draw. Without it the variant is a single fault."
     )
-    as_described: _ReadingModel = Field(description="The injections in the reading of the text.")
-    as_coded: _ReadingModel | None = Field(
-        None, description="The injections in the reading of the code, where they differ."
-    )
 
 
 class SpecModel(StrictModel, title="The file"):
     """A fault type of a module, in one or more variants."""
 
+    # its `variants` come with the readings of a library: see `spec_model`
+
     module: str = Field(description="The module of the controller that the fault is in.")
     fault_type: str = Field(description="The name of the fault type; with the module the name of the spec.")
     about: str = Field(description="What goes wrong, in a sentence.")
-    variants: dict[str, _VariantModel] = Field(description="Name of the variant -> variant; at least one.")
 
 
-def load_spec(path: Path) -> FaultSpec:
-    """Read one spec strictly (file:line errors). Models, ranges and anchors are checked by `expand`."""
-    model, source = read(path, SpecModel, SCHEMA)
+@cache
+def spec_model(readings: Readings) -> type[SpecModel]:
+    """The shape of the spec files of a library: its variants have a key for each of its readings."""
+    keys: dict[str, Any] = {}
+    for name, about in zip(readings.names, readings.about, strict=True):
+        required = name == readings.default
+        kind = _ReadingModel if required else _ReadingModel | None
+        keys[name] = (kind, Field(... if required else None, description=about))
+    variant = create_model("_VariantModel", __base__=_VariantBase, **keys)
+    variants = Field(description="Name of the variant -> variant; at least one.")
+    return create_model(
+        "SpecModel",
+        __base__=SpecModel,
+        variants=(dict[str, variant], variants),  # type: ignore[valid-type]
+    )
+
+
+def load_spec(path: Path, readings: Readings) -> FaultSpec:
+    """Read one spec of a library strictly (file:line errors); see `expand` for what is checked later."""
+    model, source = read(path, spec_model(readings), SCHEMA)
+    models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
         _check_name(getattr(model, key), source, (key,))
-    if not model.variants:
+    if not models:
         raise source.error(("variants",), "no variant", expected="at least one", remedy="describe a fault")
     name = f"{model.module}/{model.fault_type}"
-    variants = tuple(_variant(name, key, variant, source) for key, variant in model.variants.items())
+    variants = tuple(_variant(name, key, variant, readings, source) for key, variant in models.items())
     return FaultSpec(
         module=model.module,
         fault_type=model.fault_type,
         about=model.about,
         variants=variants,
+        readings=readings,
         source=source,
     )
 
@@ -202,12 +219,10 @@ def _check_name(name: str, source: Source, keys: Keys) -> None:
         raise source.error(keys, f"'{name}'", expected="small letters, digits and _", remedy="rename it")
 
 
-def _variant(spec: str, name: str, model: _VariantModel, source: Source) -> Variant:
+def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: Source) -> Variant:
     keys: Keys = ("variants", name)
     _check_name(name, source, keys)
-    readings = {AS_DESCRIBED: _injections(model.as_described, source, (*keys, AS_DESCRIBED))}
-    if model.as_coded:
-        readings[AS_CODED] = _injections(model.as_coded, source, (*keys, AS_CODED))
+    written: dict[str, _ReadingModel | None] = {name: getattr(model, name) for name in readings.names}
     return Variant(
         name=name,
         aim=model.aim,
@@ -215,7 +230,9 @@ def _variant(spec: str, name: str, model: _VariantModel, source: Source) -> Vari
         draw=_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw")) if model.draw is not None else None,
         hold=Hold(model.hold) if model.hold else None,
         changes=tuple(model.changes),
-        readings=readings,
+        readings={
+            reading: _injections(one, source, (*keys, reading)) for reading, one in written.items() if one
+        },
         keys=keys,
     )
 

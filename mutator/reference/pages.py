@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mutator.reference import cli, formats, models, recorded
-from mutator.reference.schemas import FORMATS, editor_schema
+from mutator.reference.schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
 
 FOLDER = Path("docs") / "reference"
@@ -26,7 +26,7 @@ def generated_files(workspace: Workspace) -> dict[Path, str]:
     """Path, relative to the clone, and text of each."""
     files = {FOLDER / name: make(workspace) for name, make in PAGES.items()}
     known = workspace.fault_models()
-    for kind in FORMATS:
+    for kind in file_formats(workspace.readings()):
         text = json.dumps(editor_schema(kind, known), indent=1, ensure_ascii=False)
         files[SCHEMAS / f"{kind.name}.json"] = text + "\n"
     return files

@@ -11,10 +11,11 @@ from typing import Any
 from mutator.campaigns import campaign_files as campaign
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
-from mutator.faults import fault_models
+from mutator.faults import fault_models, readings
 from mutator.faults import specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS
+from mutator.faults.readings import Readings
 from mutator.stpa import analysis as stpa_analysis
 from mutator.stpa import context_tables as stpa
 from mutator.targets import manifest
@@ -49,7 +50,7 @@ class Format:
 
 
 _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
-    (spec.SpecModel, spec.SCHEMA, "faults/*/*.yaml"),
+    (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
     (campaign.CampaignModel, campaign.SCHEMA, "campaigns/*.yaml"),
     (manifest.ManifestModel, manifest.SCHEMA, "targets/*.yaml"),
     (stpa.HazardsModel, stpa.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
@@ -58,10 +59,15 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (stpa_analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
     (stpa_analysis.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
 )
-FORMATS = (
-    *(Format(model=model, schema=schema, files=f"fault_library/{files}") for model, schema, files in _FILES),
-    Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
-)
+
+
+def file_formats(declared: Readings) -> tuple[Format, ...]:
+    """The kinds of YAML files of a library that declares these readings, and of templates."""
+    specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
+    return (
+        *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
+        Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
+    )
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
@@ -115,6 +121,8 @@ def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
     parts = definitions(kind.model)
     if "Injection" in parts:
         _with_models(parts["Injection"], models)
+    if "Variant" in parts:  # another library may declare other readings
+        parts["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
     for part in parts.values():
         part.pop("title", None)
         part.pop("description", None)

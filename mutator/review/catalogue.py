@@ -16,7 +16,7 @@ from mutator._common.hashing import content_id
 from mutator.campaigns.plans import Plan
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
-from mutator.faults.specs import READINGS, FaultSpec
+from mutator.faults.specs import FaultSpec
 from mutator.model import Fault, FaultLocation, Injection, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.probe import adds_fault
@@ -94,14 +94,14 @@ def of_library(
     manifest: TargetManifest,
     *,
     specs: Sequence[str] = (),
-    readings: Sequence[str] = READINGS,
+    reading: str | None = None,
     seed: int = 0,
 ) -> tuple[Group, ...]:
     """The groups of the library's faults; the probe's comes last.
 
     Each fault is built under every context of the tables and at a random time, as campaigns do that leave
-    open how long a fault stays. `specs` are spec files or globs over specs (none: all); MutatorError for one
-    that matches nothing.
+    open how long a fault stays; without `reading`, in every reading of the library. `specs` are spec files or
+    globs over specs (none: all); MutatorError for one that matches nothing.
     """
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_table_names())
@@ -110,8 +110,8 @@ def of_library(
     faults = [
         fault
         for spec in _specs(workspace, specs)
-        for reading in readings
-        for fault in expand(spec, seed, reading, models=models, manifest=manifest)
+        for name in ((reading,) if reading else spec.readings.names)
+        for fault in expand(spec, seed, name, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
     return _Catalogue(models, manifest).groups(members, None)

@@ -20,7 +20,8 @@ from typing import Any
 import pytest
 
 from mutator.reference.pages import SCHEMAS
-from mutator.reference.schemas import FORMATS
+from mutator.reference.schemas import file_formats
+from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
@@ -223,7 +224,10 @@ def test_editors_are_told_of_every_schema() -> None:
     """The settings that the guide prints map each schema to the files that it is made for."""
     page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
     [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
-    expected = {f"./{SCHEMAS.as_posix()}/{kind.name}.json": kind.files for kind in FORMATS}
+    expected = {
+        f"./{SCHEMAS.as_posix()}/{kind.name}.json": kind.files
+        for kind in file_formats(Workspace.find(root=CLONE).readings())
+    }
     expected[f"./{SCHEMAS.as_posix()}/scenario.json"] = "fault_library/scenarios/*.yaml"
     assert settings["yaml.schemas"] == expected
 

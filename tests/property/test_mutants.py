@@ -13,7 +13,6 @@ from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
-from mutator.faults.specs import READINGS
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed
 from mutator.mutants.building import Mutant, build, build_directly
@@ -22,6 +21,7 @@ from mutator.triggers.conditions import VARIABLES
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
+READINGS = Workspace.find(root=ROOT).readings().names
 NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 35.0, 1e22, 5e-324, math.nan, math.inf])
 CONDITIONS = st.one_of(
     st.floats(-1e3, 1e9).map(lambda t: f"t >= {t!r}"),
@@ -44,7 +44,10 @@ def faults() -> list[Fault]:
     manifest, models = paper()
     specs = Workspace.find(root=ROOT).specs()
     return [
-        f for r in READINGS for spec in specs for f in expand(spec, 1, r, models=models, manifest=manifest)
+        fault
+        for reading in READINGS
+        for spec in specs
+        for fault in expand(spec, 1, reading, models=models, manifest=manifest)
     ]
 
 

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.faults.expansion import expand
-from mutator.faults.specs import READINGS
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.building import build
 from mutator.review.groups import group_label, parameter_values, shapes
@@ -25,7 +24,7 @@ def setting() -> tuple[object, object, list[Fault]]:
     """Target, models, and one fault of each variant in both readings."""
     manifest, models = WORKSPACE.manifest("openpilot"), WORKSPACE.fault_models()
     found = {}
-    for reading in READINGS:
+    for reading in WORKSPACE.readings().names:
         for spec in WORKSPACE.specs():
             for fault in expand(spec, 1, reading, models=models, manifest=manifest):
                 found[reading, fault.spec] = fault

@@ -11,13 +11,14 @@ from typer.main import get_command
 
 from mutator.cli.main import GROUPS, app
 from mutator.config import yaml_files as yamlio
-from mutator.faults.specs import SpecModel
+from mutator.faults.specs import spec_model
 from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files
-from mutator.reference.schemas import FORMATS, Format, definitions
+from mutator.reference.schemas import Format, definitions, file_formats, short_name
 from mutator.reference.tables import reading_order
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
+FORMATS = file_formats(Workspace.find(CLONE).readings())
 CHAFF = CLONE / "fault_library" / "faults" / "radar" / "chaff.yaml"
 
 
@@ -27,6 +28,13 @@ def validator(kind: str) -> jsonschema.Draft7Validator:
 
 def told(kind: Format) -> dict[str, dict[str, Any]]:
     return {name: part for name, part in definitions(kind.model).items() if "properties" in part}
+
+
+def described(kind: Format) -> dict[str, Any]:
+    """The parts of a file as its model describes them itself."""
+    whole = kind.model.model_json_schema()
+    parts = {kind.model.__name__: whole} | whole.get("$defs", {})
+    return {short_name(name): part for name, part in parts.items() if "properties" in part}
 
 
 @pytest.mark.parametrize(
@@ -71,7 +79,7 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
 
 def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
     """The file's own model first, then those of its keys, each where it is first needed."""
-    names = reading_order(definitions(SpecModel))
+    names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 

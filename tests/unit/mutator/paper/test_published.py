@@ -1,4 +1,4 @@
-"""The paper's counts, as cited, and its tables beside ours."""
+"""The paper's counts, as cited, and tables that show them beside ours."""
 
 import csv
 import io
@@ -8,9 +8,10 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.paper.published import Paper, load_paper
-from mutator.paper.published_tables import coverage_sheet, summary_sheet
-from mutator.statistics.frame import load
+from mutator.statistics import compare
+from mutator.statistics.compare_tables import kinds_sheet, overall_sheet
 from mutator.statistics.share import share
+from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tally import Tally, by_kind, by_scenario, total
 
 from ..statistics.results_frame import results
@@ -61,17 +62,10 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
     assert rates == [35.8, 29.0, 23.3, 29.0]
 
 
-def test_wilson_interval_of_a_published_example() -> None:
-    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3); none of 20 begins at zero."""
-    assert str(share(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
-    assert share(0, 20).low == 0
-    assert str(share(0, 0)) == "- (0/0)"
-
-
 def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
     """Ours is counted by scenario and beneath the paper's; what the paper does not have is left empty."""
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
-    lines = summary_sheet("guided", by_scenario(frame), paper).table().rows
+    lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
     assert hazards[0][:3] == ["paper", "35.1 % (215/613; 31.4 to 38.9)", "-"]
     assert hazards[1][0] == "here"
@@ -87,43 +81,21 @@ def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
 def test_coverage_has_both_denominators(paper: Paper) -> None:
     """Hazards are divided by the activated and by the injected faults; types follow the paper's order."""
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
-    sheet = coverage_sheet("guided", by_kind(frame), paper)
+    sheet = coverage_sheet("guided", by_kind(frame), paper.published())
     kinds = [line[0] for line in sheet.lines]
     assert kinds == [k for k in ("radar/chaff", "radar/jamming", "radar/zeta", "total") for _ in range(2)]
     chaff = sheet.table().rows[1]
     assert [cell.split(";")[0] for cell in chaff[2:]] == ["50.0 % (1/2", "100.0 % (1/1", "50.0 % (1/2"]
 
 
-def test_a_table_without_the_paper_has_only_ours() -> None:
-    """Fault types that the paper does not know make tables without empty lines, which do not speak of it."""
-    coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
-    assert [line[1] for line in coverage.lines] == ["here", "here"]
-    summary = summary_sheet("guided", by_scenario(results(HIT)), None)
-    assert "paper" not in coverage.markdown() + summary.markdown()
-
-
 def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
     """Count, whole, rate and interval can be computed with; a cell that is not known is empty."""
-    sheet = coverage_sheet("guided", by_kind(results(HIT)), paper)
+    sheet = coverage_sheet("guided", by_kind(results(HIT)), paper.published())
     lines = list(csv.DictReader(io.StringIO(sheet.csv())))
     assert lines[0]["hazards/activated: count"] == "154"
     assert lines[0]["hazards/activated: of"] == "432"
     assert float(lines[0]["hazards/activated: rate"]) == pytest.approx(154 / 432, abs=1e-6)
     assert "| radar/chaff | paper |" in sheet.markdown()
-
-
-def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
-    """What says nothing about its fault is left out; a crash does not count as activated by itself."""
-    frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
-    assert by_scenario(frame)["guided", "S1"] == Tally(
-        injected=2,
-        activated=1,
-        manifested=1,
-        hazards=1,
-        alerts=0,
-        hazards_no_alerts=1,
-        alerts_no_hazards=0,
-    )
 
 
 def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Path) -> None:
@@ -136,10 +108,24 @@ def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Pa
         load_paper(tmp_path)
 
 
-def test_a_file_that_is_no_results_table_is_told(tmp_path: Path) -> None:
-    """A missing file and a missing column are the user's error, with the file's name."""
-    with pytest.raises(MutatorError, match=r"results\.csv"):
-        load(tmp_path / "results.csv")
-    (tmp_path / "results.csv").write_text("experiment_id,fault_id\n1,2\n")
-    with pytest.raises(MutatorError, match="no column 'module'"):
-        load(tmp_path / "results.csv")
+def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
+    """Held constant over fault types, guided faults are the more hazardous ones per activated fault only."""
+    activated, injected = (
+        compare.mantel_haenszel(compare.strata(paper.coverage, whole)) for whole in compare.WHOLES
+    )
+    assert activated.strata == injected.strata == 17
+    assert injected.high < 1
+    assert injected.p < 1e-6
+    assert activated.low > 1
+
+
+def test_the_sheets_tell_both_wholes_for_paper_and_here(paper: Paper) -> None:
+    """Per activated and per injected fault, the paper's counts are put to the same tests as ours."""
+    frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
+    overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
+    assert [line[:2] for line in overall.lines] == [
+        (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")
+    ]
+    assert str(overall.lines[0][2]).startswith("35.8 % (1316/3678")
+    assert len(kinds.lines) == 2 * (17 + 1)
+    assert all(line[-1] >= line[-2] for line in kinds.lines)  # type: ignore[operator]

@@ -11,9 +11,9 @@ import pytest
 
 from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
-from mutator.figures.actions import WANTED, Pair, Wanted
-from mutator.figures.figures import Drawing, write
-from mutator.report.examples import candidates, drawings
+from mutator.figures.figures import Drawing, write_drawings
+from mutator.paper.actions import WANTED, Pair, Wanted
+from mutator.paper.examples import candidates, example_drawings
 from mutator.statistics.frame import load
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -56,7 +56,7 @@ def drawn(place: Path, wanted: Wanted) -> Drawing:
     toy = place / "toy"
     workspace = Workspace(library=toy / "fault_library", templates=toy / "templates")
     run = place / "run"
-    [drawing] = drawings(RunFolder.open(run), load(run / "results.csv"), workspace, [wanted])
+    [drawing] = example_drawings(RunFolder.open(run), load(run / "results.csv"), workspace, [wanted])
     return drawing
 
 
@@ -85,7 +85,7 @@ def test_a_kept_trace_is_enough(place: Path, tmp_path: Path) -> None:
     """Drawn again after the target was edited, from the kept trace, it is the same file."""
     contents = []
     for _ in range(2):
-        write([drawn(place, BRAKE)], tmp_path)
+        write_drawings([drawn(place, BRAKE)], tmp_path)
         contents.append([(tmp_path / "figures" / f"brake.{kind}").read_bytes() for kind in ("svg", "png")])
         edit_target(place)
     assert contents[0] == contents[1]
@@ -100,12 +100,12 @@ def test_what_cannot_be_driven_again_is_said(place: Path, tmp_path: Path) -> Non
     edit_target(place)
     edited = drawn(place, BRAKE)
     assert "changed since this run was planned: target" in edited.note
-    write([edited], tmp_path)
+    write_drawings([edited], tmp_path)
     assert list((tmp_path / "figures").iterdir()) == []
     shutil.rmtree(place / "toy" / "tree")
     assert drawn(place, BRAKE).note.startswith("No figure: ")
     run = place / "run"
-    [nowhere] = drawings(RunFolder.open(run), load(run / "results.csv"), None, [BRAKE])
+    [nowhere] = example_drawings(RunFolder.open(run), load(run / "results.csv"), None, [BRAKE])
     assert "no fault library" in nowhere.note
 
 

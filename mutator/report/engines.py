@@ -1,4 +1,4 @@
-"""RunMode the experiments of a run were run, and what their proof came to, as its report tells it."""
+"""How the experiments of a run were run, and what their equivalence check found."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -22,9 +22,11 @@ _WORDS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
-    """A table of how many experiments were run how; what their proof came to, as a sentence and in few words;
-    `failed`: it found an experiment that is another one on the reference engine."""
+class EngineSummary:
+    """How many experiments were run how, and the equivalence check as a sentence and in few words.
+
+    `failed`: an experiment came out differently on the reference engine.
+    """
 
     table: Table
     proof: str
@@ -32,14 +34,14 @@ class Told:
     failed: bool
 
 
-def told(folder: RunFolder) -> Told | None:
-    """What the timings and `proof/` of a run folder say; None when neither says anything of engines."""
+def engine_summary(folder: RunFolder) -> EngineSummary | None:
+    """What the timings and `proof/` of a run folder say; None if neither names an engine."""
     ways = _ways(folder)
     if not ways and not (folder.path / proof.FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder)
     table = Table(heads=("how", "experiments"), rows=list(_lines(ways)), right=(1,))
-    return Told(table=table, proof=sentence, state=state, failed=failed)
+    return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
 
 
 def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:

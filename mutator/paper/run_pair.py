@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mutator.figures import style
-from mutator.figures.actions import Pair, Steps, Wanted
 from mutator.figures.run_plot import (
     FAULTY_COLOUR,
     GOLDEN_COLOUR,
@@ -16,6 +15,7 @@ from mutator.figures.run_plot import (
     MarkKind,
     finite,
 )
+from mutator.paper.actions import Pair, Steps, Wanted
 from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:

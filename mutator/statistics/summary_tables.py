@@ -1,13 +1,12 @@
-"""The paper's tables II and III: the paper's numbers with ours beneath, an interval and N in every cell."""
+"""Summaries by scenario and by fault type: published numbers with ours beneath, an interval in each cell."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
-from mutator.paper.published import Paper
+from mutator.statistics.published import OURS, Counts, Published
 from mutator.statistics.share import Share, share
 from mutator.statistics.sheet import Cell, Sheet
 from mutator.statistics.tally import Tally, total
 
-Counts = Mapping[tuple[str, str], Tally]
 _MEASURES = (
     ("activated", "injected"),
     ("manifested", "activated"),
@@ -21,60 +20,65 @@ _MEASURES = (
 )
 _WORDS = {"hazards_no_alerts": "hazards without alert", "alerts_no_hazards": "alerts without hazard"}
 _NOTE = "95 % Wilson intervals; in brackets count/whole."
-_CITED = f"{_NOTE} The paper's counts are cited, their intervals are ours."
 
 
-def summary_sheet(method: str, ours: Counts, paper: Paper | None) -> Sheet:
-    """Table II of one method: a column for each scenario of ours, and all of them together."""
+def summary_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
+    """By scenario, of one method: a column for each scenario of ours, and one for all of them together."""
     scenarios = sorted({scenario for how, scenario in ours if how == method})
-    sources = _sources(method, ours, paper.summary if paper else None, scenarios)
+    theirs = published.by_scenario if published else {}
+    sources = _sources(method, ours, published, theirs, scenarios)
     lines: list[tuple[Cell, ...]] = []
     for part, whole in _MEASURES:
         for source, tallies in sources.items():
             cells = [_share(one, part, whole) for one in (*tallies.values(), _total(tallies.values()))]
             lines.append((_WORDS.get(part, part), whole, source, *cells))
+    notes = (_NOTE, published.counts_note if published else "", "The total is of the scenarios shown.")
     return Sheet(
         name=f"summary_{method}",
-        title=f"Summary by scenario, {method}" + (" (the paper's table II)" if paper else ""),
-        note=f"{_CITED if paper else _NOTE} The total is of the scenarios shown.",
+        title=_title(f"Summary by scenario, {method}", published.scenario_title if published else ""),
+        note=" ".join(filter(None, notes)),
         heads=("what", "of", "from", *scenarios, "total"),
         lines=tuple(lines),
     )
 
 
-def coverage_sheet(method: str, ours: Counts, paper: Paper | None) -> Sheet:
-    """Table III of one method: a line for each fault type of ours, and all of them together."""
+def coverage_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
+    """By fault type, of one method: a line for each fault type of ours, and one for all of them together."""
     kinds = sorted({kind for how, kind in ours if how == method})
-    if paper:  # in its order, then what it does not have
-        kinds = list(dict.fromkeys([k for _, k in paper.coverage if k in kinds] + kinds))
-    sources = _sources(method, ours, paper.coverage if paper else None, kinds)
+    theirs = published.by_kind if published else {}
+    # In the order of the publication, then what it does not have.
+    kinds = list(dict.fromkeys([kind for _, kind in theirs if kind in kinds] + kinds))
+    sources = _sources(method, ours, published, theirs, kinds)
     lines: list[tuple[Cell, ...]] = []
     for kind in (*kinds, "total"):
         for source, tallies in sources.items():
             one = _total(tallies.values()) if kind == "total" else tallies[kind]
             cells = [_share(one, *measure) for measure in (_MEASURES[0], _MEASURES[2], _MEASURES[3])]
             lines.append((kind, source, *cells))
+    notes = (_NOTE, *((published.counts_note, published.kind_note) if published else ()))
     return Sheet(
         name=f"coverage_{method}",
-        title=f"Hazard coverage by fault type, {method}" + (" (the paper's table III)" if paper else ""),
-        note=f"{_CITED} The paper divides by activated faults; hazards/injected is what experiments yield."
-        if paper
-        else _NOTE,
+        title=_title(f"Hazard coverage by fault type, {method}", published.kind_title if published else ""),
+        note=" ".join(notes),
         heads=("fault type", "from", "activated/injected", "hazards/activated", "hazards/injected"),
         lines=tuple(lines),
     )
 
 
+def _title(title: str, published: str) -> str:
+    return f"{title} ({published})" if published else title
+
+
 def _sources(
-    method: str, ours: Counts, published: Counts | None, groups: Iterable[str]
+    method: str, ours: Counts, published: Published | None, theirs: Counts, names: Iterable[str]
 ) -> dict[str, dict[str, Tally | None]]:
-    """Paper (if it says anything of these groups) and ours, by group; None: not in the paper."""
-    names = list(groups)
+    """Published counts (if there are any of these groups) and ours, by group; None: not published."""
+    groups = list(names)
+    known = {name: theirs.get((method, name)) for name in groups}
     sources: dict[str, dict[str, Tally | None]] = {}
-    known = {name: (published or {}).get((method, name)) for name in names}
-    if any(known.values()):
-        sources["paper"] = known
-    sources["here"] = {name: ours[method, name] for name in names}
+    if published and any(known.values()):
+        sources[published.source] = known
+    sources[OURS] = {name: ours[method, name] for name in groups}
     return sources
 
 

@@ -7,11 +7,11 @@ import pandas as pd
 
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
-from mutator.figures.actions import WANTED, Pair, Wanted
 from mutator.figures.figures import Drawing
-from mutator.figures.run_pair import draw
 from mutator.figures.run_plot import marks_of
 from mutator.model import fault_label
+from mutator.paper.actions import WANTED, Pair, Wanted
+from mutator.paper.run_pair import draw
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -19,7 +19,7 @@ QUERY = "Query over results.csv"
 LOOKED_AT = 5  # candidates of each figure: each may have to be driven again
 
 
-def drawings(
+def example_drawings(
     folder: RunFolder,
     frame: pd.DataFrame,
     workspace: Workspace | None,
