@@ -185,11 +185,12 @@ def spec_model(readings: Readings) -> type[SpecModel]:
         required = name == readings.default
         kind = _ReadingModel if required else _ReadingModel | None
         keys[name] = (kind, Field(... if required else None, description=about))
-    variant = create_model("_VariantModel", __base__=_VariantBase, **keys)
+    variant = create_model("_VariantModel", __base__=_VariantBase, __doc__=_VariantBase.__doc__, **keys)
     variants = Field(description="Name of the variant -> variant; at least one.")
     return create_model(
         "SpecModel",
         __base__=SpecModel,
+        __doc__=SpecModel.__doc__,
         variants=(dict[str, variant], variants),  # type: ignore[valid-type]
     )
 
