@@ -13,7 +13,7 @@ from typer.main import get_command
 
 from mutator import __version__
 from mutator._common.interrupts import terminable
-from mutator.cli import campaigns, compare, experiments, exports, faults, library, reviews, run_folders, stpa
+from mutator.cli import campaigns, compare, experiments, exports, faults, init, library, reviews, run_folders, stpa
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
@@ -29,7 +29,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "stpa", "check", "doctor")),
+    ("Look around", ("list", "init", "stpa", "check", "doctor")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -45,8 +45,8 @@ Examples:
 
 \b
 Exit codes: {", ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())}.
-Where things are is said by options, before or after the command, or by the environment; inside
-a clone neither is needed.
+Library, templates and target are those of an option, before or after the command; of the environment;
+of the nearest folder upward with a fault_library/; else those that ship with mutator.
 """
 
 
@@ -92,7 +92,7 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments):
+for module in (library, init, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments):
     module.register(app)
 
 

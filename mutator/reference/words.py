@@ -169,7 +169,8 @@ ABOUT = {
     "Limits.steps": "Steps of simulation.",
     "Manifest.name": "Its name, which campaigns use.",
     "Manifest.about": "What the target is.",
-    "Manifest.root": "The folder that goes on `sys.path`, relative to this file; `--target` overrides it.",
+    "Manifest.root": "The folder that goes on `sys.path`, relative to this file; or `shipped:target`, "
+    "the controller that ships with mutator. `--target` overrides it.",
     "Manifest.package": "The import package in it. The probe is added to it as `_fi.py`.",
     "Manifest.files": "Globs, relative to the root: what makes up the tree. `**` stands for any folders.",
     "Manifest.forbid": "Globs: no fault may be injected there.",

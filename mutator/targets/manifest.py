@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.outcomes.columns import COLUMNS
@@ -178,12 +179,12 @@ class ManifestModel(StrictModel):
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
     model, source = read(path, ManifestModel, SCHEMA)
-    folder = (root or path.parent / model.root).resolve()
+    folder = (root or _root(path, model.root)).resolve()
     if not folder.is_dir():
         raise source.error(
             ("root",),
             f"no folder {folder}",
-            expected="the target's source root, relative to this file",
+            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET}",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
     _check_names(model, source)
@@ -215,6 +216,10 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         alerts=tuple(model.alerts),
         film=_film(model.film),
     )
+
+
+def _root(path: Path, root: str) -> Path:
+    return shipped_folder() / "target" if root == SHIPPED_TARGET else path.parent / root
 
 
 def _check_names(model: ManifestModel, source: Source) -> None:
