@@ -13,7 +13,18 @@ from typer.main import get_command
 
 from mutator import __version__
 from mutator._common.interrupts import terminable
-from mutator.cli import campaigns, compare, experiments, exports, faults, init, library, reviews, run_folders, stpa
+from mutator.cli import (
+    campaigns,
+    compare,
+    experiments,
+    exports,
+    faults,
+    init,
+    library,
+    reviews,
+    run_folders,
+    stpa,
+)
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
