@@ -92,7 +92,7 @@ def _unpacked(archive: Path, cache: Path) -> Path:
             f"no longer as it ships: {', '.join(changed[:_SHOWN])}{more}",
             where=folder,
             expected="the files that were installed with mutator, unedited",
-            remedy="delete this folder, and it is unpacked again; a library to edit is made by `mutator init DIR`",
+            remedy="delete this folder to have it unpacked again; edit in a library of `mutator init DIR`",
         )
     return folder
 

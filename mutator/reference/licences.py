@@ -18,12 +18,12 @@ _HEAD = """\
 
 <!-- Written by `python -m mutator.reference.licences`. -->
 
-`mutator` itself is under the MIT License. The packages below are installed beside it, each under its own licence,
-given here as the package states it. Binary wheels may carry libraries under further licences, as those of `av`
-and `opencv-python-headless` carry FFmpeg; the `.dist-info` of such a wheel has them.
+`mutator` itself is under the MIT License. The packages below are installed beside it, each under its own
+licence, given here as the package states it. Binary wheels may carry libraries under further licences, as
+those of `av` and `opencv-python-headless` carry FFmpeg; the `.dist-info` of such a wheel has them.
 
-*Needed by* says who asks for a package: `mutator` to run; an extra of it (`test`, `dev`, `train`); or only other
-packages of this table.
+*Needed by* says who asks for a package: `mutator` to run; an extra of it (`test`, `dev`, `train`); or only
+other packages of this table.
 
 | package | needed by | licence |
 |---|---|---|
@@ -63,10 +63,12 @@ def stated_licence(name: str) -> str | None:
         stated = metadata.metadata(name)
     except metadata.PackageNotFoundError:
         return None
-    classifiers = stated.get_all("Classifier") or ()
-    licences = [c.rpartition(" :: ")[2] for c in classifiers if c.startswith("License :: ")]
-    named = [licence for licence in licences if licence != "OSI Approved"]
-    return stated.get("License-Expression") or ", ".join(named) or stated.get("License", "none stated")
+    expressions = stated.get_all("License-Expression", [])
+    classifiers = [
+        c.split(" :: ")[1:] for c in stated.get_all("Classifier", []) if c.startswith("License :: ")
+    ]
+    named = [words[-1] for words in classifiers if words != ["OSI Approved"]]
+    return ", ".join(expressions or named or stated.get_all("License", ["none stated"]))
 
 
 def _licence(name: str, known: Mapping[str, str]) -> str:
