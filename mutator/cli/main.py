@@ -19,8 +19,8 @@ from mutator.cli import (
     experiments,
     exports,
     faults,
-    init,
     library,
+    new_library,
     reviews,
     run_folders,
     stpa,
@@ -103,7 +103,18 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, init, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments):
+for module in (
+    library,
+    new_library,
+    stpa,
+    faults,
+    reviews,
+    campaigns,
+    run_folders,
+    compare,
+    exports,
+    experiments,
+):
     module.register(app)
 
 
