@@ -24,8 +24,9 @@ from mutator.reference.schemas import FORMATS
 
 CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
+CONTRIBUTING = CLONE / "CONTRIBUTING.md"
 BENCHMARKS = CLONE / "benchmarks" / "README.md"
-PAGES = [README, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
+PAGES = [README, CONTRIBUTING, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 HOW_TO = CLONE / "docs" / "how-to"
 COMPARISON = HOW_TO / "compare-with-openpilot.md"
