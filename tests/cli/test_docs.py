@@ -52,6 +52,10 @@ LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 TIME = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b")
 
 
+# A package called mutator on an index is not this project.
+BY_NAME = re.compile(r"\b(?:pip|pipx|uv)\b[^\n`]*\b(?:install|add)\b[^\n`]*(?<![\w/.-])mutator(?![\w/.*-])")
+
+
 def name(page: Path) -> str:
     return page.relative_to(CLONE).as_posix()
 
@@ -206,6 +210,21 @@ def test_links_lead_somewhere(page: Path) -> None:
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_nobody_is_told_to_install_by_name(page: Path) -> None:
+    """On an index the name is somebody else's project, so pages install from a clone or from a file."""
+    assert not BY_NAME.search(page.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"]
+)
+def test_installing_by_name_would_be_noticed(command: str) -> None:
+    """The pattern finds such commands, and lets those pass that name a folder or a file."""
+    assert BY_NAME.search(command)
+    assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
 
 
 def test_every_page_can_be_reached() -> None:
