@@ -218,9 +218,7 @@ def test_nobody_is_told_to_install_by_name(page: Path) -> None:
     assert not BY_NAME.search(page.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize(
-    "command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"]
-)
+@pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
 def test_installing_by_name_would_be_noticed(command: str) -> None:
     """The pattern finds such commands, and lets those pass that name a folder or a file."""
     assert BY_NAME.search(command)
