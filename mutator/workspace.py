@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.shipped import shipped_folder
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, load_fault_models
@@ -34,16 +35,20 @@ class Workspace:
         templates: Path | None = None,
         target: Path | None = None,
     ) -> "Workspace":
-        """Options first, then MUTATOR_LIBRARY, MUTATOR_TEMPLATES, MUTATOR_TARGET, then `root`, MUTATOR_ROOT,
-        or the nearest folder from the current one upward that holds fault_library/; else a MutatorError."""
+        """Each of them from the first place that names or holds it.
+
+        1. the argument; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES, MUTATOR_TARGET; 3. for library and templates
+        `root` or MUTATOR_ROOT, which holds both, else the nearest folder from the current one upward that
+        holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that is missing.
+        """
         library = library or _environment("MUTATOR_LIBRARY")
         templates = templates or _environment("MUTATOR_TEMPLATES")
         target = target or _environment("MUTATOR_TARGET")
         base = root or _environment("MUTATOR_ROOT")
-        if base is None and (library is None or templates is None):
-            base = _upward(Path.cwd())
-        library = library or (base / _LIBRARY if base else None)
-        templates = templates or (base / _TEMPLATES if base else None)
+        if library is None:
+            library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
+        if templates is None:
+            templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
             library=_folder(library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
             templates=_folder(templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
@@ -148,17 +153,14 @@ def _environment(name: str) -> Path | None:
     return Path(value) if value else None
 
 
-def _upward(start: Path) -> Path | None:
-    return next((p for p in (start, *start.parents) if (p / _LIBRARY).is_dir()), None)
+def _upward(*folders: str) -> Path | None:
+    """The nearest folder from the current one upward that holds fault_library/, if it holds all of these."""
+    here = Path.cwd()
+    nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
+    return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None
 
 
-def _folder(path: Path | None, what: str, option: str) -> Path:
-    if path is None:
-        raise MutatorError(
-            f"no folder {what}/ here or in any folder above",
-            where=Path.cwd(),
-            remedy=f"run inside a clone, or give --root or MUTATOR_ROOT, or {option}",
-        )
+def _folder(path: Path, what: str, option: str) -> Path:
     if not path.is_dir():
         raise MutatorError(
             f"no folder {path}",

@@ -20,6 +20,7 @@ from mutator.cli import (
     exports,
     faults,
     library,
+    new_library,
     reviews,
     run_folders,
     stpa,
@@ -39,7 +40,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "stpa", "check", "doctor")),
+    ("Look around", ("list", "init", "stpa", "check", "doctor")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -55,8 +56,8 @@ Examples:
 
 \b
 Exit codes: {", ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())}.
-Where things are is said by options, before or after the command, or by the environment; inside
-a clone neither is needed.
+Library, templates and target are those of an option, before or after the command; of the environment;
+of the nearest folder upward with a fault_library/; else those that ship with mutator.
 """
 
 
@@ -102,7 +103,18 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, stpa, faults, reviews, campaigns, run_folders, comparisons, exports, experiments):
+for module in (
+    library,
+    new_library,
+    stpa,
+    faults,
+    reviews,
+    campaigns,
+    run_folders,
+    comparisons,
+    exports,
+    experiments,
+):
     module.register(app)
 
 

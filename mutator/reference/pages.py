@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from mutator._common.shipped import refuse_shipped
 from mutator.reference import cli, formats, models, recorded
 from mutator.reference.schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
@@ -33,8 +34,9 @@ def generated_files(workspace: Workspace) -> dict[Path, str]:
 
 
 def write(workspace: Workspace) -> Iterator[Path]:
-    """Write them into the clone of the library; gives the paths."""
+    """Write them into the clone of the library; gives the paths. MutatorError where there is no clone."""
     clone = workspace.library.parent
+    refuse_shipped(clone)
     for path, text in generated_files(workspace).items():
         (clone / path).parent.mkdir(parents=True, exist_ok=True)
         (clone / path).write_text(text, encoding="utf-8")

@@ -14,6 +14,7 @@ from typing import Literal
 from pydantic import Field
 
 from mutator._common.files import make_folder, write_atomic
+from mutator._common.shipped import refuse_shipped
 from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Bound, Group
@@ -121,7 +122,11 @@ class Review:
         return Review(path=self.path, target=self.target, decisions={**self.decisions, **made})
 
     def write(self) -> None:
-        """Write the file, whole or not at all; sorted, so that the work of two people can be merged."""
+        """Write the file, whole or not at all; sorted, so that the work of two people can be merged.
+
+        MutatorError in the library that ships with mutator, which stays as it is.
+        """
+        refuse_shipped(self.path)
         make_folder(self.path.parent)
         blocks = [_block(self.decisions[name]) for name in sorted(self.decisions)]
         entries = "\n" + "".join(blocks) if blocks else " []\n"

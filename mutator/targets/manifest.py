@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.targets.observation import Observation, ObservationModel, observation
@@ -179,7 +180,8 @@ class ManifestModel(StrictModel, title="The file"):
     name: str = Field(description="Its name, which campaigns use.")
     about: str = Field("", description="What the target is.")
     root: str = Field(
-        description="The folder that goes on `sys.path`, relative to this file; `--target` overrides it."
+        description="The folder that goes on `sys.path`, relative to this file; or `shipped:target`, the "
+        "controller that ships with mutator. `--target` overrides it."
     )
     package: str = Field(description="The import package in it. The probe is added to it as `_fi.py`.")
     files: list[str] = Field(
@@ -224,12 +226,12 @@ class ManifestModel(StrictModel, title="The file"):
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
     model, source = read(path, ManifestModel, SCHEMA)
-    folder = (root or path.parent / model.root).resolve()
+    folder = (root or _root(path, model.root)).resolve()
     if not folder.is_dir():
         raise source.error(
             ("root",),
             f"no folder {folder}",
-            expected="the target's source root, relative to this file",
+            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET}",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
     _check_names(model, source)
@@ -262,6 +264,10 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         source=source,
         film=_film(model.film),
     )
+
+
+def _root(path: Path, root: str) -> Path:
+    return shipped_folder() / "target" if root == SHIPPED_TARGET else path.parent / root
 
 
 def _check_names(model: ManifestModel, source: Source) -> None:

@@ -25,8 +25,9 @@ from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
+CONTRIBUTING = CLONE / "CONTRIBUTING.md"
 BENCHMARKS = CLONE / "benchmarks" / "README.md"
-PAGES = [README, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
+PAGES = [README, CONTRIBUTING, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 HOW_TO = CLONE / "docs" / "how-to"
 COMPARISON = HOW_TO / "compare-with-openpilot.md"
@@ -50,6 +51,10 @@ FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 # What differs from machine to machine: how long it took.
 TIME = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b")
+
+
+# A package called mutator on an index is not this project.
+BY_NAME = re.compile(r"\b(?:pip|pipx|uv)\b[^\n`]*\b(?:install|add)\b[^\n`]*(?<![\w/.-])mutator(?![\w/.*-])")
 
 
 def name(page: Path) -> str:
@@ -206,6 +211,19 @@ def test_links_lead_somewhere(page: Path) -> None:
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_nobody_is_told_to_install_by_name(page: Path) -> None:
+    """On an index the name is somebody else's project, so pages install from a clone or from a file."""
+    assert not BY_NAME.search(page.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
+def test_installing_by_name_would_be_noticed(command: str) -> None:
+    """The pattern finds such commands, and lets those pass that name a folder or a file."""
+    assert BY_NAME.search(command)
+    assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
 
 
 def test_every_page_can_be_reached() -> None:

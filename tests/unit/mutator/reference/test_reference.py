@@ -9,10 +9,12 @@ import jsonschema
 import pytest
 from typer.main import get_command
 
+from mutator._common import shipped
 from mutator.cli.main import GROUPS, app
 from mutator.config import yaml_files as yamlio
+from mutator.errors import MutatorError
 from mutator.faults.specs import spec_model
-from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files
+from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files, write
 from mutator.reference.schemas import Format, definitions, file_formats, short_name
 from mutator.reference.tables import reading_order
 from mutator.workspace import Workspace
@@ -132,3 +134,13 @@ def test_a_schema_takes_a_model_of_ones_own() -> None:
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
     assert validator("fault_spec").is_valid(data)
+
+
+def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the library is the one that came with a wheel, there is no clone to write pages into."""
+    monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
+    with pytest.raises(MutatorError, match="ships with mutator"):
+        next(write(Workspace(library=library, templates=library.with_name("templates"))))
+    assert list(tmp_path.iterdir()) == []

@@ -1,10 +1,12 @@
 """The file of decisions: it holds what was decided; a mistake is reported at its line."""
 
+import dataclasses
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from mutator._common import shipped
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Bound, Group
 from mutator.review.decisions import Review, State, Verdict, load_review
@@ -142,3 +144,15 @@ def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytes
         review(toycar, "b").write()
     assert review(toycar).path.read_bytes() == before
     assert [path.name for path in review(toycar).path.parent.iterdir()] == ["toycar.yaml"]
+
+
+def test_the_shipped_library_takes_no_decisions(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decisions about the library that came with a wheel are refused before anything is written."""
+    monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "cache" / "mutator" / "shipped" / "0" / "reviews" / "toycar.yaml"
+    with pytest.raises(MutatorError, match=r"reviews/toycar.yaml: .*ships with mutator.*mutator init DIR"):
+        dataclasses.replace(review(toycar, "a"), path=path).write()
+    assert not (tmp_path / "cache").exists()

@@ -71,6 +71,20 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
         load_manifest(path, tmp_path / "none")
 
 
+def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
+    """`shipped:target` is the controller that ships with the harness, wherever the manifest lies."""
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text()
+    line = next(line for line in text.splitlines() if line.startswith("root:"))
+    path.write_text(text.replace(line, "root: shipped:target"))
+    assert (load_manifest(path).root / "selfdrive" / "sim" / "run.py").is_file()
+    path.write_text(text.replace(line, "root: shipped:other"))
+    with pytest.raises(
+        MutatorError, match=r"toy.yaml:3: no folder .*relative to this file, or shipped:target"
+    ):
+        load_manifest(path)
+
+
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
     """Bytecode is no part of a tree; an edit shows in a manifest loaded after it, not before."""
     manifest = toy.manifest("toy")
