@@ -13,7 +13,18 @@ from typer.main import get_command
 
 from mutator import __version__
 from mutator._common.interrupts import terminable
-from mutator.cli import campaigns, compare, experiments, exports, faults, library, reviews, run_folders, stpa
+from mutator.cli import (
+    caches,
+    campaigns,
+    compare,
+    experiments,
+    exports,
+    faults,
+    library,
+    reviews,
+    run_folders,
+    stpa,
+)
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
@@ -29,7 +40,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "stpa", "check", "doctor")),
+    ("Look around", ("list", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -92,7 +103,7 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments):
+for module in (library, stpa, faults, reviews, campaigns, run_folders, compare, exports, experiments, caches):
     module.register(app)
 
 

@@ -38,8 +38,10 @@ SECTIONS = {
     "Manifest": ("The file", ""),
     "Entry": (
         "The entry",
-        "`{scenario}`, `{seed}` and `{out}` in the arguments are the scenario's file, the seed, and the "
-        "folder in which trace and record are to be left.",
+        "In the arguments `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder in "
+        "which trace and record are to be left, and `{cache}` a folder that all runs of the target share. It "
+        "may be missing, unwritable or damaged, and `mutator cache` deletes from it: a run must come to the "
+        "same bytes.",
     ),
     "Change": (
         "A change",
@@ -173,8 +175,8 @@ ABOUT = {
     "Manifest.package": "The import package in it. The probe is added to it as `_fi.py`.",
     "Manifest.files": "Globs, relative to the root: what makes up the tree. `**` stands for any folders.",
     "Manifest.forbid": "Globs: no fault may be injected there.",
-    "Manifest.reads_itself": "Globs: files that a run reads while it runs, so that a mutant of one is run by "
-    "the reference engine.",
+    "Manifest.reads_itself": "Globs: files that a run reads while it runs, as what it caches follows from "
+    "them. A mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
     "Manifest.step_s": "The length of a step of simulation.",
     "Manifest.armed_after_s": "When `mutator try` arms triggers, where nothing else is said.",
     "Manifest.entry": "How a run is started.",
@@ -192,7 +194,8 @@ ABOUT = {
     "Entry.args": "Its arguments.",
     "Entry.stepwise": "A function of the module that takes these arguments and gives a run that is driven "
     "step by step: what [faster engines](../explanation/performance.md#which-engine-runs) need.",
-    "Entry.independent": "More arguments, of a run that takes nothing from what other runs left behind.",
+    "Entry.independent": "More arguments, of a run that takes nothing from what other runs left behind: "
+    "those of the equivalence check, and of mutants of a file in `reads_itself`.",
     "Entry.changes": "Name of a change of the scenario -> its arguments.",
     "Change.args": "Further arguments.",
     "Change.same_in": "Scenarios that the change makes the same run: it is driven once.",

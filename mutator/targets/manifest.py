@@ -1,17 +1,18 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common import caches
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.outcomes.columns import COLUMNS
 from mutator.targets.observation import Observation, ObservationModel, observation
-from mutator.targets.source_tree import SourceTree, read_tree
+from mutator.targets.source_tree import SourceTree, matches, read_tree
 
 SCHEMA = "target/1"
 FILM = "film"  # folder in the output of a run that is filmed
@@ -52,7 +53,7 @@ class TargetManifest:
     files: tuple[str, ...]  # globs, relative to root: what makes up the tree
     forbid: tuple[str, ...]  # globs: no fault may be injected there
     entry_module: str  # run as `python -m`
-    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}
+    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}
     stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
     independent: tuple[str, ...]  # more arguments, of a run that takes nothing from what others left behind
     reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
@@ -83,6 +84,10 @@ class TargetManifest:
             )
         return tree
 
+    def reads_any(self, paths: Iterable[str]) -> bool:
+        """Whether a run itself reads one of these files: what it caches follows from their content."""
+        return any(matches(path, self.reads_itself) for path in paths)
+
     @property
     def probe_path(self) -> str:
         """Path of the probe in a mutated tree, relative to its root."""
@@ -99,7 +104,7 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
         places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
-        places["{film}"] = str(out / FILM)
+        places |= {"{film}": str(out / FILM), "{cache}": str(caches.of_target(self.name))}
         extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:
