@@ -59,10 +59,10 @@ def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, .
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--max", "much"), "size 'much'; expected a number of B, kB, MB, GB or TB"),
+        (("--max", "much"), "size 'much'\n  expected: a number of B, kB, MB, GB or TB"),
         (("--max", "-1"), "size '-1'"),
-        (("--max", "1GB", "--clear"), "expected one of them"),
-        (("--path", "--clear"), "expected one of them"),
+        (("--max", "1GB", "--clear"), "expected: one of them"),
+        (("--path", "--clear"), "expected: one of them"),
     ],
 )
 def test_what_makes_no_sense_deletes_nothing(
