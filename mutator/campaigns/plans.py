@@ -13,7 +13,7 @@ from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.provenance import check_sources, sources, versions
+from mutator.campaigns.provenance import check_sources, check_version, sources, versions
 from mutator.campaigns.sampling import pick, pick_in_proportion
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
@@ -232,6 +232,7 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
                 expected=f"plan {plan.digest[:16]}",
                 remedy="use another folder, or the campaign and options it was planned with",
             )
+        check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(plan, workspace))
         return folder
     write_atomic(out / "campaign.yaml", plan.campaign.source)

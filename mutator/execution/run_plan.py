@@ -6,7 +6,7 @@ from pathlib import Path
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.plans import Choices, freeze_owned, load_plan, make_plan
-from mutator.campaigns.provenance import check_sources, sources
+from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.review import gate
 from mutator.store.run_folder import RunFolder
@@ -19,7 +19,7 @@ def frozen(
     """The run folder `out`, which is the caller's, with a frozen plan of the campaign in it.
 
     With `reviewed` the folder also keeps who approved what; CheckFailed, and no new plan, when that is not
-    all of it. MutatorError when it holds another plan, or one of other sources.
+    all of it. MutatorError when it holds another plan, or one of other sources or another mutator.
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
@@ -37,6 +37,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
     """The run folder, if it was planned from this campaign with these choices and sources."""
     folder = RunFolder.open(out)
     head = folder.head
+    check_version(out, head["schema"], head["provenance"])
     loaded = load_campaign(workspace.campaign(campaign))
     if digest(loaded.source) != head["campaign_digest"]:
         raise MutatorError(
