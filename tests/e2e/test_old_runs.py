@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from mutator import load_run
@@ -16,7 +17,7 @@ from mutator.execution import session
 from mutator.exports import Format
 from mutator.store import plan_file
 from mutator.store.records import read_records
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import SCHEMA, RunFolder
 from mutator.workspace import Workspace
 
 FIXTURES = sorted((Path(__file__).parents[1] / "fixtures").glob("run-*"))
@@ -63,14 +64,14 @@ def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixtu
 
 
 def test_there_is_one_for_each_schema() -> None:
-    """A run folder's schema never rises without a fixture of the last one."""
-    head = RunFolder.open(FIXTURES[-1] / "small").head
-    assert [path.name for path in FIXTURES] == [f"run-{i + 1}" for i in range(len(FIXTURES))]
-    assert head["schema"] == f"run/{len(FIXTURES)}"
+    """A run folder's schema never rises without a fixture of the new one beside those of the old."""
+    schemas = [RunFolder.open(path / "small").head["schema"] for path in FIXTURES]
+    assert [path.name.replace("-", "/") for path in FIXTURES] == schemas
+    assert schemas == [f"run/{number}" for number in range(1, len(schemas) + 1)] and schemas[-1] == SCHEMA
 
 
 def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
-    """Plan, records, results and patches are read; each id follows from what it stands for, as it did then."""
+    """Plan, records, results and patches are read; each id follows from its content as it did then."""
     run = load_run(place / "small", root=place / "toy")
     assert [*run.experiments] == [*plan_file.ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
@@ -105,10 +106,15 @@ def test_it_exports(cli: Cli, place: Path, format: Format) -> None:
     file = place / f"export-{format.value}"
     code, _, err = cli("export", "small", "--format", format.value, "--out", file)
     assert code == 0, err
-    if format is not Format.PARQUET:
-        assert file.read_text().count(KEPT) >= 1
     if format is Format.CSV:
         assert file.read_bytes() == (place / "small" / "results.csv").read_bytes()
+    elif format is Format.PARQUET:
+        assert len(pd.read_parquet(file)) == EXPERIMENTS
+    elif format is Format.JUNIT:
+        assert file.read_text().count("<testcase ") == EXPERIMENTS
+    else:
+        mutants = json.loads(file.read_text())["files"]["toycar/sensing.py"]["mutants"]
+        assert {mutant["status"] for mutant in mutants} >= {"Killed", "Survived"}
 
 
 def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
@@ -136,9 +142,8 @@ def test_its_approvals_are_read(cli: Cli, place: Path) -> None:
     """The decisions of then still approve what is injected, and the report says who made them."""
     code, out, err = cli("review", "list", "--campaign", "small", "--json")
     assert code == 0, err
-    assert out.count('"approved"') == len(
-        json.loads((place / "small" / "reviewed.json").read_text())["groups"]
-    )
+    approved = json.loads((place / "small" / "reviewed.json").read_text())["groups"]
+    assert out.count('"approved"') == len(approved) == 7
 
 
 def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
