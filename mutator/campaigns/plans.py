@@ -13,7 +13,7 @@ from mutator.campaigns.campaign_files import Campaign, check_readings, load_camp
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.provenance import check_sources, sources, versions
+from mutator.campaigns.provenance import check_sources, check_version, sources, versions
 from mutator.campaigns.sampling import pick, pick_in_proportion
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
@@ -26,6 +26,8 @@ from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
 from mutator.store.shards import Shard
 from mutator.workspace import Workspace
 
+# First part of every plan digest. Digests are cited, so this text stays whatever becomes of the run schema.
+_DIGEST_PREFIX = "run/1"
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
 _DEFAULT_CPU_S = 1.4  # one run on the reference engine, interpreter start included
 _START_S = 3.0  # of a campaign, before and after its runs
@@ -138,7 +140,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
         experiments=experiments,
         chunks=chunks,
         canary=canary,
-        digest=digest([SCHEMA, *content]),
+        digest=digest([_DIGEST_PREFIX, *content]),
         runs=len(once),
     )
 
@@ -226,6 +228,7 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
                 expected=f"plan {plan.digest[:16]}",
                 remedy="use another folder, or the campaign and options it was planned with",
             )
+        check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(plan, workspace))
         return folder
     write_atomic(out / "campaign.yaml", plan.campaign.source)

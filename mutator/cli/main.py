@@ -14,6 +14,7 @@ from typer.main import get_command
 from mutator._common.interrupts import terminable
 from mutator._common.version import VERSION
 from mutator.cli import (
+    caches,
     campaigns,
     comparisons,
     experiments,
@@ -40,7 +41,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "init", "stpa", "check", "doctor")),
+    ("Look around", ("list", "init", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -114,6 +115,7 @@ for module in (
     comparisons,
     exports,
     experiments,
+    caches,
 ):
     module.register(app)
 

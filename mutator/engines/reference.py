@@ -39,7 +39,8 @@ class ReferenceEngine:
 
     `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
     `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). The runs
-    of an `independent` one take nothing from what other runs left behind, where the manifest says how.
+    of an `independent` one take nothing from what other runs left behind, where the manifest says how; nor
+    does any run of a mutant whose changed files decide what is left behind.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class ReferenceEngine:
             seed=job.seed,
             out=out,
             changes=job.changes,
-            independent=self._independent,
+            independent=self._independent or self.manifest.reads_any(job.files),
         )
         request = {
             "parent": os.getpid(),

@@ -1,17 +1,18 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common import caches
 from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.targets.observation import Observation, ObservationModel, observation
-from mutator.targets.source_tree import SourceTree, read_tree
+from mutator.targets.source_tree import SourceTree, matches, read_tree
 
 SCHEMA = "target/1"
 FILM = "film"  # folder in the output of a run that is filmed
@@ -52,7 +53,7 @@ class TargetManifest:
     files: tuple[str, ...]  # globs, relative to root: what makes up the tree
     forbid: tuple[str, ...]  # globs: no fault may be injected there
     entry_module: str  # run as `python -m`
-    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}
+    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}
     stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
     independent: tuple[str, ...]  # more arguments, of a run that takes nothing from what others left behind
     reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
@@ -84,6 +85,10 @@ class TargetManifest:
             )
         return tree
 
+    def reads_any(self, paths: Iterable[str]) -> bool:
+        """Whether a run itself reads one of these files: what it caches follows from their content."""
+        return any(matches(path, self.reads_itself) for path in paths)
+
     def arguments(
         self,
         *,
@@ -95,7 +100,7 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
         places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
-        places["{film}"] = str(out / FILM)
+        places |= {"{film}": str(out / FILM), "{cache}": str(caches.of_target(self.name))}
         extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:
@@ -144,8 +149,9 @@ class _ChangeModel(StrictModel, title="A change"):
 
 
 class _EntryModel(StrictModel, title="The entry"):
-    """`{scenario}`, `{seed}` and `{out}` in the arguments are the scenario's file, the seed, and the folder
-    in which trace and record are to be left."""
+    """In the arguments, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for trace
+    and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable or
+    damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
 
     module: str = Field(description="Run as `python -m`, from the root.")
     args: list[str] = Field(description="Its arguments.")
@@ -157,7 +163,8 @@ class _EntryModel(StrictModel, title="The entry"):
     )
     independent: list[str] = Field(
         default_factory=list,
-        description="More arguments, of a run that takes nothing from what other runs left behind.",
+        description="More arguments, of a run that takes nothing from what other runs left behind: those of "
+        "the equivalence check, and of mutants of a file in `reads_itself`.",
     )
     changes: dict[str, list[str] | _ChangeModel] = Field(
         default_factory=dict, description="Name of a change of the scenario -> its arguments."
@@ -190,8 +197,8 @@ class ManifestModel(StrictModel, title="The file"):
     forbid: list[str] = Field(default_factory=list, description="Globs: no fault may be injected there.")
     reads_itself: list[str] = Field(
         default_factory=list,
-        description="Globs: files that a run reads while it runs, so that a mutant of one is run by the "
-        "reference engine.",
+        description="Globs: files that a run reads while it runs, as what it caches follows from them. A "
+        "mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
     )
     step_s: float = Field(gt=0.0, allow_inf_nan=False, description="The length of a step of simulation.")
     armed_after_s: float = Field(

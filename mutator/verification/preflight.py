@@ -92,12 +92,15 @@ class _Checks:
         try:
             found = read_json(place / FILE, SCHEMA)
             results = self._passed(found, place)
-        except (MutatorError, KeyError, TypeError, AttributeError):
+        except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # none is there, or a damaged one
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            with raising_disk_full(self.folder.path):
-                check_cache.copy(place, self.folder.path, FILE)
+            try:
+                with raising_disk_full(self.folder.path):
+                    check_cache.copy(place, self.folder.path, FILE)
+            except OSError:
+                return None  # it was deleted meanwhile
         return results
 
     def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:

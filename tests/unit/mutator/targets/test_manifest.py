@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common import caches
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
@@ -38,6 +39,16 @@ def test_arguments(toy: Workspace) -> None:
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
     with pytest.raises(MutatorError, match="change 'no_lead'; expected one of alone"):
         manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
+
+
+def test_the_harness_names_the_cache(toy: Workspace) -> None:
+    """`{cache}` is the target's own folder below the user's cache, the same in every run."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
+    manifest = toy.manifest("toy")
+    for independent in (False, True):
+        given = manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
+        assert given[given.index("--cache") + 1] == str(caches.of_target("toy"))
 
 
 def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
