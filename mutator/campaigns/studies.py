@@ -28,11 +28,18 @@ def study_names() -> tuple[str, ...]:
 
 
 def find_study(name: str) -> Study:
-    """The study of that name; MutatorError that lists the known ones when it is not installed."""
+    """The study of that name; MutatorError that lists the known ones if it is not installed, or that says why
+    it cannot be loaded."""
     found = entry_points(group=GROUP, name=name)
     if not found:
         known = ", ".join(study_names()) or "none"
         raise MutatorError(
             f"study '{name}' is not installed", expected=f"one of {known}", remedy="install its package"
         )
-    return cast(Study, next(iter(found)).load())
+    try:
+        return cast(Study, next(iter(found)).load())
+    except (ImportError, AttributeError) as err:
+        raise MutatorError(
+            f"study '{name}' cannot be loaded: {err}",
+            remedy="correct or reinstall its package",
+        ) from err

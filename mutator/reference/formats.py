@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from mutator._common.tables import Table
 from mutator.campaigns import campaign_files as campaign
 from mutator.config import units
 from mutator.faults import specs as spec
@@ -114,10 +115,8 @@ def _readings() -> Iterator[str]:
 
 
 def _units() -> Iterator[str]:
-    yield "| suffix | unit | quantity |"
-    yield "|---|---|---|"
-    for unit in units.UNITS.values():
-        yield f"| `_{unit.suffix}` | {unit.symbol} | {unit.dimension} |"
+    rows = [(f"`_{unit.suffix}`", unit.symbol, unit.dimension) for unit in units.UNITS.values()]
+    yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
 
 

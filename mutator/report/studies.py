@@ -79,7 +79,7 @@ class ReportedRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """Published work, as its entry point in `mutator.studies` provides it.
+    """Published work, as its entry point in `mutator.studies` provides it; `about` cites it.
 
     `check` finds problems of its data in a fault library. `published` gives the counts that stand beside a
     run's in the tables, None where they do not fit the run. Each of `panels` may add a part to the report

@@ -59,6 +59,6 @@ def _study(run: ReportedRun) -> dict[str, str]:
     if not name:
         return {}
     if run.study:
-        return {"study": name}
-    why = "is not installed here" if run.workspace else "needs a fault library, of which there is none here"
+        return {"study": f"{name} ({run.study.about})"}
+    why = "cannot be loaded here" if run.workspace else "needs a fault library, of which there is none here"
     return {"study": f"{name}, which {why}"}

@@ -197,5 +197,5 @@ def test_a_study_that_cannot_be_asked_is_said_and_left_out(
 ) -> None:
     """The package may be missing here, or the library: the report is written, and its origin says why."""
     text = report.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
-    assert ("moon_landing, which is not installed here" in text) == (workspace is not None)
+    assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
     assert ("moon_landing, which needs a fault library" in text) == (workspace is None)
