@@ -14,9 +14,9 @@ _LAZY = ("Run", "load_run")  # pandas is not paid for by who only wants the vers
 
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
-        from mutator.api import runs as load
+        from mutator.api import runs
 
-        return getattr(load, name)
+        return getattr(runs, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
