@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
@@ -183,7 +183,7 @@ class CampaignModel(StrictModel, title="The file"):
         description="One of the library's [readings](fault-spec.md#readings); without it, the first. "
         "`--reading` overrides it.",
     )
-    methods: list[Literal["guided", "random"]] = Field(
+    methods: list[Annotated[Method, Field(strict=False)]] = Field(
         min_length=1, description="`guided`, `random` or both."
     )
     triggers: _TriggersModel = Field(description="When faults become active.")

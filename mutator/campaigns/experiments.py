@@ -125,10 +125,15 @@ class Expansion:
     ) -> Iterator[Experiment]:
         for number, fault in faults:
             for method in self.campaign.methods:
-                for trigger in triggers:
-                    if method is Method.RANDOM:
-                        trigger = self._random(scenario, fault, number, trigger)
+                for row in triggers:
+                    trigger = self._trigger(method, scenario, fault, number, row)
                     yield self._experiment(fault, scenario, method, trigger)
+
+    def _trigger(self, method: Method, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
+        """What a method makes of a context row for one fault."""
+        if method is Method.RANDOM:
+            return self._random(scenario, fault, number, row)
+        return row
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
         """The random partner of a row's trigger, the same in every reading but for when times begin."""

@@ -43,7 +43,7 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
     if kind in _TYPES:
         expected, remedy = _TYPES[kind]
         return got, expected, remedy, keys
-    if kind == "literal_error":
+    if kind in ("literal_error", "enum"):
         return got, f"one of {context['expected']}", "use one of them", keys
     return got, problem["msg"].removeprefix("Input should be "), "correct the value", keys
 

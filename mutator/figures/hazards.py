@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.model import Method
 from mutator.statistics.frame import hazard_names
 from mutator.statistics.shares import share
 from mutator.statistics.tallies import Tally, by_kind
@@ -84,7 +83,7 @@ def _coverage(
     axis: "Axes", tallies: dict[tuple[str, str], Tally], methods: Sequence[str], kinds: Sequence[str]
 ) -> None:
     for m, method in enumerate(methods):
-        colour, marker = style.METHOD_LOOKS[Method(method)]
+        colour, marker = style.method_look(method)
         height = 0.18 * (2 * m - len(methods) + 1)
         told = [(i, tallies[method, kind]) for i, kind in enumerate(kinds) if (method, kind) in tallies]
         shares = [(i + height, share(t.hazards, t.activated)) for i, t in told if t.activated]

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.model import Method
 from mutator.statistics.times import Spread, propagation
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) -> None:
     """A bar from quartile to quartile, a line at the median, a marker at the mean, the number above."""
-    colour, marker = style.METHOD_LOOKS[Method(method)]
+    colour, marker = style.method_look(method)
     known = [(x, spread) for x, spread in spreads if spread.n]
     xs = [x for x, _ in known]
     lower = [s.lower for _, s in known]

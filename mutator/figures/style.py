@@ -16,8 +16,12 @@ TEXT, SMALL = 9, 8  # points
 INK = "#222222"
 HAZARD_COLOURS = ("#d55e00", "#f0e442", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
 SEVERAL_COLOUR = "#444444"
-# colour and marker: a method looks the same in every report, also where it is alone
-METHOD_LOOKS = {Method.GUIDED: ("#0072b2", "o"), Method.RANDOM: ("#d55e00", "s")}
+_METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7", "D"))
+
+
+def method_look(method: str) -> tuple[str, str]:
+    """Colour and marker: a method looks the same in every report, also where it is alone."""
+    return _METHOD_LOOKS[list(Method).index(Method(method)) % len(_METHOD_LOOKS)]
 
 
 def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tuple["Figure", list["Axes"]]:

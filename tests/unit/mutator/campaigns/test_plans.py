@@ -311,7 +311,7 @@ def test_published_plans_keep_their_digests(
     clone: Workspace, campaign: str, reading: str, promised: str
 ) -> None:
     """Whoever cites a plan's digest, and with it all its experiments' ids, finds it in every version."""
-    assert make_plan(clone, campaign, reading=reading).digest == promised
+    assert make_plan(clone, campaign, Choices(reading=reading)).digest == promised
 
 
 def test_the_run_schema_is_no_part_of_the_plan_digest(
