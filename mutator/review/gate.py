@@ -75,6 +75,6 @@ def _of(group: Group) -> str:
 def _name(workspace: Workspace, plan: Plan) -> str:
     """The campaign as a command names it: by its name where that means this text, else by its file."""
     name = plan.campaign.name
-    known = name in workspace.campaign_names()
+    known = name in workspace.campaigns
     same = known and workspace.campaign(name).read_bytes() == plan.campaign.source
     return name if same else shlex.quote(str(plan.campaign.path))

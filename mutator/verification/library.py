@@ -40,7 +40,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     manifest = found.tried(lambda: workspace.manifest(target))
     models = found.tried(workspace.fault_models)
     hazards = found.tried(workspace.hazards)
-    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_table_names()]
+    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
     specs = [found.tried(partial(workspace.spec, path)) for path in workspace.spec_files()]
     if models:
         found.problems += check_examples(models)

@@ -59,10 +59,10 @@ def test_nothing_found(elsewhere: Path) -> None:
 
 def test_names_and_paths(toy: Workspace) -> None:
     """Everything of the library is found by name or by the path of its file."""
-    assert toy.target_names() == ("toy",)
-    assert toy.scenario_names() == ("follow",)
-    assert toy.context_table_names() == ("pedals",)
-    assert toy.campaign_names() == ()
+    assert list(toy.targets) == ["toy"]
+    assert list(toy.scenarios) == ["follow"]
+    assert list(toy.context_tables) == ["pedals"]
+    assert not toy.campaigns
     path = toy.library / "scenarios" / "follow.yaml"
     assert toy.scenario("follow") == toy.scenario(path) == path
     assert toy.spec_files() == (toy.library / "faults" / "sensor" / "distance.yaml",)
