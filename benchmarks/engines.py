@@ -25,7 +25,7 @@ from mutator.engines.jobs import Engine, Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E402
 from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
-from mutator.mutants import building as mutant  # noqa: E402
+from mutator.mutants.building import build  # noqa: E402
 from mutator.outcomes import golden  # noqa: E402
 from mutator.store.run_folder import golden_key  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
@@ -58,7 +58,7 @@ class Bench:
         work = folder / "work"
         work.mkdir()
         base = prepare_base(self.manifest, folder / "base")
-        null = mutant.build(self.manifest, self.models, None, always()).files
+        null = build(self.manifest, self.models, None, always()).files
         arguments = (self.manifest, base, work, plan.campaign.limits)
         self.engines: dict[str, Callable[[], Engine]] = {
             "reference": lambda: ReferenceEngine(*arguments),

@@ -1,4 +1,4 @@
-"""Mutants per second: from molds, the direct way, and the direct way with each file parsed by LibCST again.
+"""Mutants per second: from reused changes, spliced, and spliced with each file parsed by LibCST again.
 
 `python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. First every experiment of the paper's
 campaign has its mutant built, diff, compile check and digests included; then all ways build the same sample
@@ -43,29 +43,29 @@ def main() -> None:
     plan = make_plan(workspace, "paper")
     manifest, models = workspace.manifest(plan.campaign.target), workspace.fault_models()
 
-    def molded(experiment: Experiment) -> None:
+    def reused(experiment: Experiment) -> None:
         build(manifest, models, experiment.fault, experiment.trigger)
 
-    def direct(experiment: Experiment) -> None:
+    def spliced(experiment: Experiment) -> None:
         build_directly(manifest, models, experiment.fault, experiment.trigger)
 
     def parsed(experiment: Experiment) -> None:
         changed = {manifest.observation.location, *(i.location for i in experiment.fault.injections)}
         for path in {location.path for location in changed}:
             parse_file(path, manifest.tree.files[path], manifest.root)
-        direct(experiment)
+        spliced(experiment)
 
-    whole = rate(molded, list(plan.experiments))
+    whole = rate(reused, list(plan.experiments))
     print(f"the paper's {len(plan.experiments)}: {whole:.0f} a second (goal {GOAL:.0f})")
     sample = random.Random(1).sample(plan.experiments, options.sample)
-    ways = {"molds": molded, "direct": direct, "direct, parsed": parsed}
+    ways = {"reused": reused, "spliced": spliced, "spliced, parsed": parsed}
     rates: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(options.rounds):
         for name, make in ways.items():
             rates[name].append(rate(make, sample[: 20 if make is parsed else None]))
     for name, values in rates.items():
-        ratios = [mold / value for mold, value in zip(rates["molds"], values, strict=True)]
-        print(f"  {name:16}{median(values):8.1f} a second, molds {median(ratios):7.2f} times as many")
+        ratios = [reuse / value for reuse, value in zip(rates["reused"], values, strict=True)]
+        print(f"  {name:16}{median(values):8.1f} a second, reused {median(ratios):7.2f} times as many")
     if options.json:
         figures = {"unit": "1/s of CPU", "campaign": whole, "rates": rates}
         options.json.write_text(json.dumps(figures, indent=1) + "\n")

@@ -27,7 +27,7 @@ from mutator.engines.jobs import Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E402
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
-from mutator.mutants import building as mutant  # noqa: E402
+from mutator.mutants.building import build  # noqa: E402
 from mutator.store.records import SCHEMA, LineWriter  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
@@ -83,7 +83,7 @@ class Bench:
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
         """What the experiments cost an engine, but for the first `FEW`, which do what is done once; all of
         them must be forked."""
-        null = mutant.build(self.manifest, self.models, None, always()).files
+        null = build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda scenario, changes: self.folder / "golden" / "out")
         runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)

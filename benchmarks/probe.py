@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.engines import bytecode  # noqa: E402
-from mutator.mutants import building as mutant  # noqa: E402
+from mutator.mutants.building import build  # noqa: E402
+from mutator.mutants.probe import probe_path  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
@@ -57,8 +58,8 @@ def main() -> int:
     options = parser.parse_args()
     workspace = Workspace.find(root=ROOT)
     manifest = workspace.manifest("openpilot")
-    null = mutant.build(manifest, workspace.fault_models(), None, always()).files
-    (changed,) = null.keys() - {manifest.probe_path}
+    null = build(manifest, workspace.fault_models(), None, always()).files
+    (changed,) = null.keys() - {probe_path(manifest.package)}
     with tempfile.TemporaryDirectory() as folder:
         trees = {"pristine": Path(folder, "pristine"), "null mutant": Path(folder, "null")}
         bytecode.write_compiled(manifest.tree.files, trees["pristine"])

@@ -34,7 +34,7 @@ from mutator.report import browse as report_browse
 from mutator.report import page as report_page
 from mutator.report import series as report_series
 from mutator.report.browse import Browse
-from mutator.report.building import Content
+from mutator.report.page import Content
 from mutator.review.groups import shapes
 from mutator.web import embedded
 from mutator.workspace import Workspace
@@ -126,18 +126,14 @@ def write(size: int, out: Path) -> dict[str, float]:
     )
     content = Content(
         name=f"{size} experiments",
-        facts=[],
-        planned="",
+        alarm="",
         outcomes=tables.outcome_counts(rows),
-        tables=[],
-        observations=None,
-        statistics=(),
-        figures=(),
-        failed=[],
-        engine=None,
+        planned="",
+        notes="",
+        panels=(),
         browse=browse,
     )
-    page = report_page.page(content, out)
+    page = report_page.page(content)
     (out / "index.html").write_text(page)
     sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "series_kb": "".join(series)}
     return {"table_s": table_s} | {name: len(text.encode()) / 1000 for name, text in sizes.items()}

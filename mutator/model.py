@@ -1,10 +1,13 @@
-"""The records that pass from spec to verdict: frozen, comparable, identified by their content."""
+"""The records that pass from spec to verdict: frozen, comparable, identified by their content.
+
+A field that joins one of them later is declared with `hashing.added`, so that it changes no id.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from mutator._common.hashing import content_id
+from mutator._common.hashing import added_values, content_id
 
 Value = int | float | str | bool | None
 
@@ -161,7 +164,8 @@ class Experiment:
     def id(self) -> str:
         # through the fault's id, not its whole content: a plan hashes each fault once, not once a run
         parts = (self.scenario, self.scenario_digest, self.method, self.trigger, self.seed, self.setting)
-        return content_id([self.fault.id, *parts])
+        later = added_values(self)
+        return content_id([self.fault.id, *parts, *([later] if later else [])])
 
     @property
     def label(self) -> str:

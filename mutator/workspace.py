@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, load_fault_models
-from mutator.faults.specs import AS_DESCRIBED, FaultSpec, load_spec
+from mutator.faults.readings import Readings, load_readings
+from mutator.faults.specs import FaultSpec, load_spec
 from mutator.model import Fault
 from mutator.outcomes.columns import check_names
 from mutator.stpa.analysis import Analysis, load_analysis
@@ -59,16 +61,20 @@ class Workspace:
         templates: Path | None = None,
         target: Path | None = None,
     ) -> "Workspace":
-        """Options first, then MUTATOR_LIBRARY, MUTATOR_TEMPLATES, MUTATOR_TARGET, then `root`, MUTATOR_ROOT,
-        or the nearest folder from the current one upward that holds fault_library/; else a MutatorError."""
+        """Each of them from the first place that names or holds it.
+
+        1. the argument; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES, MUTATOR_TARGET; 3. for library and templates
+        `root` or MUTATOR_ROOT, which holds both, else the nearest folder from the current one upward that
+        holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that is missing.
+        """
         library = library or _environment("MUTATOR_LIBRARY")
         templates = templates or _environment("MUTATOR_TEMPLATES")
         target = target or _environment("MUTATOR_TARGET")
         base = root or _environment("MUTATOR_ROOT")
-        if base is None and (library is None or templates is None):
-            base = _upward(Path.cwd())
-        library = library or (base / _LIBRARY if base else None)
-        templates = templates or (base / _TEMPLATES if base else None)
+        if library is None:
+            library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
+        if templates is None:
+            templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
             library=_folder(library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
             templates=_folder(templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
@@ -90,17 +96,22 @@ class Workspace:
         """The fault models of the templates folder."""
         return load_fault_models(self.templates)
 
+    def readings(self) -> Readings:
+        """The readings that the library declares."""
+        return load_readings(self.library)
+
     def spec_files(self) -> tuple[Path, ...]:
         """Every fault spec of the library, sorted."""
         return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
         """The spec `<module>/<fault_type>`, or the spec file of that path."""
-        return load_spec(self._file("faults", name, "fault spec"))
+        return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
         """All specs of the library, in the order of `spec_files`; each is at `<module>/<fault_type>.yaml`."""
-        specs = tuple(load_spec(path) for path in self.spec_files())
+        readings = self.readings()
+        specs = tuple(load_spec(path, readings) for path in self.spec_files())
         for spec in specs:
             expected = self.library / "faults" / f"{spec.name}.yaml"
             if spec.path != expected:
@@ -136,7 +147,7 @@ class Workspace:
             fault
             for spec in specs
             if any(fnmatchcase(name, glob) for name in (spec.name, *_variants(spec)))
-            for fault in expand(spec, seed, reading or AS_DESCRIBED, models=models, manifest=manifest)
+            for fault in expand(spec, seed, reading, models=models, manifest=manifest)
             if fnmatchcase(spec.name, glob) or fnmatchcase(fault.spec, glob)
         )
         if not faults:
@@ -224,17 +235,14 @@ def _environment(name: str) -> Path | None:
     return Path(value) if value else None
 
 
-def _upward(start: Path) -> Path | None:
-    return next((p for p in (start, *start.parents) if (p / _LIBRARY).is_dir()), None)
+def _upward(*folders: str) -> Path | None:
+    """The nearest folder from the current one upward that holds fault_library/, if it holds all of these."""
+    here = Path.cwd()
+    nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
+    return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None
 
 
-def _folder(path: Path | None, what: str, option: str) -> Path:
-    if path is None:
-        raise MutatorError(
-            f"no folder {what}/ here or in any folder above",
-            where=Path.cwd(),
-            remedy=f"run inside a clone, or give --root or MUTATOR_ROOT, or {option}",
-        )
+def _folder(path: Path, what: str, option: str) -> Path:
     if not path.is_dir():
         raise MutatorError(
             f"no folder {path}",

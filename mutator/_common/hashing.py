@@ -1,16 +1,51 @@
-"""Content hashes: the same input gives the same id on every machine."""
+"""Content hashes: the same input gives the same id on every machine, in this version and in later ones.
+
+Ids and plan digests are cited, so they must outlive new fields. A field that joins a hashed record is
+declared with `added(default)`: ids and plan files leave it out while it holds that default.
+"""
 
 import dataclasses
 import hashlib
 import json
 from enum import Enum
+from functools import lru_cache
 from typing import Any
+
+_ADDED = "added"  # key in a field's metadata
+
+
+def added(default: Any) -> Any:
+    """Declare a dataclass field that joins a hashed record after its first release.
+
+    No id changes: `plain` leaves the field out while it equals `default`, and readers of older files, which
+    lack it, give it `default`. The default must be immutable and must never change.
+    """
+    return dataclasses.field(default=default, metadata={_ADDED: True})
+
+
+def added_values(record: Any) -> dict[str, Any]:
+    """The `added` fields of a dataclass instance that differ from their defaults, as `plain` values."""
+    _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable, says Python
+    values = ((name, getattr(record, name), default) for name, default in later)
+    return {name: plain(value) for name, value, default in values if value != default}
+
+
+@lru_cache(maxsize=256)
+def _fields(kind: type) -> tuple[tuple[str, ...], tuple[tuple[str, Any], ...]]:
+    """Names of a dataclass's first fields; names and defaults of its `added` ones."""
+    every = dataclasses.fields(kind)
+    first = tuple(f.name for f in every if _ADDED not in f.metadata)
+    return first, tuple((f.name, f.default) for f in every if _ADDED in f.metadata)
 
 
 def plain(value: Any) -> Any:
-    """Turn records, tuples and enums into what JSON knows; floats stay as they are."""
+    """Turn records, tuples and enums into what JSON knows; floats stay as they are.
+
+    Of a record's `added` fields only those count that differ from their defaults.
+    """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        first, _ = _fields(type(value))
+        return {name: plain(getattr(value, name)) for name in first} | added_values(value)
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

@@ -37,7 +37,7 @@ class Table:
             texts = [markdown_line(c).replace("|", "\\|") for c in cells] if escape else cells
             return f"| {' | '.join(texts)} |"
 
-        rule = f"| {' | '.join('---' for _ in self.heads)} |"
+        rule = f"|{'---|' * len(self.heads)}"
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
     def as_html(self, style: str = "") -> "Markup":

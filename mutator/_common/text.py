@@ -4,9 +4,9 @@ import difflib
 from typing import Any
 
 
-def counted(count: int, noun: str) -> str:
-    """A number of things: 1 run, 2 runs."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """A number of things: 1 run, 2 runs; `plural` where it is not the noun and an s."""
+    return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
 def shown(value: Any) -> str:

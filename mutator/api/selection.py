@@ -11,7 +11,7 @@ from typing import TypeAlias
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.specs import AS_DESCRIBED, FaultSpec, Variant
+from mutator.faults.specs import FaultSpec, Variant
 from mutator.model import Fault, Trigger
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -75,8 +75,7 @@ class Bench:
         spec = choice.narrowed(self.workspace.spec(choice.spec))
         for problem in check_spec(spec, self.models, self.manifest):
             raise problem
-        reading = choice.reading or AS_DESCRIBED
-        return expand(spec, choice.seed or 0, reading, models=self.models, manifest=self.manifest)
+        return expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
 
     def fault(
         self, given: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None

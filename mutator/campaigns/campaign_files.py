@@ -3,16 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
+from mutator.campaigns.studies import study_names
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
-from mutator.faults.specs import AS_CODED, AS_DESCRIBED
+from mutator.faults.readings import FILE, Readings
 from mutator.model import Limits, Method
 
 SCHEMA = "campaign/1"
+EVERY_READING = "*"  # whose time is in `armed_after_s` if that is one number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,21 +48,24 @@ class Campaign:
 
     `sample` is how many experiments are taken: each variant as often, or, with `proportional`, each fault
     type in each scenario in proportion to its number, guided and random ones in pairs.
+    `study` names the published work that reports of the campaign stand beside (None: none).
     `setting` names changes of the manifest that every run of the campaign is made with.
-    `armed_after_s` is by reading: before that time no trigger fires and no random time is drawn.
+    `reading` is None for the library's default. Before `armed_after(reading)` no trigger fires and no random
+    time is drawn.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
     random time to the end).
     """
 
     name: str
     about: str
+    study: str | None
     path: Path
     source: bytes
     target: str
     scenarios: tuple[str, ...]
     setting: tuple[str, ...]
     faults: tuple[Selection, ...]
-    reading: str
+    reading: str | None
     methods: tuple[Method, ...]
     table: str
     rows: tuple[str, ...] | None
@@ -75,67 +80,132 @@ class Campaign:
     chunk: int
     yaml: Source
 
+    def armed_after(self, reading: str) -> float:
+        """When triggers are armed under a reading."""
+        times = self.armed_after_s
+        return times[reading] if reading in times else times[EVERY_READING]
+
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
         """An error (not raised) that points into the campaign file."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
 
 
-class _SelectionModel(StrictModel):
-    spec: str
-    values: int | None = Field(None, ge=1)
+class _SelectionModel(StrictModel, title="A selection"):
+    """Faults of the library, by the names of their specs."""
+
+    spec: str = Field(
+        description="A glob over `<module>/<fault_type>/<variant>`: `radar/*`, `car_sensors/speed/low`."
+    )
+    values: int | None = Field(
+        None, ge=1, description="How many of each variant's values, spread evenly; without it, all."
+    )
 
 
-class _ArmingModel(StrictModel):
-    as_described: float = Field(ge=0.0, allow_inf_nan=False)
-    as_coded: float = Field(ge=0.0, allow_inf_nan=False)
+_Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_SECONDS = {"type": "number", "minimum": 0.0}
 
 
-class _TriggersModel(StrictModel):
-    table: str
-    rows: list[str] | None = Field(None, min_length=1)
-    armed_after_s: _ArmingModel
-    random_until_s: float = Field(gt=0.0, allow_inf_nan=False)
-    hold_s: float | None = Field(None, gt=0.0, allow_inf_nan=False)
+class _TriggersModel(StrictModel, title="Triggers"):
+    """Guided experiments wait for the contexts of a table, random ones for a time that is drawn."""
+
+    table: str = Field(description="A context table, by its name.")
+    rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
+    armed_after_s: Annotated[
+        dict[str, _Seconds],
+        WithJsonSchema({"anyOf": [_SECONDS, {"type": "object", "additionalProperties": _SECONDS}]}),
+    ] = Field(
+        min_length=1,
+        description="Before that time no trigger fires and no random time is drawn, in s since the start "
+        "of a run: one number, or one for each reading by its name.",
+    )
+    random_until_s: float = Field(
+        gt=0.0,
+        allow_inf_nan=False,
+        description="The latest random time. One past the end of a scenario never comes.",
+    )
+    hold_s: float | None = Field(
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="How long a fault stays active once triggered; without it, while its context holds, or "
+        "from its random time to the end.",
+    )
+
+    @field_validator("armed_after_s", mode="before")
+    @classmethod
+    def _by_reading(cls, given: object) -> object:
+        return given if isinstance(given, dict) else {EVERY_READING: given}
 
     @model_validator(mode="after")
     def _check(self) -> "_TriggersModel":
-        if self.random_until_s <= max(self.armed_after_s.as_described, self.armed_after_s.as_coded):
+        if self.random_until_s <= max(self.armed_after_s.values()):
             raise ValueError("random_until_s must be later than armed_after_s")
         return self
 
 
-class _CanaryModel(StrictModel):
-    spec: str
-    scenario: str
-    hazard: str
-    at_s: float = Field(ge=0.0, allow_inf_nan=False)
+class _CanaryModel(StrictModel, title="The canary"):
+    """A fault known to be harmful. It must reach its hazard, or the campaign does not start."""
+
+    spec: str = Field(
+        description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken."
+    )
+    scenario: str = Field(description="The scenario.")
+    hazard: str = Field(description="The hazard that must come.")
+    at_s: float = Field(ge=0.0, allow_inf_nan=False, description="From when on the fault is active.")
 
 
-class _LimitsModel(StrictModel):
-    cpu_s: int = Field(default=60, ge=1)
-    wall_s: int = Field(default=300, ge=1)
-    memory_mb: int = Field(default=4096, ge=256)
-    steps: int = Field(default=20_000, ge=1)
+class _LimitsModel(StrictModel, title="Limits"):
+    """What one run may use before it is stopped."""
+
+    cpu_s: int = Field(default=60, ge=1, description="Seconds of CPU.")
+    wall_s: int = Field(default=300, ge=1, description="Seconds of wall time.")
+    memory_mb: int = Field(default=4096, ge=256, description="MiB of address space.")
+    steps: int = Field(default=20_000, ge=1, description="Steps of simulation.")
 
 
-class CampaignModel(StrictModel):
-    """A campaign file, but for its key `schema`."""
+class CampaignModel(StrictModel, title="The file"):
+    """What is run, and what each run may use."""
 
-    name: str = Field(pattern=r"^[a-z0-9_]+$")
-    about: str
-    target: str
-    scenarios: list[str] = Field(min_length=1)
-    setting: list[str] = Field(default_factory=list)
-    faults: list[_SelectionModel] = Field(min_length=1)
-    reading: Literal["as_described", "as_coded"] = "as_described"
-    methods: list[Literal["guided", "random"]] = Field(min_length=1)
-    triggers: _TriggersModel
-    sample: int | None = Field(None, ge=1)
-    proportional: bool = False
-    seed: int = Field(ge=0, lt=2**63)
-    canary: _CanaryModel
-    limits: _LimitsModel = _LimitsModel()
-    chunk: int = Field(20, ge=1, le=1000)
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="Its name: small letters, digits and `_`.")
+    about: str = Field(description="What it is for.")
+    study: str | None = Field(
+        None, description="The [study](../how-to/add-a-study.md) that its reports compare the results with."
+    )
+    target: str = Field(description="The target, by the name of its manifest.")
+    scenarios: list[str] = Field(min_length=1, description="Names of scenarios, each once.")
+    setting: list[str] = Field(
+        default_factory=list,
+        description="Changes of the manifest that every run is made with, fault-free ones included.",
+    )
+    faults: list[_SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
+    reading: str | None = Field(
+        None,
+        description="One of the library's [readings](fault-spec.md#readings); without it, the first. "
+        "`--reading` overrides it.",
+    )
+    methods: list[Literal["guided", "random"]] = Field(
+        min_length=1, description="`guided`, `random` or both."
+    )
+    triggers: _TriggersModel = Field(description="When faults become active.")
+    sample: int | None = Field(
+        None,
+        ge=1,
+        description="How many experiments are taken, each variant as often as another; without it, all.",
+    )
+    proportional: bool = Field(
+        False,
+        description="The sample takes each fault type in each scenario in proportion to its number, guided "
+        "and random ones in pairs.",
+    )
+    seed: int = Field(ge=0, lt=2**63, description="The seed of all that is drawn; `--seed` overrides it.")
+    canary: _CanaryModel = Field(description="The check that a known fault does harm.")
+    limits: _LimitsModel = Field(_LimitsModel(), description="What one run may use.")
+    chunk: int = Field(
+        20,
+        ge=1,
+        le=1000,
+        description="How many experiments make a unit of work, which a worker takes at a time.",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "CampaignModel":
@@ -154,10 +224,18 @@ def load_campaign(path: Path) -> Campaign:
                 raise source.error(
                     (key, i), f"'{value}' stands here a second time", remedy="remove one of the two"
                 )
+    if model.study is not None and model.study not in (known := study_names()):
+        raise source.error(
+            ("study",),
+            f"study '{model.study}' is not installed",
+            expected=f"one of {', '.join(known) or 'none'}",
+            remedy="correct the name, or install the package that provides the study",
+        )
     triggers = model.triggers
     return Campaign(
         name=model.name,
         about=model.about.strip(),
+        study=model.study,
         path=path,
         source=path.read_bytes(),
         target=model.target,
@@ -168,10 +246,7 @@ def load_campaign(path: Path) -> Campaign:
         methods=tuple(Method(name) for name in model.methods),
         table=triggers.table,
         rows=tuple(triggers.rows) if triggers.rows else None,
-        armed_after_s={
-            AS_DESCRIBED: triggers.armed_after_s.as_described,
-            AS_CODED: triggers.armed_after_s.as_coded,
-        },
+        armed_after_s=triggers.armed_after_s,
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
         sample=model.sample,
@@ -182,3 +257,27 @@ def load_campaign(path: Path) -> Campaign:
         chunk=model.chunk,
         yaml=source,
     )
+
+
+def check_readings(campaign: Campaign, readings: Readings) -> None:
+    """MutatorError with file and line for a reading that the library does not declare, or for one that
+    `armed_after_s` leaves out."""
+    known, keys = ", ".join(readings.names), ("triggers", "armed_after_s")
+    remedy = f"correct the name, or declare the reading in the library's {FILE}"
+    if campaign.reading is not None and campaign.reading not in readings.names:
+        raise campaign.error(
+            ("reading",), f"reading '{campaign.reading}'", expected=f"one of {known}", remedy=remedy
+        )
+    if EVERY_READING in campaign.armed_after_s:
+        return
+    for name in campaign.armed_after_s:
+        if name not in readings.names:
+            raise campaign.error(
+                (*keys, name), f"reading '{name}'", expected=f"one of {known}", remedy=remedy
+            )
+    for name in readings.names:
+        if name not in campaign.armed_after_s:
+            remedy = f"add `{name}: ...`, or write one number for all of them"
+            raise campaign.error(
+                keys, f"no time for reading '{name}'", expected=f"one for each of {known}", remedy=remedy
+            )

@@ -29,7 +29,7 @@ class Expansion:
         self.manifest = manifest
         self.seed = seed
         self.reading = reading
-        self.armed_after_s = campaign.armed_after_s[reading]
+        self.armed_after_s = campaign.armed_after(reading)
         self._digests: dict[str, str] = {}
 
     def experiments(self) -> tuple[Experiment, ...]:
@@ -131,7 +131,7 @@ class Expansion:
                     yield self._experiment(fault, scenario, method, trigger)
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
-        """The random partner of a row's trigger, the same in both readings but for when times begin."""
+        """The random partner of a row's trigger, the same in every reading but for when times begin."""
         time = draw_time(
             self.seed,
             f"{scenario}/{fault.spec}/{number}/{row.name}",

@@ -13,14 +13,15 @@ from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
-from mutator.campaigns.campaign_files import Campaign, load_campaign
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.provenance import check_sources, sources, versions
+from mutator.campaigns.provenance import check_sources, check_version, sources, versions
 from mutator.campaigns.sampling import pick, pick_in_proportion
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
+from mutator.faults.readings import Readings
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file as planfile
@@ -32,6 +33,8 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     import pandas as pd
 
+# First part of every plan digest. Digests are cited, so this text stays whatever becomes of the run schema.
+_DIGEST_PREFIX = "run/1"
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
 _DEFAULT_CPU_S = 1.4  # one run on the reference engine, interpreter start included
 _START_S = 3.0  # of a campaign, before and after its runs
@@ -141,8 +144,10 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     loaded = load_campaign(workspace.campaign(campaign))
     choices = choices or Choices()
     seed = loaded.seed if choices.seed is None else choices.seed
-    reading = choices.reading or loaded.reading
-    _check(choices, loaded)
+    readings = workspace.readings()
+    check_readings(loaded, readings)
+    reading = choices.reading or loaded.reading or readings.default
+    _check(choices, readings)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
     once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
@@ -163,15 +168,14 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
         experiments=experiments,
         chunks=chunks,
         canary=canary,
-        digest=digest([SCHEMA, *content]),
+        digest=digest([_DIGEST_PREFIX, *content]),
         runs=len(once),
     )
 
 
-def _check(choices: Choices, campaign: Campaign) -> None:
-    if choices.reading is not None and choices.reading not in campaign.armed_after_s:
-        known = " or ".join(campaign.armed_after_s)
-        raise MutatorError(f"reading '{choices.reading}'", expected=known, remedy="correct --reading")
+def _check(choices: Choices, readings: Readings) -> None:
+    if choices.reading is not None:
+        readings.check(choices.reading)
     for name in ("seed", "limit"):
         value = getattr(choices, name)
         if value is not None and value < (name == "limit"):
@@ -252,6 +256,7 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
                 expected=f"plan {plan.digest[:16]}",
                 remedy="use another folder, or the campaign and options it was planned with",
             )
+        check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(plan, workspace))
         return folder
     write_atomic(out / "campaign.yaml", plan.campaign.source)
@@ -274,6 +279,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dic
         "plan": plan.digest,
         "campaign": plan.campaign.name,
         "campaign_digest": digest(plan.campaign.source),
+        "study": plan.campaign.study,
         "target": plan.campaign.target,
         "seed": plan.seed,
         "reading": plan.reading,

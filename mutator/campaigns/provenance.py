@@ -1,6 +1,7 @@
 """What a run depends on: digests of its sources, versions of what runs them."""
 
 import platform
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
+from mutator.store.run_folder import SCHEMA
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -33,6 +35,20 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
             where=run,
             expected="the same target, templates and scenarios during a whole run",
             remedy=_REMEDY,
+        )
+
+
+def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None:
+    """MutatorError when a run folder is of another schema or version of mutator than this one.
+
+    Such a folder can be read in every way, but not be run on: all its results come from one program.
+    """
+    if (schema, provenance["mutator"]) != (SCHEMA, VERSION):
+        raise MutatorError(
+            f"was planned by mutator {provenance['mutator']} ({schema})",
+            where=run,
+            expected=f"mutator {VERSION} ({SCHEMA})",
+            remedy="finish it with that version, or run into another folder; this one can still be read",
         )
 
 

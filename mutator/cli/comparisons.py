@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
 EXAMPLES = """\b
 Examples:
   mutator compare runs/before runs/after
-  mutator compare runs/paper runs/robust --only 'module == "vision_input"'
+  mutator compare runs/before runs/after --only 'module == "vision_input"'
   mutator compare runs/main runs/change --fail-on new-hazard,new-crash,harness-error
 
 With --fail-on, exit code 1 if anything of that kind is found (each is named), else 3 if experiments have no

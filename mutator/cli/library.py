@@ -153,7 +153,7 @@ def check(
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    with terminal.wait("checking every spec in both readings"):
+    with terminal.wait("checking every spec in every reading"):
         problems = check_library(workspace, workspace.target_name(manifest))
     if as_json:
         terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
@@ -163,9 +163,10 @@ def check(
         terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = sum(spec.count for spec in workspace.specs())
-    terminal.say(
-        f"all well: {len(workspace.spec_files())} specs, {faults} faults, in both readings", style="green"
+    readings = {1: "", 2: ", in both readings"}.get(
+        number := len(workspace.readings().names), f", in all {number} readings"
     )
+    terminal.say(f"all well: {len(workspace.spec_files())} specs, {faults} faults{readings}", style="green")
 
 
 def _line(text: str) -> str:

@@ -14,12 +14,14 @@ from typer.main import get_command
 from mutator._common.interrupts import terminable
 from mutator._common.version import VERSION
 from mutator.cli import (
+    caches,
     campaigns,
     comparisons,
     experiments,
     exports,
     faults,
     library,
+    new_library,
     reviews,
     run_folders,
     stpa,
@@ -39,7 +41,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "stpa", "check", "doctor")),
+    ("Look around", ("list", "init", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -55,8 +57,8 @@ Examples:
 
 \b
 Exit codes: {", ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())}.
-Where things are is said by options, before or after the command, or by the environment; inside
-a clone neither is needed.
+Library, templates and target are those of an option, before or after the command; of the environment;
+of the nearest folder upward with a fault_library/; else those that ship with mutator.
 """
 
 
@@ -102,7 +104,19 @@ def start(
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
-for module in (library, stpa, faults, reviews, campaigns, run_folders, comparisons, exports, experiments):
+for module in (
+    library,
+    new_library,
+    stpa,
+    faults,
+    reviews,
+    campaigns,
+    run_folders,
+    comparisons,
+    exports,
+    experiments,
+    caches,
+):
     module.register(app)
 
 

@@ -20,7 +20,7 @@ Manifest = Annotated[
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of drawn values and times.")]
 Reading = Annotated[
     str | None,
-    typer.Option(help="as_described: units as the text means them; as_coded: as the code had them."),
+    typer.Option(metavar="NAME", help="A reading that the library declares; default: its first."),
 ]
 Variant = Annotated[str | None, typer.Option(help="Only this variant of the spec.")]
 Value = Annotated[float | None, typer.Option(help="This value (in the spec's unit) instead of drawn ones.")]

@@ -42,14 +42,12 @@ class Wanted:
                 target = plan.campaign.target
                 groups = catalogue.of_plan(workspace, plan)
             else:
-                from mutator.faults.specs import READINGS
-
                 target = workspace.target_name(self.manifest)
                 groups = catalogue.of_library(
                     workspace,
                     workspace.manifest(target),
                     specs=self.specs,
-                    readings=(self.reading,) if self.reading else READINGS,
+                    reading=self.reading,
                     seed=self.seed or 0,
                 )
         manifest = workspace.manifest(target)

@@ -20,7 +20,7 @@ CONDITIONS = 6
 
 def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
     """A group for a program; `whole`: with its diff and values."""
-    from mutator.review.words import values
+    from mutator.review.readable_groups import value_table
 
     decision = review.decisions.get(group.id)
     facts = {**columns(review, group), "what": group.what, "injections": group.injections}
@@ -28,7 +28,7 @@ def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, 
     facts |= {"changed": decision.changed(group) if decision else [], "bound": asdict(group.bound)}
     if not whole:
         return facts
-    heads, rows = values(group)
+    heads, rows = value_table(group)
     return facts | {
         "diff": group.diff,
         "values": [dict(zip(heads, row, strict=True)) for row in rows],
@@ -74,24 +74,25 @@ def _when(group: "Group") -> str:
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     """One group: what it is, what was said of it, diff with holes, values, triggers."""
-    from mutator.review.words import conditions, values
+    from mutator.review.readable_groups import condition_lines, value_table
 
     state = review.state(group).value
     terminal.say(f"group {group.id}: {state}", style=STYLES[state])
-    if told := review.told(group):
-        terminal.say(told)
+    if decision := review.describe(group):
+        terminal.say(decision)
     for injection in group.injections:
         terminal.say(f"  {injection}", style="bold")
     runs = "" if group.runs is None else f", {counted(group.runs, 'experiment')}"
     terminal.say(f"when: {_when(group)}; {counted(len(group.faults), 'fault')}{runs}")
-    for line in conditions(group.triggers)[:CONDITIONS]:
+    conditions = condition_lines(group.triggers)
+    for line in conditions[:CONDITIONS]:
         terminal.say(f"  {line}")
-    if (more := len(conditions(group.triggers)) - CONDITIONS) > 0:
+    if (more := len(conditions) - CONDITIONS) > 0:
         terminal.say(f"  and {more} more")
     terminal.say()
     terminal.diff(group.diff)
     terminal.say()
-    heads, rows = values(group)
+    heads, rows = value_table(group)
     if rows:
         terminal.table(heads, rows[:ROWS], right=range(2, len(heads)))
         if len(rows) > ROWS:

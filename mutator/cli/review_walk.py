@@ -43,7 +43,7 @@ def walk_through(terminal: Terminal, load: Callable[[], "Loaded"], by: str) -> N
         verdict = Verdict.APPROVED if key == "a" else Verdict.REJECTED
         review = review.decided([group], verdict, by, remark)
         review.write()
-        terminal.say(f"{group.id} {review.told(group)}", style=view.STYLES[verdict.value])
+        terminal.say(f"{group.id} {review.describe(group)}", style=view.STYLES[verdict.value])
     terminal.say(f"{short_path(review.path)}: {view.counts(review, found.groups)}")
 
 

@@ -40,7 +40,7 @@ Remark = Annotated[str, typer.Option(metavar="TEXT", help="Kept with the decisio
 EXAMPLES = """\b
 Examples:
   mutator review                                   all of the library: new and changed groups first
-  mutator review --campaign paper_smoke            what one campaign runs
+  mutator review --campaign quickstart             what one campaign runs
   mutator review --only 'state == "new" and match(file, "*radar*")'
   mutator review show 3f9a                         one group: diff with holes, values
   mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"
@@ -180,7 +180,7 @@ def _decide(
     if terminal.as_json:
         terminal.emit([view.data(decided, group) for group in groups])
     for group in groups:
-        terminal.say(f"{group.id} {decided.told(group)}", style=view.STYLES[verdict.value])
+        terminal.say(f"{group.id} {decided.describe(group)}", style=view.STYLES[verdict.value])
     terminal.say(f"{short_path(decided.path)}: {view.counts(decided, found.groups)}")
 
 

@@ -63,7 +63,7 @@ def merge(
 REPORT_EXAMPLES = """\b
 Examples:
   mutator report runs/first
-  mutator report /data/paper --root ~/openpilot-faults
+  mutator report /data/night --root ~/openpilot-faults
 """
 
 

@@ -7,19 +7,29 @@ from pydantic import Field
 from mutator.config.yaml_files import Keys, Source, StrictModel
 from mutator.model import Anchor, AnchorKind, FaultLocation
 
+PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target does (mutants/probe.py)
 
-class AtModel(StrictModel):
-    """File, qualified function name, exactly one anchor, and `nth` where there are several hits."""
 
-    file: str
-    function: str
-    after_assign: str | None = None
-    before_assign: str | None = None
-    after_call: str | None = None
-    before_call: str | None = None
-    before_return: str | None = None
-    entry: bool | None = None
-    nth: int | None = Field(None, ge=1)
+class AtModel(StrictModel, title="A place"):
+    """Exactly one anchor is given. It must be found exactly once in the function, in statement position; if
+    there are several, the error lists them and `nth` chooses one. Names are as written in the source
+    (`d_rel`, `self.angle`, `frames.extend`)."""
+
+    file: str = Field(description="A file of the target, relative to its root.")
+    function: str = Field(
+        description="A qualified name: `measure`, `RadarSensor.measure`, `outer.<locals>.inner`."
+    )
+    after_assign: str | None = Field(None, description="After the statement that assigns to this name.")
+    before_assign: str | None = Field(None, description="Before the statement that assigns to this name.")
+    after_call: str | None = Field(None, description="After the statement that calls this name.")
+    before_call: str | None = Field(
+        None, description="Before the statement that calls this name; the statement a guard leaves out."
+    )
+    before_return: str | None = Field(
+        None, description="Before the `return` of this name; empty for a bare `return`."
+    )
+    entry: bool | None = Field(None, description="`true`: at the start of the function.")
+    nth: int | None = Field(None, ge=1, description="Which of several hits, counted from 1.")
 
     def location(self, source: Source, keys: Keys) -> FaultLocation:
         """The location; errors point into `source` at `keys`."""
@@ -48,4 +58,4 @@ class AtModel(StrictModel):
 def dotted_name(text: str) -> bool:
     """Whether `text` is a chain of identifiers that are no keywords and not the probe's name."""
     parts = text.split(".")
-    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != "_fi"
+    return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_NAME

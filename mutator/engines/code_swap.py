@@ -1,10 +1,10 @@
-"""What a mutant changes in a loaded program: functions whose code can be exchanged, or why it cannot.
+"""Which functions of a loaded program a mutant changes, and whether their code can be swapped.
 
-A mutant's files differ from the pristine ones by inserted lines alone, so whatever stands outside functions
-is the same but for the import of the probe. Between two steps of a run no function of the target is at work:
-the code of the changed ones can then be exchanged in place, and all that holds them (methods, closures, names
-imported elsewhere) goes on with the new code. Until its trigger first holds, such a program does what the
-pristine one does: every inserted statement is guarded by the probe, and none hides a name.
+A mutant's files differ from the pristine ones by inserted lines alone, so outside functions nothing differs
+but the import of the probe. Between two steps of a run no function of the target is at work. The code of the
+changed functions can then be swapped in place, and whatever refers to them (methods, closures, names imported
+elsewhere) goes on with the new code. Until its trigger first holds, such a program does what the pristine one
+does: the probe guards every inserted statement, and none of them hides a name.
 """
 
 import re
@@ -14,24 +14,22 @@ from functools import lru_cache
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
-from mutator.mutants.anchors import TAG
-from mutator.mutants.building import OBSERVE_TAG, unsplice
-from mutator.mutants.splicing import PROBE_TAG
+from mutator.mutants.probe import probe_path, tag_of
+from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 
 _SUSPENDED = CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
-_GUARD = re.compile(rb'\s*if (not )?_fi\.active\("[0-9a-z]+"\)( or _fi\.steps\(\))?:\Z')
 _IMPORT = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
 
 
-class NotExchangeable(Exception):
+class NotSwappable(Exception):
     """The mutant cannot be put into a running program; the text says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Function:
-    """A function of a module, by the names that lead to it (class, method), and its code before and after."""
+class FunctionSwap:
+    """A function of a module, the names that lead to it (class, method), and its code before and after."""
 
     module: str
     path: tuple[str, ...]
@@ -40,51 +38,54 @@ class Function:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Exchange:
-    """All that makes a loaded pristine program the mutant. `imports` are modules that injected lines import;
-    they may be loaded beforehand."""
+class CodeSwap:
+    """All that turns a loaded pristine program into the mutant.
 
-    functions: tuple[Function, ...]
+    `imports` are modules that injected lines import; they may be loaded beforehand.
+    """
+
+    functions: tuple[FunctionSwap, ...]
     probe: CodeType
     imports: tuple[str, ...]
 
 
-def exchange(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> Exchange:
-    """The exchange that makes the pristine tree in the folder `tree`, loaded, the mutant with these `files`.
+def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
+    """What turns the loaded pristine program, whose tree is the folder `tree`, into the mutant with `files`.
 
-    NotExchangeable when there is none that is sure to do the same.
+    NotSwappable when the result might differ from the mutant started on its own.
     """
-    functions: list[Function] = []
+    functions: list[FunctionSwap] = []
     imports: dict[str, None] = {}
+    probe_file = probe_path(manifest.package)
     for path, data in files.items():
-        if path == manifest.probe_path:
+        if path == probe_file:
             continue
         if matches(path, manifest.reads_itself):
-            raise NotExchangeable(f"{path} is read by the run itself")
+            raise NotSwappable(f"{path} is read by the run itself")
         if path not in manifest.tree.files:
-            raise NotExchangeable(f"{path} is a new file")
+            raise NotSwappable(f"{path} is a new file")
         found, needed = _in_file(path, manifest.tree.files[path], data, f"{tree}/{path}")
         functions += found
         imports |= dict.fromkeys(needed)
-    if manifest.probe_path not in files:
-        raise NotExchangeable("there is no probe")
-    probe = _compiled(files[manifest.probe_path], f"{tree}/{manifest.probe_path}")
-    return Exchange(functions=tuple(functions), probe=probe, imports=tuple(imports))
+    if probe_file not in files:
+        raise NotSwappable("there is no probe")
+    probe = _compiled(files[probe_file], f"{tree}/{probe_file}")
+    return CodeSwap(functions=tuple(functions), probe=probe, imports=tuple(imports))
 
 
 @lru_cache(maxsize=64)  # every mutant changes the file that observes, most of them in no other way
 def _in_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
-) -> tuple[tuple[Function, ...], tuple[str, ...]]:
+) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
     """The changed functions of one file, and what its injected lines import."""
     if unsplice(mutated) != pristine:
-        raise NotExchangeable(f"{path} differs by more than inserted lines")
-    imports = _guarded(path, mutated.splitlines())
+        raise NotSwappable(f"{path} differs by more than inserted lines")
+    imports = _guarded_imports(path, mutated.splitlines())
     module = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     old, new = _compiled(pristine, filename), _compiled(mutated, filename)
     functions = [
-        Function(module=module, path=names, old=before, new=after)
-        for names, before, after in _changed(old, new, (), path)
+        FunctionSwap(module=module, path=names, old=before, new=after)
+        for names, before, after in changed_functions(old, new, path)
     ]
     return tuple(functions), imports
 
@@ -94,35 +95,34 @@ def _compiled(data: bytes, filename: str) -> CodeType:
     return compile(data, filename, "exec", dont_inherit=True)
 
 
-def _guarded(path: str, lines: list[bytes]) -> tuple[str, ...]:
-    """The modules that injected lines import; NotExchangeable unless all of them wait for the probe."""
+def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
+    """What injected lines import; NotSwappable unless every injected block asks the probe first."""
     imports: list[str] = []
-    before, margin = b"", 0
+    before, margin = "", 0
     for line in lines:
-        match = TAG.search(line)
-        tag = match[1] if match else b""
-        if match and tag.decode() not in (PROBE_TAG, OBSERVE_TAG):
-            code = line[: match.start()]
-            indent = len(code) - len(code.lstrip())
-            if tag != before or indent <= margin:
+        tag = tag_of(line)
+        if tag and tag.of_fault:
+            indent = len(tag.code) - len(tag.code.lstrip())
+            if tag.id != before or indent <= margin:
                 margin = indent
-                if not _GUARD.match(code):
-                    raise NotExchangeable(
-                        f"{path} has an injected statement that does not ask the probe first"
-                    )
-            elif found := _IMPORT.match(code):
+                if not tag.asks_probe:
+                    raise NotSwappable(f"{path} has an injected statement that does not ask the probe first")
+            elif found := _IMPORT.match(tag.code):
                 imports.append((found[1] or found[2]).decode())
-        before = tag
+        before = tag.id if tag else ""
     return tuple(imports)
 
 
-def _changed(
-    old: CodeType, new: CodeType, names: tuple[str, ...], path: str
+def changed_functions(
+    old: CodeType, new: CodeType, path: str, names: tuple[str, ...] = ()
 ) -> Iterator[tuple[tuple[str, ...], CodeType, CodeType]]:
-    """The functions that differ below a module or class body."""
+    """Names, old code and new code of the functions that differ in a module, or in its class `names`.
+
+    `old` and `new` are the bodies to compare. NotSwappable if anything but functions differs.
+    """
     before, after = _inner(old), _inner(new)
     if [code.co_name for code in before] != [code.co_name for code in after]:
-        raise NotExchangeable(f"{path} is changed outside its functions")
+        raise NotSwappable(f"{path} is changed outside its functions")
     for one, other in zip(before, after, strict=True):
         here = (*names, one.co_name)
         if not one.co_flags & CO_OPTIMIZED:  # a class body
@@ -131,28 +131,27 @@ def _changed(
                 other.co_freevars,
                 other.co_cellvars,
             ):
-                raise NotExchangeable(f"the body of class {'.'.join(here)} in {path} is changed")
-            yield from _changed(one, other, here, path)
+                raise NotSwappable(f"the body of class {'.'.join(here)} in {path} is changed")
+            yield from changed_functions(one, other, path, here)
         elif not same(one, other):
             _check(one, other, f"{'.'.join(here)} in {path}")
             yield here, one, other
 
 
 def _check(old: CodeType, new: CodeType, name: str) -> None:
-    """NotExchangeable unless a function's code can be `new` from now on, with no difference before a trigger
-    holds."""
+    """NotSwappable unless a function with `new` code does what it did with `old`, until a trigger holds."""
     if old.co_name.startswith("<"):
-        raise NotExchangeable(f"{name} is a function without a name")
+        raise NotSwappable(f"{name} is a function without a name")
     if new.co_flags & _SUSPENDED:
-        raise NotExchangeable(f"{name} may be suspended between two steps")
+        raise NotSwappable(f"{name} may be suspended between two steps")
     if _signature(old) != _signature(new):
-        raise NotExchangeable(f"{name} has another signature, or other variables of an outer function")
+        raise NotSwappable(f"{name} has another signature, or other variables of an outer function")
     before = _inner(old)
     if len(before) > sum(any(same(one, other) for other in _inner(new)) for one in before):
-        raise NotExchangeable(f"{name} has a function in it that is changed")
+        raise NotSwappable(f"{name} has a function in it that is changed")
     hidden = (_locals(new) - _locals(old)) & _read(old)
     if hidden:
-        raise NotExchangeable(f"{name} reads '{min(hidden)}' from outside, which an injected statement sets")
+        raise NotSwappable(f"{name} reads '{min(hidden)}' from outside, which an injected statement sets")
 
 
 def _signature(code: CodeType) -> tuple[object, ...]:
@@ -166,7 +165,7 @@ def _locals(code: CodeType) -> set[str]:
 
 
 def _read(code: CodeType) -> set[str]:
-    """Names that the function, or one inside it, takes from outside (attributes' names among them)."""
+    """Names that the function, or one inside it, reads from outside (attribute names among them)."""
     return {*code.co_names, *code.co_freevars}.union(*map(_read, _inner(code)))
 
 
@@ -175,7 +174,7 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 
 def same(one: CodeType, other: CodeType) -> bool:
-    """Whether two functions do the same, wherever their lines stand."""
+    """Whether two functions do the same, on whatever lines they are."""
     if _essence(one) != _essence(other):
         return False
     before, after = _inner(one), _inner(other)
@@ -183,7 +182,7 @@ def same(one: CodeType, other: CodeType) -> bool:
 
 
 def _essence(code: CodeType) -> tuple[object, ...]:
-    """What a function's code does, without its lines and without the functions in it."""
+    """What a function's code does, without its line numbers and the functions in it."""
     values = [(type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts]
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

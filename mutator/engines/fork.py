@@ -16,14 +16,16 @@ from typing import Any
 from mutator._common.files import disk_full, raising_disk_full, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
-from mutator.engines.code_swap import Exchange, NotExchangeable, exchange
+from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
 from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting
 from mutator.engines.jobs import Execution, Job, RunMode, Setting
 from mutator.engines.processes import Ended, is_full, judge_report, judge_silent, read_report, tail
 from mutator.engines.reference import ReferenceEngine
 from mutator.model import Limits, Status
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
+from mutator.mutants.probe import mutant_of, probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.observation import OBSERVED
 from mutator.triggers.kinds import always
 
 _MORE_S = 60.0  # beyond the wall limit of a run, until its process in the server must have answered
@@ -70,7 +72,7 @@ class ForkEngine:
         try:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)
-        except (NotExchangeable, Refused) as why:
+        except (NotSwappable, Refused) as why:
             shutil.rmtree(folder, ignore_errors=True)
             return replace(self.reference.execute(job, folder), why=str(why))
         except Lost as why:
@@ -87,15 +89,15 @@ class ForkEngine:
             raise Refused(self._unfit)
         if job.mutant is None or job.golden is None or job.hash_seed:
             raise Refused("no experiment")
-        changes = exchange(self._manifest, job.files, str(self._running().tree))
+        swap = plan_swap(self._manifest, job.files, str(self._running().tree))
         if self._warm:
             first = self._running().first
-            first.load(_needed(changes), self._patience_s)
-            return self._become(first, job, folder, changes, _FROM_THE_START)
-        start = first_active(changes.probe, self._observed(job, job.golden))
+            first.load(_needed(swap), self._patience_s)
+            return self._become(first, job, folder, swap, _FROM_THE_START)
+        start = first_active(swap.probe, self._observed(job, job.golden))
         if start is None:
             return _golden(job, job.golden)
-        return self._become(self._at(job, start.step, changes), job, folder, changes, start)
+        return self._become(self._at(job, start.step, swap), job, folder, swap, start)
 
     def _running(self) -> Pool:
         if self._pool is None:
@@ -108,12 +110,12 @@ class ForkEngine:
                 raise
         return self._pool
 
-    def _at(self, job: Job, step: int, changes: Exchange) -> Waiting:
+    def _at(self, job: Job, step: int, swap: CodeSwap) -> Waiting:
         pool = self._running()
         golden = Golden(key=_key(job), arguments=self._arguments(job, pool.home))
         seen = self._seen.get(_key(job))
         libraries = seen.libraries if isinstance(seen, Observed) else ()
-        return pool.before(step, golden, [*libraries, *_needed(changes)], self._patience_s)
+        return pool.before(step, golden, [*libraries, *_needed(swap)], self._patience_s)
 
     def _arguments(self, job: Job, out: Path) -> list[str]:
         return list(
@@ -123,7 +125,7 @@ class ForkEngine:
         )
 
     def _become(
-        self, waiting: Waiting, job: Job, folder: Path, changes: Exchange, start: Start, watch: bool = False
+        self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
     ) -> Execution:
         """Have a waiting process fork a child that finishes the run as the mutant."""
         out = folder / "out"
@@ -137,12 +139,11 @@ class ForkEngine:
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
             "steps": self._limits.steps,
-            "probe_name": f"{self._manifest.package}._fi",
-            "probe": changes.probe,
-            "functions": [(f.module, f.path, f.old, f.new) for f in changes.functions],
-            "observed": start.observed,
-            "t": start.t,
-            "watch": watch,
+            "probe_name": probe_module(self._manifest.package),
+            "probe": swap.probe,
+            "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
+            "probe_state": state_after(start.observed, start.t),
+            "watch": OBSERVED if watch else (),
         }
         asked = {"do": "mutant", "job": marshal.dumps(request), "wall_s": self._limits.wall_s}
         said, _ = waiting.ask(asked, self._patience_s)
@@ -178,7 +179,7 @@ class ForkEngine:
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
         """Refused unless the child was the job's mutant and left the server as it was."""
-        if report["ended"] == "unfit":
+        if report["ended"] == "swap refused":
             raise Refused(report["error"])
         if report["touched"]:
             self.close()
@@ -187,7 +188,7 @@ class ForkEngine:
             raise Refused(f"the package was also imported from {', '.join(report['outside'])}")
         if report["threads"] != 1:
             raise Refused("it leaves threads behind")
-        if job.mutant not in (None, (report["probe"] or {}).get("mutant")):
+        if job.mutant not in (None, mutant_of(report["probe"])):
             raise Refused("the probe that ran is not the one of this mutant")
 
     def _observed(self, job: Job, golden: Path) -> Observed:
@@ -210,12 +211,12 @@ class ForkEngine:
             return Observed(values=values, before=before, libraries=libraries)
         folder = self._work / f"{os.getpid()}-watch-{content_id(_key(job))}"
         try:
-            changes = exchange(self._manifest, self._null, str(self._running().tree))
+            swap = plan_swap(self._manifest, self._null, str(self._running().tree))
             null = replace(job, mutant=None)
-            self._at(job, 0, changes)  # whether it can be begun, told in its own words
+            self._at(job, 0, swap)  # Refused, with the reason, if the run cannot begin
             # From before its beginning: what it observed then, no fork of it would have.
             first = self._running().first
-            execution = self._become(first, null, folder, changes, _FROM_THE_START, watch=True)
+            execution = self._become(first, null, folder, swap, _FROM_THE_START, watch=True)
             if execution.status is Status.HARNESS_ERROR:
                 raise Lost(execution.detail)
             if execution.status is not Status.OK:
@@ -234,7 +235,7 @@ class ForkEngine:
                 raise Refused("it observes before its first step")
             write_atomic(known, marshal.dumps(found))
             return Observed(values=found[0], before=found[1], libraries=found[2])
-        except NotExchangeable as why:
+        except NotSwappable as why:
             raise Refused(f"its observation cannot be put into it: {why}") from None
         finally:
             shutil.rmtree(folder, ignore_errors=True)
@@ -243,9 +244,9 @@ class ForkEngine:
 _FROM_THE_START = Start(step=0, observed=0, t=None)
 
 
-def _needed(changes: Exchange) -> list[str]:
+def _needed(swap: CodeSwap) -> list[str]:
     """Modules to load before the mutant is made: those that it changes, and those that it imports."""
-    return [*dict.fromkeys(function.module for function in changes.functions), *changes.imports]
+    return [*dict.fromkeys(function.module for function in swap.functions), *swap.imports]
 
 
 def _key(job: Job) -> _Key:
@@ -258,7 +259,7 @@ def _golden(job: Job, golden: Path) -> Execution:
         status=Status.OK,
         detail="",
         out=golden,
-        probe={"mutant": job.mutant, "triggered": None, "injections": {}},
+        probe=silent_report(job.mutant),
         cpu_s=0.0,
         wall_s=0.0,
         mode=RunMode.GOLDEN,
@@ -288,7 +289,7 @@ def make_warm(setting: Setting) -> ForkEngine:
 
 
 def _make(setting: Setting, *, warm: bool) -> ForkEngine:
-    null = mutant.build(setting.manifest, setting.models, None, always()).files
+    null = build(setting.manifest, setting.models, None, always()).files
     return ForkEngine(
         setting.manifest, setting.base, setting.work, setting.limits, setting.parent, null=null, warm=warm
     )

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 
-from mutator.engines.code_swap import NotExchangeable, exchange
+from mutator.engines.code_swap import NotSwappable, plan_swap
 from mutator.engines.registry import not_forkable
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 
@@ -20,8 +20,8 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
     found = {}
     for name, fault in variants.items():
         try:
-            exchange(manifest, mutant.build(manifest, models, fault, always()).files, "")
-        except NotExchangeable as reason:
+            plan_swap(manifest, build(manifest, models, fault, always()).files, "")
+        except NotSwappable as reason:
             found[name] = str(reason)
         except MutatorError:
             continue  # the checks before the campaign tell it, or it is not run at all

@@ -27,6 +27,7 @@ from mutator.engines.processes import (
     tail,
 )
 from mutator.model import Limits, Status
+from mutator.mutants.probe import mutant_of, probe_module
 from mutator.targets.manifest import TargetManifest
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
@@ -38,7 +39,8 @@ class ReferenceEngine:
 
     `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
     `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). The runs
-    of an `independent` one take nothing from what other runs left behind, where the manifest says how.
+    of an `independent` one take nothing from what other runs left behind, where the manifest says how; nor
+    does any run of a mutant whose changed files decide what is left behind.
     """
 
     def __init__(
@@ -101,7 +103,7 @@ class ReferenceEngine:
             seed=job.seed,
             out=out,
             changes=job.changes,
-            independent=self._independent,
+            independent=self._independent or self.manifest.reads_any(job.files),
         )
         request = {
             "parent": os.getpid(),
@@ -109,7 +111,7 @@ class ReferenceEngine:
             "package": self.manifest.package,
             "module": self.manifest.entry_module,
             "args": list(arguments),
-            "probe": f"{self.manifest.package}._fi" if job.mutant is not None else None,
+            "probe": probe_module(self.manifest.package) if job.mutant is not None else None,
             "out": str(out),
             "report": str(folder / "report.json"),
             "cpu_s": self.limits.cpu_s,
@@ -176,7 +178,7 @@ class ReferenceEngine:
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
-        if job.mutant is not None and (report["probe"] or {}).get("mutant") != job.mutant:
+        if job.mutant is not None and mutant_of(report["probe"]) != job.mutant:
             return "the probe that ran is not the one of this mutant"
         return ""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.plans import Choices, freeze_owned, load_plan, make_plan
-from mutator.campaigns.provenance import check_sources, sources
+from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.review import gate
 from mutator.store.run_folder import RunFolder
@@ -19,7 +19,8 @@ def open_frozen(
     """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign in it.
 
     With `reviewed`, also store who approved what; CheckFailed, and no new plan, unless all of it is approved.
-    MutatorError when the folder holds another plan, or one of other sources.
+    MutatorError when the folder holds another plan, one of other sources, or one of another
+    version of mutator.
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
@@ -29,7 +30,7 @@ def open_frozen(
         approvals = gate.approvals(workspace, plan) if reviewed else None
         folder = freeze_owned(plan, out, workspace)
     if approvals is not None:
-        gate.write(folder.path, approvals)
+        gate.write_approvals(folder.path, approvals)
     return folder
 
 
@@ -37,6 +38,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
     """Open a run folder that was planned from this campaign with these choices and sources, or refuse it."""
     folder = RunFolder.open(out)
     head = folder.head
+    check_version(out, head["schema"], head["provenance"])
     loaded = load_campaign(workspace.campaign(campaign))
     if digest(loaded.source) != head["campaign_digest"]:
         raise MutatorError(

@@ -2,19 +2,18 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Experiment, Record, Status
-from mutator.mutants import building as mutant
-from mutator.mutants.building import InvalidMutant, Mutant
+from mutator.mutants.building import InvalidMutant, Mutant, build
+from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput, Trace
 from mutator.outcomes.verdicts import first_events, judge
@@ -92,7 +91,7 @@ class Runner:
         def jobs() -> Iterator[Job]:
             for experiment in experiments:
                 try:
-                    built = mutant.build(self.manifest, self.models, experiment.fault, experiment.trigger)
+                    built = build(self.manifest, self.models, experiment.fault, experiment.trigger)
                 except MutatorError as err:
                     refused.append(self._refused(experiment, err))
                     continue
@@ -172,19 +171,6 @@ class Runner:
             alerts=tuple(first_events(golden.alerts_of(said, self.manifest.alerts), activation)),
             trace_digest=golden.trace_digest(self.manifest, execution.out),
         )
-
-
-def activation_of(report: Mapping[str, Any]) -> Activation | None:
-    """What a probe's report says about all injections together: earliest, latest, number of executions."""
-    injections = report.get("injections")
-    ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
-    if not ran:
-        return None
-    return Activation(
-        first=min(i["first"] for i in ran),
-        last=max(i["last"] for i in ran),
-        count=sum(i["count"] for i in ran),
-    )
 
 
 def _problem_of(err: BadOutput) -> str:

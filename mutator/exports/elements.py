@@ -14,8 +14,9 @@ from mutator._common.version import VERSION
 from mutator.execution import single_run as single
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
-from mutator.mutants.anchors import ParsedFile, Site
-from mutator.mutants.building import injection_edit, injection_id
+from mutator.mutants.anchors import ParsedFile, Site, parsed
+from mutator.mutants.building import injection_edit
+from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import Edit
 from mutator.store import plan_file as planfile
 from mutator.store.records import read_records
@@ -43,7 +44,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
     files: dict[str, dict[str, Any]] = {}
     for experiments in drives.values():
         fault = experiments[0].fault
-        file = manifest.tree.parsed(fault.injections[0].location.path)
+        file = parsed(manifest.tree, fault.injections[0].location.path)
         source = file.data.decode(file.encoding)
         entry = files.setdefault(file.path, {"language": "python", "source": source, "mutants": []})
         entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
@@ -67,7 +68,7 @@ def _mutant(
     records: Mapping[str, Record],
 ) -> dict[str, Any]:
     first, *others = fault.injections
-    file = manifest.tree.parsed(first.location.path)
+    file = parsed(manifest.tree, first.location.path)
     site = file.resolve(first.location)
     edit = injection_edit(file, models, first, injection_id(0, first))
     also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
@@ -82,7 +83,7 @@ def _mutant(
 
 
 def _line(manifest: TargetManifest, injection: Injection) -> int:
-    return manifest.tree.parsed(injection.location.path).resolve(injection.location).first + 1
+    return parsed(manifest.tree, injection.location.path).resolve(injection.location).first + 1
 
 
 def _splice(file: ParsedFile, site: Site, edit: Edit) -> dict[str, Any]:

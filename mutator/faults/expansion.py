@@ -11,7 +11,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.imports import check_import
 from mutator.faults.injections import InjectionSpec
 from mutator.faults.parameters import resolve
-from mutator.faults.specs import AS_DESCRIBED, READINGS, Draw, FaultSpec, Variant
+from mutator.faults.specs import Draw, FaultSpec, Variant
 from mutator.model import Fault, Injection
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
@@ -22,20 +22,20 @@ _REDRAWS = 100
 def expand(
     spec: FaultSpec,
     seed: int,
-    reading: str = AS_DESCRIBED,
+    reading: str | None = None,
     *,
     models: FaultModels,
     manifest: TargetManifest,
 ) -> tuple[Fault, ...]:
-    """The faults of `spec`, in the order of its variants and ranges.
+    """The faults of `spec` in a reading (None: the library's default), in the order of variants and ranges.
 
-    The same seed gives the same values in both readings and whatever the triggers, scenarios and methods are.
+    The same seed gives the same values in every reading and whatever the triggers, scenarios and methods are.
     MutatorError (file:line) for an unknown model or parameter, a wrong unit, a value out of range, a location
     outside the target or in a forbidden place, a change the target does not offer. Anchors are resolved when
     a mutant is built.
     """
-    if reading not in READINGS:
-        raise MutatorError(f"reading '{reading}'", expected=f"one of {', '.join(READINGS)}")
+    reading = reading or spec.readings.default
+    spec.readings.check(reading)
     expander = _Expander(spec, seed, reading, models, manifest)
     return tuple(fault for variant in spec for fault in expander.faults(variant))
 

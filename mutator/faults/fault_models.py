@@ -11,12 +11,13 @@ from pydantic import Field
 from mutator._common import hashing as ids
 from mutator._common.text import suggestion
 from mutator.config import units
+from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionModel, InjectionSpec
 
 SCHEMA = "fault_model/1"
-PROBE_TEMPLATE = "_fi.py.j2"
+PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
 ParamType = Literal["variable", "import", "number", "integer", "boolean", "seed"]
@@ -99,30 +100,43 @@ class FaultModels:
         return self.models[name]
 
 
-class _ParamModel(StrictModel):
-    type: ParamType
-    about: str
-    unit: str | None = None
-    optional: bool = False
-    min: float | None = None
-    max: float | None = None
+class _ParamModel(StrictModel, title="A parameter"):
+    """Its name has no unit: a spec writes `by_m` for the parameter `by`."""
+
+    type: ParamType = Field(
+        description="What a value is: a name in the function (`variable`), a dotted name to be imported "
+        "(`import`), a number, or a `seed`, which no spec gives and expansion draws."
+    )
+    about: str = Field(description="What it is.")
+    unit: str | None = Field(
+        None,
+        description="The unit the template wants, `target` for that of the changed variable; without it, "
+        "none.",
+    )
+    optional: bool = Field(False, description="May be left out; the template then finds `none`.")
+    min: float | None = Field(None, description="The least value, in that unit.")
+    max: float | None = Field(None, description="The greatest value, in that unit.")
 
 
-class _ExampleModel(StrictModel):
-    about: str
-    injection: InjectionModel
-    before: str
-    after: str
+class _ExampleModel(StrictModel, title="An example"):
+    """Shown on this page, and run as a test: `mutator check` compares the result."""
+
+    about: str = Field(description="What it shows, after *For example*.")
+    injection: InjectionModel = Field(description="An injection, as a spec has it.")
+    before: str = Field(description="A source.")
+    after: str = Field(description="The same with the injection, tagged `example`.")
 
 
-class FaultModelModel(StrictModel):
-    """The YAML of a fault model, but for its key `schema`."""
+class FaultModelModel(StrictModel, title="The file"):
+    """Name, parameters and examples of a fault model, whose template is the file beside it."""
 
-    name: str
-    kind: Literal["insert", "guard"]
-    about: str
-    params: dict[str, _ParamModel] = Field(default_factory=dict)
-    examples: list[_ExampleModel] = Field(min_length=1)
+    name: str = Field(description="Its name, that of the file.")
+    kind: Literal["insert", "guard"] = Field(
+        description="`insert`: lines before or after the statement; `guard`: the statement is wrapped."
+    )
+    about: str = Field(description="What it does, in a sentence.")
+    params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
+    examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
 
 
 def load_fault_models(folder: Path) -> FaultModels:

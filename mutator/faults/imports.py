@@ -1,7 +1,8 @@
-"""Names that an injected statement imports: they must be there, in the target and nowhere else."""
+"""Names that an injected statement imports: the target must define them."""
 
 import ast
 from collections.abc import Iterator
+from pathlib import Path
 
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
@@ -19,7 +20,7 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
             expected="a module of the target and a name in it, such as package.module.Name",
             remedy=f"correct the name, or the `files` of {manifest.path.name}",
         )
-    known = sorted(_defined(ast.parse(manifest.tree.parsed(path).data)))
+    known = manifest.tree.derived(path, _names)
     if name not in known:
         public = [x for x in known if not x.startswith("_")]
         raise MutatorError(
@@ -29,8 +30,18 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
         )
 
 
+def _names(path: str, data: bytes, root: Path) -> list[str]:
+    """The names that a module's top level defines or imports, sorted."""
+    try:
+        return sorted(_defined(ast.parse(data)))
+    except (SyntaxError, ValueError, RecursionError) as error:
+        message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
+        raise MutatorError(
+            f"not valid Python: {message}", where=root / path, line=line, remedy="mend the target"
+        ) from None
+
+
 def _defined(module: ast.Module) -> Iterator[str]:
-    """Names that a module's top level defines or imports."""
     for node in module.body:
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
             yield node.name

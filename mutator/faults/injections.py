@@ -60,13 +60,22 @@ class InjectionSpec:
     keys: Keys
 
 
-class InjectionModel(StrictModel):
-    """`at`, `model`, `unit` of the changed variable (a suffix, or '1' for a plain number) and `params`."""
+class InjectionModel(StrictModel, title="An injection"):
+    """One fault model applied at one place."""
 
-    at: AtModel
-    model: str
-    unit: str | None = None
-    params: dict[str, Any] = Field(default_factory=dict)
+    at: AtModel = Field(description="Where.")
+    model: str = Field(description="A [fault model](fault-models.md).")
+    unit: str | None = Field(
+        None,
+        description="The unit that the changed variable has in the source, a suffix of the table of units, "
+        "or `'1'` for a plain number. Needed where the model has parameters in that unit.",
+    )
+    params: dict[str, Any] = Field(
+        default_factory=dict,
+        description="Parameters of the model, their unit in the key. A value is a number, a name, the "
+        "draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a number that is "
+        "written in one unit and read as another.",
+    )
 
     def injection(self, source: Source, keys: Keys) -> InjectionSpec:
         """The injection; errors point into `source` at `keys`."""

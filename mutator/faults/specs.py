@@ -3,20 +3,19 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from mutator.config import units
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.faults.readings import Readings
 from mutator.model import Hold
 
 SCHEMA = "fault_spec/1"
-AS_DESCRIBED = "as_described"
-AS_CODED = "as_coded"
-READINGS = (AS_DESCRIBED, AS_CODED)
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
@@ -46,7 +45,7 @@ class Draw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """One row of the library: injections that share a trigger and a draw, in one or both readings."""
+    """One row of the library: injections that share a trigger and a draw, by reading, the default first."""
 
     name: str
     aim: str
@@ -58,8 +57,9 @@ class Variant:
     keys: Keys
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
-        """The injections under `reading`; a variant without `as_coded` is the same in both."""
-        return self.readings.get(reading, self.readings[AS_DESCRIBED])
+        """The injections under `reading`; where it is not written, those of the default."""
+        default = next(iter(self.readings.values()))
+        return self.readings.get(reading, default)
 
     @property
     def count(self) -> int:
@@ -75,6 +75,7 @@ class FaultSpec:
     fault_type: str
     about: str
     variants: tuple[Variant, ...]
+    readings: Readings  # of the library
     source: Source
 
     @property
@@ -96,12 +97,13 @@ class FaultSpec:
         return iter(self.variants)
 
 
-class SweepModel(StrictModel):
-    """Ranges of equal width at equal distances: first, step, last."""
+class SweepModel(StrictModel, title="A sweep"):
+    """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` is the 24
+    ranges [15, 24], [25, 34] ... [245, 254]; one value is drawn from each, both ends included."""
 
-    first: list[float]
-    step: float = Field(gt=0.0, allow_inf_nan=False)
-    last: list[float]
+    first: list[float] = Field(description="The first range, [low, high].")
+    step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
+    last: list[float] = Field(description="The last range; whole steps above the first.")
 
     @model_validator(mode="after")
     def _even(self) -> "SweepModel":
@@ -120,52 +122,95 @@ class SweepModel(StrictModel):
         return ranges
 
 
-class _DrawModel(StrictModel):
-    integers_from: SweepModel | None = None
-    reals_from: SweepModel | None = None
-    decimals: int | None = Field(None, ge=0, le=12)
-    values: list[float | int] | None = None
-    cap: float | None = Field(None, allow_inf_nan=False)
-    key: str | None = None
+class _DrawModel(StrictModel, title="A draw"):
+    """The key of a draw is a name of one's own and a unit: `distance_m`. Parameters take the drawn value by
+    that name, without the unit, with a minus sign if wanted: `by_m: -distance`. Exactly one of
+    `integers_from`, `reals_from` and `values` is given. The same seed and the same key draw the same
+    values."""
+
+    integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")
+    reals_from: SweepModel | None = Field(None, description="One number from each range of a sweep.")
+    decimals: int | None = Field(
+        None, ge=0, le=12, description="Round numbers of `reals_from` to so many decimals."
+    )
+    values: list[float | int] | None = Field(None, description="These values, as they are.")
+    cap: float | None = Field(None, allow_inf_nan=False, description="No drawn value is above it.")
+    key: str | None = Field(
+        None,
+        description="What seeds the draw, so that variants can share it; default: the variant's full name.",
+    )
 
 
-class _ReadingModel(StrictModel):
-    injections: list[InjectionModel]
+class _ReadingModel(StrictModel, title="A reading"):
+    injections: list[InjectionModel] = Field(
+        description="At least one; any of them executed while triggered counts as activation."
+    )
 
 
-class _VariantModel(StrictModel):
-    aim: str
-    about: str
-    changes: list[str] = Field(default_factory=list)
-    hold: Literal["while", "to_end"] | None = None
-    draw: dict[str, _DrawModel] | None = None
-    as_described: _ReadingModel
-    as_coded: _ReadingModel | None = None
+class _VariantBase(StrictModel, title="A variant"):
+    """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
+
+    aim: str = Field(description="The hazard it aims at, one of the target's.")
+    about: str = Field(description="What this variant does.")
+    changes: list[str] = Field(
+        default_factory=list,
+        description="Changes of the scenario that belong to the fault, by their names in the target's "
+        "manifest.",
+    )
+    hold: Literal["while", "to_end"] | None = Field(
+        None,
+        description="How long the fault stays active, where it does not follow the trigger: `to_end` for a "
+        "fault that latches.",
+    )
+    draw: dict[str, _DrawModel] | None = Field(
+        None, description="One draw: name and unit -> draw. Without it the variant is a single fault."
+    )
 
 
-class SpecModel(StrictModel):
-    """A spec file, but for its key `schema`."""
+class SpecModel(StrictModel, title="The file"):
+    """A fault type of a module, in one or more variants."""
 
-    module: str
-    fault_type: str
-    about: str
-    variants: dict[str, _VariantModel]
+    # its `variants` come with the readings of a library: see `spec_model`
+
+    module: str = Field(description="The module of the controller that the fault is in.")
+    fault_type: str = Field(description="The name of the fault type; with the module the name of the spec.")
+    about: str = Field(description="What goes wrong, in a sentence.")
 
 
-def load_spec(path: Path) -> FaultSpec:
-    """Read one spec strictly (file:line errors). Models, ranges and anchors are checked by `expand`."""
-    model, source = read(path, SpecModel, SCHEMA)
+@cache
+def spec_model(readings: Readings) -> type[SpecModel]:
+    """The shape of the spec files of a library: its variants have a key for each of its readings."""
+    keys: dict[str, Any] = {}
+    for name, about in zip(readings.names, readings.about, strict=True):
+        required = name == readings.default
+        kind = _ReadingModel if required else _ReadingModel | None
+        keys[name] = (kind, Field(... if required else None, description=about))
+    variant = create_model("_VariantModel", __base__=_VariantBase, __doc__=_VariantBase.__doc__, **keys)
+    variants = Field(description="Name of the variant -> variant; at least one.")
+    return create_model(
+        "SpecModel",
+        __base__=SpecModel,
+        __doc__=SpecModel.__doc__,
+        variants=(dict[str, variant], variants),  # type: ignore[valid-type]
+    )
+
+
+def load_spec(path: Path, readings: Readings) -> FaultSpec:
+    """Read one spec of a library strictly (file:line errors); see `expand` for what is checked later."""
+    model, source = read(path, spec_model(readings), SCHEMA)
+    models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
         _check_name(getattr(model, key), source, (key,))
-    if not model.variants:
+    if not models:
         raise source.error(("variants",), "no variant", expected="at least one", remedy="describe a fault")
     name = f"{model.module}/{model.fault_type}"
-    variants = tuple(_variant(name, key, variant, source) for key, variant in model.variants.items())
+    variants = tuple(_variant(name, key, variant, readings, source) for key, variant in models.items())
     return FaultSpec(
         module=model.module,
         fault_type=model.fault_type,
         about=model.about,
         variants=variants,
+        readings=readings,
         source=source,
     )
 
@@ -175,12 +220,10 @@ def _check_name(name: str, source: Source, keys: Keys) -> None:
         raise source.error(keys, f"'{name}'", expected="small letters, digits and _", remedy="rename it")
 
 
-def _variant(spec: str, name: str, model: _VariantModel, source: Source) -> Variant:
+def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: Source) -> Variant:
     keys: Keys = ("variants", name)
     _check_name(name, source, keys)
-    readings = {AS_DESCRIBED: _injections(model.as_described, source, (*keys, AS_DESCRIBED))}
-    if model.as_coded:
-        readings[AS_CODED] = _injections(model.as_coded, source, (*keys, AS_CODED))
+    written: dict[str, _ReadingModel | None] = {name: getattr(model, name) for name in readings.names}
     return Variant(
         name=name,
         aim=model.aim,
@@ -188,7 +231,9 @@ def _variant(spec: str, name: str, model: _VariantModel, source: Source) -> Vari
         draw=_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw")) if model.draw is not None else None,
         hold=Hold(model.hold) if model.hold else None,
         changes=tuple(model.changes),
-        readings=readings,
+        readings={
+            reading: _injections(one, source, (*keys, reading)) for reading, one in written.items() if one
+        },
         keys=keys,
     )
 

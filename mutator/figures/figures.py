@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from mutator.figures import hazards, heat_map, propagation
+from mutator.figures.run_plot import save
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -44,10 +47,8 @@ def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     return tuple(made)
 
 
-def write(made: Sequence[Drawing], out: Path) -> None:
+def write_drawings(made: Sequence[Drawing], out: Path) -> None:
     """Write each figure into `out`/figures as <name>.svg and <name>.png."""
-    from mutator.figures.run_plot import save
-
     for drawing in made:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
         if drawing.figure is not None:
@@ -58,35 +59,29 @@ def write(made: Sequence[Drawing], out: Path) -> None:
 
 
 def _hazards(frame: pd.DataFrame) -> Drawing:
-    from mutator.figures.hazards import draw
-
     return Drawing(
         name="hazards_by_fault_type",
         title="Hazards by fault type",
         note="Left: runs with a hazard, of all injected. Right: their share of the activated faults; a fault "
         "type without a mark was never activated.",
-        figure=draw(frame),
+        figure=hazards.draw(frame),
     )
 
 
 def _propagation(frame: pd.DataFrame) -> Drawing:
-    from mutator.figures.propagation import draw
-
     return Drawing(
         name="propagation_by_scenario",
         title="Propagation times by scenario",
         note="From event to event, in the runs that had both (their number stands above). Alert to hazard: "
         "where the alert came first. Runs that ended before the second event are not shown.",
-        figure=draw(frame),
+        figure=propagation.draw(frame),
     )
 
 
 def _heat_map(frame: pd.DataFrame) -> Drawing:
-    from mutator.figures.heat_map import draw
-
     return Drawing(
         name="fault_type_by_scenario",
         title="Fault type and scenario",
         note="Runs with a hazard / activated faults. An empty cell was never activated.",
-        figure=draw(frame),
+        figure=heat_map.draw(frame),
     )

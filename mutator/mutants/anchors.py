@@ -1,15 +1,13 @@
 """Anchors: from a qualified function name and a statement to lines of a source file.
 
-LibCST parses each file once; what is kept is, for each function, its statements that assign, call or return,
-with the lines they span. A location resolves to exactly one of them, or to an error that lists the
-candidates.
+LibCST parses each file once. Kept are, for each function, the statements that assign, call or return, with
+the lines they span. A location resolves to exactly one of them, or to an error that lists the candidates.
 """
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import libcst as cst
 from libcst.metadata import CodeRange, MetadataWrapper, PositionProvider
@@ -18,22 +16,19 @@ from mutator._common.interrupts import held
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants.probe import instrumented_line
 from mutator.mutants.statements import Function, Statement, collect
+from mutator.targets.source_tree import SourceTree
 
-if TYPE_CHECKING:
-    from mutator.mutants.shapes import Mold, Shape
-
-TAG = re.compile(rb"[ \t]*# fi:([0-9a-z]+)(?: guard:(\d+))?(?=\r?\n?\Z)")
 _LONE_CR = re.compile(rb"\r(?!\n)")
-_PROBE_NAME = re.compile(rb"\b_fi\b")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
     """A resolved anchor: the anchored statement is lines `first` to `last` (exclusive, from 0).
 
-    For `entry` it is empty: `first == last`. `reindent` is how many of its lines a guard may indent: all,
-    or only the first when a string spans lines. `names` are the names that the function knows.
+    For `entry` it is empty: `first == last`. `reindent` is the number of its lines that a guard may indent:
+    all, or only the first when a string spans lines. `names` are the names that the function uses.
     """
 
     first: int
@@ -47,7 +42,7 @@ class Site:
 
 @dataclass(frozen=True)
 class ParsedFile:
-    """A Python file of the target: its lines, its functions, where an import may go, its molds so far."""
+    """A Python file of the target: its lines, its functions, and the line before which an import may go."""
 
     path: str
     data: bytes
@@ -58,27 +53,31 @@ class ParsedFile:
     import_line: int
     functions: Mapping[str, tuple[Function, ...]]
     where: Path
-    molds: dict["Shape", "Mold"] = field(default_factory=dict, repr=False, compare=False)
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve(self, location: FaultLocation) -> Site:
-        """The one place that `location` means; MutatorError with candidates if there is none or several."""
+        """The statement that `location` names; MutatorError with candidates unless there is exactly one."""
         key = (location.function, location.anchor)
         if key not in self._sites:
             self._sites[key] = _resolve(self, location)
         return self._sites[key]
 
 
+def parsed(tree: SourceTree, path: str) -> ParsedFile:
+    """The file at `path`, parsed once; MutatorError when it is not a Python file of the target."""
+    return tree.derived(path, parse_file)
+
+
 @held()
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
-    """Parse one file of the target; MutatorError when it is no Python, or was instrumented before."""
+    """Parse one file of the target; MutatorError when it is not Python, or has injected lines already."""
     where = root / path
     lines = tuple(data.splitlines(keepends=True))
     if _LONE_CR.search(data):
         raise MutatorError(
             "line ends of CR alone", where=where, expected="LF or CRLF", remedy="convert the file's line ends"
         )
-    _refuse_instrumented(lines, data, where)
+    _refuse_instrumented(data, where)
     try:
         compile(data, str(where), "exec", dont_inherit=True)
         module = cst.parse_module(data)
@@ -102,11 +101,9 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     )
 
 
-def _refuse_instrumented(lines: tuple[bytes, ...], data: bytes, where: Path) -> None:
-    match = _PROBE_NAME.search(data)
-    tagged = next((i for i, line in enumerate(lines) if TAG.search(line)), None) if b"# fi:" in data else None
-    if match or tagged is not None:
-        line = tagged if tagged is not None else data[: match.start()].count(b"\n") if match else 0
+def _refuse_instrumented(data: bytes, where: Path) -> None:
+    line = instrumented_line(data)
+    if line is not None:
         raise MutatorError(
             "the name _fi or a `# fi:` tag is in use",
             where=where,
@@ -117,7 +114,7 @@ def _refuse_instrumented(lines: tuple[bytes, ...], data: bytes, where: Path) -> 
 
 
 def _import_line(module: cst.Module, positions: Mapping[cst.CSTNode, CodeRange]) -> int:
-    """Line index for an import: after docstring and `__future__` imports, else before the first statement."""
+    """Index of the line before which an import goes: after docstring and `__future__` imports, if any."""
     after = None
     for i, node in enumerate(module.body):
         if not isinstance(node, cst.SimpleStatementLine):
@@ -235,7 +232,7 @@ def _no_single_hit(
     pairs: list[tuple[Function, Statement]],
     hits: list[tuple[Function, Statement]],
 ) -> MutatorError:
-    """Why none of `pairs` (what bears the name) or `hits` (those that are statements) can be taken."""
+    """Why the anchor is ambiguous or missing: `pairs` have its name, `hits` of them are statements."""
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
     what, place = _what(verb, anchor.name), f"in {location.function}"
@@ -262,7 +259,7 @@ def _what(verb: str, name: str) -> str:
 
 
 def _candidates(functions: tuple[Function, ...], verb: str) -> str:
-    """All statements of the kind asked for, with their lines."""
+    """All statements of this kind, with their lines."""
     found = [
         f"'{name}' (line {s.first + 1})" if name else f"line {s.first + 1}"
         for f in functions
@@ -274,7 +271,7 @@ def _candidates(functions: tuple[Function, ...], verb: str) -> str:
 
 
 def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
-    """Line-wise insertion needs the statement's own line on the side where it inserts."""
+    """Refuse a statement that shares its line with others on the side where lines are inserted."""
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
     if statement.one_line_suite:

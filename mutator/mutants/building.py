@@ -1,6 +1,6 @@
 """From a fault and a trigger to changed files: built, compiled, diffed, identified."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,21 +9,27 @@ from mutator._common.hashing import content_id
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels, SnippetKind
 from mutator.model import Fault, Hold, Injection, Trigger
-from mutator.mutants import patches as patch
-from mutator.mutants import splicing as splice
-from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.normalized_source import compiles, normalized
+from mutator.mutants.patches import changed_file, new_file
+from mutator.mutants.probe import OBSERVE_TAG, injection_id, observe_call, probe_path, template_values
 from mutator.mutants.rendering import render, snippet
-from mutator.mutants.shapes import Change, Mold, lines_of, proven, shape_of
-from mutator.mutants.skeletons import compiles, skeleton
+from mutator.mutants.reusable_changes import (
+    Change,
+    ReusableChange,
+    always_compiles,
+    inserted_lines,
+    known_changes,
+    reuse_key,
+)
+from mutator.mutants.splicing import Edit, apply_edits, guard, insertion, joined, probe_import, unsplice
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import check_condition, to_code
-
-OBSERVE_TAG = "observe"
+from mutator.targets.source_tree import SourceTree
 
 
 class InvalidMutant(MutatorError):
-    """The mutated file does not compile; a mutant that does not compile is never run."""
+    """The mutated file does not compile; such a mutant is never run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,55 +54,58 @@ class Mutant:
 def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger) -> Mutant:
     """The mutant of `manifest`'s tree with `fault` under `trigger`; no fault: the null mutant (probe only).
 
-    `fault.hold` goes before `trigger.hold`. MutatorError when an anchor is not found or ambiguous (candidates
+    `fault.hold` overrides `trigger.hold`. MutatorError when an anchor is not found or ambiguous (candidates
     are listed), InvalidMutant when the result does not compile.
     """
-    return _build(manifest, models, fault, trigger, _BY_SHAPE)
+    return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
 
 def build_directly(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
 ) -> Mutant:
-    """The mutant with each file spliced, compared and compiled anew: what `build` gives must equal it."""
-    return _build(manifest, models, fault, trigger, _DIRECT)
+    """The same mutant with each file spliced, compared and compiled anew: `build` must give its bytes."""
+    return _build(manifest, models, fault, trigger, _Splicer())
 
 
 def _build(
-    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, way: "_Way"
+    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
     injections = fault.injections if fault else ()
-    names = tuple(injection_id(i, injection) for i, injection in enumerate(injections))
+    ids = tuple(injection_id(i, injection) for i, injection in enumerate(injections))
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
-    edits: dict[str, list[splice.Edit]] = {}
-    _add(edits, manifest.observation.location.path, _observation(manifest))
-    for name, injection in zip(names, injections, strict=True):
-        check_location(manifest, injection.location)
-        file = manifest.tree.parsed(injection.location.path)
-        _add(edits, file.path, injection_edit(file, models, injection, name))
-    probe = _probe(manifest, models, mutant_id, trigger, hold, names)
-    way.compile(probe, (mutant_id, *names), models.folder / PROBE_TEMPLATE)
-    files = {manifest.probe_path: probe.encode()}
-    patches = {manifest.probe_path: patch.new_file(manifest.probe_path, probe)}
+    edits = _edits(manifest, models, injections, ids)
+    probe_file = probe_path(manifest.package)
+    probe = _probe(manifest, models, mutant_id, trigger, hold, ids)
+    splicer.check_probe(probe, (mutant_id, *ids), models.folder / PROBE_TEMPLATE)
+    files = {probe_file: probe.encode()}
+    patches = {probe_file: new_file(probe_file, probe)}
     for path, file_edits in edits.items():
-        file = manifest.tree.parsed(path)
-        change = way.change(file, [splice.probe_import(file, manifest.package), *file_edits], names)
+        file = parsed(manifest.tree, path)
+        change = splicer.change(file, [probe_import(file, manifest.package), *file_edits], ids)
         files[path], patches[path] = change.data, change.patch
     return Mutant(
         id=mutant_id,
         files=dict(sorted(files.items())),
         patch="".join(text for _, text in sorted(patches.items())),
         tree_digest=manifest.tree.digest_with(files),
-        injections=names,
+        injections=ids,
     )
 
 
-def injection_id(index: int, injection: Injection) -> str:
-    """The id in an injection's tags: its content and its place in the fault."""
-    return content_id([index, injection])[:8]
+def _edits(
+    manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection], ids: Sequence[str]
+) -> dict[str, list[Edit]]:
+    """The edits of each file: the observation's first, then those of the injections in their order."""
+    edits = {manifest.observation.location.path: [_observation(manifest)]}
+    for name, injection in zip(ids, injections, strict=True):
+        check_location(manifest, injection.location)
+        file = parsed(manifest.tree, injection.location.path)
+        edits.setdefault(file.path, []).append(injection_edit(file, models, injection, name))
+    return edits
 
 
-def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> splice.Edit:
+def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> Edit:
     """The edit of one injection in its file: anchor resolved, names checked, snippet rendered."""
     model = models.get(injection.model)
     site = file.resolve(injection.location)
@@ -112,21 +121,15 @@ def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, 
                 remedy=f"correct `{param.name}`",
             )
     code = snippet(model, params, name)
-    make = splice.guard if model.kind is SnippetKind.GUARD else splice.insertion
+    make = guard if model.kind is SnippetKind.GUARD else insertion
     return make(file, site, code, name)
 
 
-def _add(edits: dict[str, list[splice.Edit]], path: str, edit: splice.Edit) -> None:
-    edits.setdefault(path, []).append(edit)
-
-
-def _observation(manifest: TargetManifest) -> splice.Edit:
+def _observation(manifest: TargetManifest) -> Edit:
     observation = manifest.observation
-    file = manifest.tree.parsed(observation.location.path)
-    arguments = ", ".join(f"{name}={text}" for name, text in observation.expressions)
-    return splice.insertion(
-        file, file.resolve(observation.location), [f"_fi.observe({arguments})"], OBSERVE_TAG
-    )
+    file = parsed(manifest.tree, observation.location.path)
+    site = file.resolve(observation.location)
+    return insertion(file, site, [observe_call(observation.expressions)], OBSERVE_TAG)
 
 
 def _probe(
@@ -135,25 +138,17 @@ def _probe(
     mutant_id: str,
     trigger: Trigger,
     hold: Hold,
-    names: tuple[str, ...],
+    ids: tuple[str, ...],
 ) -> str:
-    if manifest.probe_path in manifest.tree.files:
+    path = probe_path(manifest.package)
+    if path in manifest.tree.files:
         raise MutatorError(
-            f"the target has a file {manifest.probe_path}",
+            f"the target has a file {path}",
             where=manifest.root,
             expected="that name free for the probe",
             remedy="rename the target's file, or point the manifest at the original tree",
         )
-    if hold is Hold.FOR and trigger.hold_s is None:
-        raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
-    values = {
-        "mutant": mutant_id,
-        "condition": to_code(check_condition(trigger.condition)),
-        "hold": hold.value,
-        "hold_s": float(trigger.hold_s or 0.0),
-        "armed_after_s": float(trigger.armed_after_s),
-        "injections": names,
-    }
+    values = template_values(mutant_id, trigger, hold, ids)
     return render(models.probe, values, models.folder / PROBE_TEMPLATE)
 
 
@@ -171,57 +166,47 @@ def _compile(data: bytes, where: Path) -> None:
         ) from None
 
 
-def _compile_probe(text: str, ids: Sequence[str], where: Path) -> None:
-    _compile(text.encode(), where)
+class _Splicer:
+    """Makes every file by splicing, and compiles it; `ids` are those in the injected lines."""
 
-
-def _compile_probe_by_shape(text: str, ids: Sequence[str], where: Path) -> None:
-    if not compiles(skeleton(text, ids).encode()):
+    def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
+        """InvalidMutant unless the probe compiles."""
         _compile(text.encode(), where)
 
-
-def _change(file: ParsedFile, edits: Sequence[splice.Edit], ids: Sequence[str]) -> Change:
-    """The file with the edits made: it compiles, and un-splices to the original."""
-    pieces = splice.apply(file, edits)
-    data = splice.joined(pieces)
-    _compile(data, file.where)
-    if unsplice(data) != file.data:
-        raise InvalidMutant(
-            "the mutated file does not un-splice to the original",
-            where=file.where,
-            remedy="anchor at another statement",
-        )
-    return Change(data=data, patch=patch.changed_file(file.path, pieces))
-
-
-def _change_by_shape(file: ParsedFile, edits: Sequence[splice.Edit], ids: Sequence[str]) -> Change:
-    """The same from the mold of the shape; the first of a shape is made directly and leaves its mold."""
-    shape = shape_of(file, edits, ids)
-    mold = file.molds.get(shape)
-    if mold is not None:
-        return mold.filled(lines_of(edits))
-    change = _change(file, edits, ids)
-    mold = Mold.of(change)
-    if proven(file, mold, shape):
-        file.molds[shape] = mold
-    return change
+    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
+        """The file with the edits made; InvalidMutant unless it compiles and un-splices to the original."""
+        pieces = apply_edits(file, edits)
+        data = joined(pieces)
+        _compile(data, file.where)
+        if unsplice(data) != file.data:
+            raise InvalidMutant(
+                "the mutated file does not un-splice to the original",
+                where=file.where,
+                remedy="anchor at another statement",
+            )
+        return Change(data=data, patch=changed_file(file.path, pieces))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Way:
-    """How probes are compiled and files changed; the ids are those in the injected lines."""
+class _ReusingSplicer(_Splicer):
+    """Makes a file from a reusable change, if there is one; splices it and keeps one if not."""
 
-    compile: Callable[[str, Sequence[str], Path], None]
-    change: Callable[[ParsedFile, Sequence[splice.Edit], Sequence[str]], Change]
+    def __init__(self, tree: SourceTree) -> None:
+        self._tree = tree
 
+    def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
+        if not compiles(normalized(text, ids).encode()):
+            super().check_probe(text, ids, where)
 
-_DIRECT = _Way(compile=_compile_probe, change=_change)
-_BY_SHAPE = _Way(compile=_compile_probe_by_shape, change=_change_by_shape)
-
-
-def unsplice(data: bytes) -> bytes:
-    """The original bytes of a mutated file: tagged lines removed, a guarded statement put back."""
-    return splice.unsplice(data.splitlines(keepends=True))
+    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
+        known = known_changes(self._tree, file.path)
+        key = reuse_key(file, edits, ids)
+        if key in known:
+            return known[key].filled(inserted_lines(edits))
+        change = super().change(file, edits, ids)
+        reusable = ReusableChange.of(change)
+        if always_compiles(file, reusable, key):
+            known[key] = reusable
+        return change
 
 
 def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:

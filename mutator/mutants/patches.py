@@ -1,4 +1,4 @@
-"""Patches: unified diffs, git style, written from the edits themselves; `patch -p1` applies them."""
+"""Patches: unified diffs in git's style, written from the edits; `patch -p1` applies them."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ _NO_NEWLINE = "\\ No newline at end of file\n"
 
 @dataclass(slots=True)
 class _Hunk:
-    """Pieces that are shown together, and the lines before them on each side."""
+    """Pieces that are shown together, and the number of lines before them on each side."""
 
     old: int
     new: int
@@ -24,13 +24,13 @@ class _Hunk:
 
 
 def changed_file(path: str, pieces: Iterable[Piece]) -> str:
-    """The patch of one changed file; bytes that are no UTF-8 come as surrogate escapes."""
+    """The patch of one changed file; bytes that are not UTF-8 become surrogate escapes."""
     hunks = "".join(hunk.text() for hunk in _hunks([p for p in pieces if p.lines]))
     return f"diff --git a/{path} b/{path}\n--- a/{_name(path)}\n+++ b/{_name(path)}\n{hunks}"
 
 
 def new_file(path: str, text: str) -> str:
-    """The patch that makes a file of this text, whose lines end with LF."""
+    """The patch that adds a file with this text, whose lines end with LF."""
     lines, end = text.removesuffix("\n"), "" if text.endswith("\n") else _NO_NEWLINE
     body = "+" + lines.replace("\n", "\n+")
     return (
@@ -68,12 +68,12 @@ def _count(pieces: Iterable[Piece], sign: str) -> int:
 
 
 def _span(before: int, count: int) -> str:
-    """`start,count` of a hunk's side; an empty side names the line before it."""
+    """`start,count` of one side of a hunk; `start` of an empty side is the line before it."""
     return f"{before + 1 if count else before},{count}"
 
 
 def _name(path: str) -> str:
-    """A tab ends a name with a space in it, or `patch` takes the rest for a date."""
+    """A name with a space ends with a tab, or `patch` takes the rest for a date."""
     return f"{path}\t" if " " in path else path
 
 

@@ -1,14 +1,28 @@
-"""Unified diffs for reading: what a fault changes, without the probe that every mutant gets."""
+"""Reading patches: file by file, and without the probe that every mutant has."""
 
 import re
+from collections.abc import Iterator
 
-_NEW_FILE = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
+_NEW_NAME = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
 
 
 def readable(patch: str) -> tuple[str, str]:
-    """The patch without its new files, and a sentence on what was left out (empty if nothing was)."""
-    sections = re.split(r"^(?=diff --git )", patch, flags=re.MULTILINE)
-    kept = [s for s in sections if "\nnew file mode " not in s]
-    left_out = [m[1] for s in sections if s not in kept and (m := _NEW_FILE.search(s))]
+    """The patch without its new files, and a sentence that names them (empty if there are none)."""
+    sections = list(file_patches(patch))
+    left_out = [m[1] for s in sections if adds_file(s) and (m := _NEW_NAME.search(s))]
     note = f"not shown: {', '.join(left_out)}, the probe, which every mutant gets" if left_out else ""
-    return "".join(kept), note
+    return "".join(s for s in sections if not adds_file(s)), note
+
+
+def file_patches(patch: str) -> Iterator[str]:
+    """The patch of each file in a patch of several."""
+    begin = 0
+    while begin < len(patch):
+        end = patch.find("\ndiff --git ", begin) + 1 or len(patch)
+        yield patch[begin:end]
+        begin = end
+
+
+def adds_file(file_patch: str) -> bool:
+    """Whether the patch of one file adds that file."""
+    return file_patch.startswith("new file mode ", file_patch.find("\n") + 1)

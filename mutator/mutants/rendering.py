@@ -1,7 +1,7 @@
 """Rendering: a fault model's template and its parameters to lines of Python.
 
-Templates run in Jinja2's sandbox with undefined names as errors. Whatever is printed is a Python literal or a
-checked name, so a value cannot break out of its place.
+Templates run in Jinja2's sandbox, where an undefined name is an error. Every printed value is a Python
+literal or a checked name, so it cannot become other code.
 """
 
 import ast
@@ -22,7 +22,7 @@ from mutator.config.locations import dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, FaultModel, SnippetKind
 from mutator.model import Value
-from mutator.mutants.skeletons import skeleton
+from mutator.mutants.normalized_source import normalized
 
 
 def literal(value: object) -> str:
@@ -46,7 +46,7 @@ def signed(value: int | float) -> str:
 
 
 class _Sandbox(ImmutableSandboxedEnvironment):
-    """Jinja2's sandbox without powers, which take time without end: 9 ** 9 ** 9."""
+    """Jinja2's sandbox without powers: 9 ** 9 ** 9 never ends."""
 
     intercepted_binops = frozenset({"**"})
 
@@ -79,13 +79,13 @@ def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[st
             raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
     text = render(model.template, {"fi": fi, **names}, model.template_path)
     text = text.removesuffix("\n")
-    if not _are_lines(skeleton(text, (fi,)), model.kind):
+    if not _are_lines(normalized(text, (fi,)), model.kind):
         _check_lines(text, model.kind, model.template_path)
     return tuple(text.split("\n"))
 
 
 def render(template: str, names: Mapping[str, object], where: Path) -> str:
-    """Render one template; every failure is a MutatorError with the template and, if known, its line."""
+    """Render one template; MutatorError with the template and, if known, its line when it fails."""
     try:
         return _compiled(template).render(names)
     except TemplateSyntaxError as error:
@@ -119,7 +119,7 @@ def _line_in(error: BaseException) -> int | None:
 
 @lru_cache(maxsize=1024)
 def _are_lines(text: str, kind: SnippetKind) -> bool:
-    """Whether a skeleton passes `_check_lines`, and so every text that has it."""
+    """Whether normalized source passes `_check_lines`, and with it every source that it stands for."""
     try:
         _check_lines(text, kind, Path())
     except MutatorError:

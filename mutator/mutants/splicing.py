@@ -1,8 +1,7 @@
-"""The splicer: puts tagged lines between the lines of a source file, and takes them out again.
+"""The splicer: inserts tagged lines between the lines of a source file, and removes them again.
 
-Edits are whole lines at line boundaries, so everything else keeps its bytes by construction: line ends, tabs,
-comments, a missing newline at the end. A guard also indents the statement it wraps; its tag says how many
-lines.
+Edits are whole lines, so everything else keeps its bytes by construction: line ends, tabs, comments, a
+missing newline at the end. A guard also indents the statement it wraps; its tag says how many lines.
 """
 
 from codecs import BOM_UTF8
@@ -11,13 +10,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import TAG, ParsedFile, Site
-
-PROBE_TAG = "probe"
+from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.probe import import_statement, tag_of, tagged
 
 
 class Rank(IntEnum):
-    """Order of edits at one boundary: what belongs to the statement above goes first, a guard last."""
+    """Order of edits between the same two lines: first what follows the upper one, a guard last."""
 
     AFTER = 0
     BEFORE = 1
@@ -26,7 +24,7 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edit:
-    """Lines to go before line `index`; the `reindent` lines that follow are indented by `unit`."""
+    """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`."""
 
     index: int
     rank: Rank
@@ -37,21 +35,21 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """A run of lines of the result: kept (' '), taken out ('-') or put in ('+')."""
+    """Consecutive lines with one sign: kept (' '), removed ('-') or added ('+')."""
 
     sign: str
     lines: tuple[bytes, ...]
 
 
 def insertion(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
-    """The edit that puts `code` (4 spaces an indentation level) at `site`, each line tagged."""
-    lines = _lines(file, site.indent, code, f"# fi:{tag}")
+    """The edit that inserts `code` (4 spaces an indentation level) at `site`, each line tagged."""
+    lines = _lines(file, site.indent, code, tag)
     index, rank = (site.last, Rank.AFTER) if site.after else (site.first, Rank.BEFORE)
     return Edit(index=index, rank=rank, lines=lines)
 
 
 def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
-    """The edit that puts `code`, whose last line opens a block, around the statement at `site`."""
+    """The edit that wraps the statement at `site` in `code`, whose last line opens a block."""
     if site.first == site.last or not site.alone or site.after:
         raise MutatorError(
             "a guard needs a statement to wrap, alone on its lines",
@@ -60,7 +58,7 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
             expected="an anchor before_call, before_assign or before_return",
             remedy="anchor at the statement that is to be left out",
         )
-    lines = _lines(file, site.indent, code, f"# fi:{tag} guard:{site.reindent}")
+    lines = _lines(file, site.indent, code, tag, site.reindent)
     return Edit(
         index=site.first,
         rank=Rank.GUARD,
@@ -80,7 +78,7 @@ def probe_import(file: ParsedFile, package: str) -> Edit:
             expected="a comment or docstring there, or no mark",
             remedy="save the file without byte order mark",
         )
-    line = f"from {package} import _fi  # fi:{PROBE_TAG}".encode(file.encoding)
+    line = import_statement(package).encode(file.encoding)
     return Edit(index=file.import_line, rank=Rank.BEFORE, lines=(line + file.newline,))
 
 
@@ -88,14 +86,16 @@ def _unit(file: ParsedFile, indent: bytes) -> bytes:
     return b"\t" if indent.endswith(b"\t") else file.indent_unit
 
 
-def _lines(file: ParsedFile, indent: bytes, code: Sequence[str], tag: str) -> tuple[bytes, ...]:
+def _lines(
+    file: ParsedFile, indent: bytes, code: Sequence[str], tag: str, guarded: int = 0
+) -> tuple[bytes, ...]:
     unit = _unit(file, indent)
     result = []
     for line in code:
         body = line.lstrip(" ")
         levels = (len(line) - len(body)) // 4
         try:
-            result.append(indent + unit * levels + f"{body}  {tag}".encode(file.encoding) + file.newline)
+            text = tagged(body, tag, guarded).encode(file.encoding)
         except UnicodeEncodeError:
             raise MutatorError(
                 f"{body!r} cannot be written in {file.encoding}",
@@ -103,19 +103,17 @@ def _lines(file: ParsedFile, indent: bytes, code: Sequence[str], tag: str) -> tu
                 expected="names that the file's encoding has",
                 remedy="use other names",
             ) from None
+        result.append(indent + unit * levels + text + file.newline)
     return tuple(result)
 
 
 def in_order(edits: Iterable[Edit]) -> list[Edit]:
-    """Edits from the top of the file to its end; those at one boundary keep their order within a rank."""
+    """Edits from the top of the file to its end; those at one index and rank keep their order."""
     return sorted(edits, key=lambda e: (e.index, e.rank))
 
 
-def apply(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
-    """The file's lines with the edits made, as pieces; `joined` gives the bytes.
-
-    MutatorError when two guards want one statement.
-    """
+def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
+    """The edited file as pieces, for `joined`; MutatorError when two guards wrap one statement."""
     pieces: list[Piece] = []
     done = 0
     for edit in in_order(edits):
@@ -148,7 +146,7 @@ def _keep(pieces: list[Piece], lines: tuple[bytes, ...]) -> None:
 
 
 def _indented(lines: Sequence[bytes], unit: bytes) -> tuple[bytes, ...]:
-    """The first line one level deeper (after its indentation, lest tabs and spaces mix), the others alike."""
+    """Lines one level deeper. The first gets `unit` after its own indentation, lest tabs and spaces mix."""
     start = len(_margin(lines[0]))
     first = lines[0][:start] + unit + lines[0][start:]
     return (first, *(unit + line if line.strip() else line for line in lines[1:]))
@@ -159,7 +157,7 @@ def _margin(line: bytes) -> bytes:
 
 
 def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> list[bytes]:
-    """A file whose last line has no end keeps that property: the new last line has none instead."""
+    """If the file ends without a newline, so does the result: the old last line gets the new one's."""
     last = pieces[-1]
     if last.lines[-1].endswith((b"\n", b"\r")):
         return added
@@ -176,15 +174,16 @@ def joined(pieces: Iterable[Piece]) -> bytes:
     return b"".join(line for piece in pieces if piece.sign != "-" for line in piece.lines)
 
 
-def unsplice(lines: Sequence[bytes]) -> bytes:
-    """The original bytes of a mutated file's lines: tagged lines out, guarded statements put back."""
+def unsplice(data: bytes) -> bytes:
+    """The original bytes of a mutated file: tagged lines removed, guarded statements put back."""
+    lines = data.splitlines(keepends=True)
     result: list[bytes] = []
-    left = 0  # lines still to be put back
+    left = 0  # lines that are still indented by a guard
     margin = unit = b""
     for line in lines:
-        match = TAG.search(line)
-        if match:
-            left = int(match[2] or 0)
+        tag = tag_of(line)
+        if tag:
+            left = tag.guarded
             margin, unit = _margin(line), b""
         elif left and not unit:
             unit = _margin(line)[len(margin) :]
@@ -195,6 +194,6 @@ def unsplice(lines: Sequence[bytes]) -> bytes:
             left -= 1
         else:
             result.append(line)
-    if result and TAG.search(lines[-1]) and not lines[-1].endswith((b"\n", b"\r")):
+    if result and tag_of(lines[-1]) and not lines[-1].endswith((b"\n", b"\r")):
         result[-1] = result[-1].rstrip(b"\r\n")
     return b"".join(result)

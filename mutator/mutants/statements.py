@@ -1,4 +1,4 @@
-"""What a function's statements assign, call and return, and on which lines they stand."""
+"""What a function's statements assign, call and return, and the lines they are on."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ Positions = Mapping[cst.CSTNode, CodeRange]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """One small statement, or (with a `reason`) something that binds or calls without being one.
+    """A small statement; with a `reason`, something that binds or calls but is not a statement, and why.
 
-    Lines are counted from 0, `last` is exclusive. Names are dotted, as written; `returns` holds the empty
-    name too, which stands for any return.
+    Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns has the
+    empty name in `returns`, too: it matches any return.
     """
 
     first: int
@@ -29,12 +29,12 @@ class Statement:
     reason: str | None = None
 
     def names(self, verb: str) -> tuple[str, ...]:
-        """What it does by `verb`: assign, call or return."""
+        """The names that it assigns, calls or returns, as `verb` says."""
         return {"assign": self.assigns, "call": self.calls, "return": self.returns}[verb]
 
     @property
     def alone(self) -> bool:
-        """Whether it has its lines for itself."""
+        """Whether it shares its lines with no other statement."""
         return self.first_in_line and self.last_in_line and not self.one_line_suite
 
     @property
@@ -44,9 +44,10 @@ class Statement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Function:
-    """A function: its line, its own statements (none of functions and classes inside it), the names in it.
+    """A function: its line, its statements (without those of nested functions and classes), its names.
 
-    `entry` is (line index to insert at, line index whose indentation to take), None for a one-line body.
+    `entry` is the index of the line to insert before, and of the line whose indentation to use; None for a
+    one-line body.
     """
 
     line: int

@@ -34,7 +34,7 @@ _TO_MANIFEST = (
     Column("fault_id", "text", "", "its fault, a content hash as well"),
     Column("module", "text", "", "the module of the fault spec"),
     Column("fault_type", "text", "", "the fault type of the spec"),
-    Column("reading", "text", "", "`as_described` or `as_coded`"),
+    Column("reading", "text", "", "the [reading](../explanation/concepts.md#readings) of the fault"),
     Column("value", "number", "as `unit` says", "the value drawn; empty for a fault without one"),
     Column("unit", "text", "", "the unit of `value` as the spec states it, `-` for a plain number"),
     Column("scenario", "text", "", "the scenario driven"),

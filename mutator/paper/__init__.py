@@ -1,4 +1,4 @@
-"""The published study: its tables, observations and figures beside those of a run.
+"""A published study that the library reproduces: its tables, observations and figures beside those of a run.
 
-The rest of the harness does not know this package: it is found by its entry point in `mutator.studies`.
+Nothing else in the harness imports this package; it is found by its entry point in `mutator.studies`.
 """

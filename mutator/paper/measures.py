@@ -33,48 +33,48 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class Estimate:
     """An estimate with its 95 % interval (NaN: none), from `n` runs or pairs; `count`: how many of them have
-    what is asked for, where that is countable. `said`: all of it in words."""
+    what is asked for, where that is countable. `text`: all of it in words."""
 
     estimate: float
     low: float
     high: float
     n: int
     count: int | None = None
-    said: str
+    text: str
 
     def __str__(self) -> str:
-        return self.said
+        return self.text
 
 
-def share(runs: pd.DataFrame, *, of: str, part: str) -> Found:
+def share(runs: pd.DataFrame, *, of: str, part: str) -> Estimate:
     """The share of the runs of `of` that are in `part`, too; Wilson interval."""
     return of_share(_share(runs, of, part))
 
 
-def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Found:
+def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Estimate:
     """The share of `part` in the runs of `of` less that in the runs of `against`; Newcombe interval."""
     return of_difference(_share(runs, of, part), _share(runs, against, part))
 
 
-def clustered_difference(runs: pd.DataFrame, *, of: str) -> Found:
+def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Hazard rate of guided less that of random runs; whole faults (location and value) resampled."""
     chosen = _query(runs, of)
     one, other = (
         _share(chosen, f'method == "{how}"', "is_hazard") for how in (compare.GUIDED, compare.RANDOM)
     )
     found = compare.resampled(chosen, "injected")  # of these runs: they are chosen already
-    return Found(
+    return Estimate(
         estimate=found.difference,
         low=found.low,
         high=found.high,
         n=min(one.of, other.of),
-        said=_against(found.difference, found.low, found.high, one, other, f", {found.clusters} faults"),
+        text=_against(found.difference, found.low, found.high, one, other, f", {found.clusters} faults"),
     )
 
 
-def stratified(runs: pd.DataFrame, *, of: str) -> Found:
+def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Odds of a hazard, guided against random, common to the fault types (Mantel-Haenszel)."""
     parts = compare.strata(by_kind(_query(runs, of)), "injected")
     found = compare.mantel_haenszel(parts)
@@ -84,16 +84,16 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Found:
             f"odds ratio {found.odds_ratio:.3g} ({found.low:.3g} to {found.high:.3g}; {found.strata} fault "
             f"types; p {found.p:.2g}, equal in all types: p {found.p_equal:.2g})"
         )
-    return Found(
+    return Estimate(
         estimate=found.odds_ratio,
         low=found.low,
         high=found.high,
         n=min(sum(s.guided for s in parts), sum(s.random for s in parts)),
-        said=said,
+        text=said,
     )
 
 
-def paired(runs: pd.DataFrame, *, of: str) -> Found:
+def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Of the pairs of guided and random run that differ in having a hazard, the share where the guided one
     has it. Clopper-Pearson interval, which decides as McNemar's exact test does. `of` is a query on pairs:
     its columns end in `_guided` and `_random`."""
@@ -105,36 +105,38 @@ def paired(runs: pd.DataFrame, *, of: str) -> Found:
     if unlike:
         estimate = matched.first_only / unlike
         low, high = map(float, proportion_confint(matched.first_only, unlike, 1 - CONFIDENCE, "beta"))
-    return Found(
+    return Estimate(
         estimate=estimate,
         low=low,
         high=high,
         n=unlike,
         count=matched.first_only,
-        said=f"hazard in the guided run only {matched.first_only}, in the random one only "
+        text=f"hazard in the guided run only {matched.first_only}, in the random one only "
         f"{matched.second_only}, of {matched.pairs} pairs (McNemar p {matched.p:.2g})",
     )
 
 
-def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Found:
+def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
     """Mean of `end - start` in s over the runs of `of` that have both; interval of Student's t."""
     from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
 
     chosen = _query(runs, of)
     known = (chosen[end] - chosen[start]).dropna()
     if len(known) < 2 or known.nunique() < 2:  # of a single value nothing is known about the spread
-        return Found(estimate=math.nan, low=math.nan, high=math.nan, n=len(known), said=f"- (N {len(known)})")
+        return Estimate(
+            estimate=math.nan, low=math.nan, high=math.nan, n=len(known), text=f"- (N {len(known)})"
+        )
     interval = ttest_1samp(known, 0.0).confidence_interval(CONFIDENCE)
     return _seconds(float(known.mean()), float(interval.low), float(interval.high), len(known))
 
 
-def median_time(runs: pd.DataFrame, *, of: str) -> Found:
+def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Kaplan-Meier median of the time in s from the first alert to a hazard, censored at the end of the run
     (column `t_end`, s of simulation). Infinite: most alerts are never followed by a hazard."""
     chosen = _query(runs, of)
     if chosen["t_end"].isna().any():
         nan = math.nan
-        return Found(estimate=nan, low=nan, high=nan, n=0, said="- (when a run ends is not known here)")
+        return Estimate(estimate=nan, low=nan, high=nan, n=0, text="- (when a run ends is not known here)")
     ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
     found = times.reaction(chosen, ends, 0.0)
     median = found.median
@@ -146,12 +148,12 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Found:
     return _seconds(median, low, high, found.at_risk)
 
 
-def of_share(one: Share) -> Found:
+def of_share(one: Share) -> Estimate:
     """What a share says."""
-    return Found(estimate=one.rate, low=one.low, high=one.high, n=one.of, count=one.count, said=str(one))
+    return Estimate(estimate=one.rate, low=one.low, high=one.high, n=one.of, count=one.count, text=str(one))
 
 
-def of_difference(one: Share, other: Share) -> Found:
+def of_difference(one: Share, other: Share) -> Estimate:
     """What two shares of different runs say, the first less the second (Newcombe, statsmodels)."""
     from statsmodels.stats.proportion import confint_proportions_2indep
 
@@ -162,7 +164,7 @@ def of_difference(one: Share, other: Share) -> Found:
         )
     gap = one.rate - other.rate
     said = _against(gap, low, high, one, other)
-    return Found(estimate=gap, low=float(low), high=float(high), n=min(one.of, other.of), said=said)
+    return Estimate(estimate=gap, low=float(low), high=float(high), n=min(one.of, other.of), text=said)
 
 
 def _query(runs: pd.DataFrame, text: str) -> pd.DataFrame:
@@ -185,9 +187,9 @@ def _plain(one: Share) -> str:
     return f"{100 * one.rate:.1f} % ({one.count}/{one.of})" if one.of else "- (0/0)"
 
 
-def _seconds(value: float, low: float, high: float, n: int) -> Found:
+def _seconds(value: float, low: float, high: float, n: int) -> Estimate:
     said = f"{value:.2f} s (N {n}; {low:.2f} to {high:.2f})" if n else "- (N 0)"
-    return Found(estimate=value, low=low, high=high, n=n, said=said)
+    return Estimate(estimate=value, low=low, high=high, n=n, text=said)
 
 
 MEASURES = {

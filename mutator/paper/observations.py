@@ -14,7 +14,7 @@ import pandas as pd
 from pydantic import Field, model_validator
 
 from mutator.config.yaml_files import Source, StrictModel, read
-from mutator.paper.measures import MEASURES, Found, of_difference, of_share
+from mutator.paper.measures import MEASURES, Estimate, of_difference, of_share
 from mutator.statistics.share import share
 
 FILE = "paper_observations.yaml"
@@ -27,7 +27,7 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     FAILS = "does not hold"
-    UNTOLD = "cannot be told"
+    UNDECIDED = "cannot be told"
 
 
 class Rule(StrictModel):
@@ -49,12 +49,12 @@ class Rule(StrictModel):
             raise ValueError("not exactly one of above, below, within, some, never")
         return self
 
-    def verdict(self, found: Found) -> Verdict:
+    def verdict(self, found: Estimate) -> Verdict:
         """What the rule says of an estimate."""
         if self.some is not None or self.never is not None:
             return self._seen(found)
         if found.n < FEWEST:
-            return Verdict.UNTOLD
+            return Verdict.UNDECIDED
         low, high = found.low, found.high  # NaN: no comparison is true
         if self.within is not None:
             holds, fails = -self.within < low and high < self.within, low > self.within or high < -self.within
@@ -63,15 +63,15 @@ class Rule(StrictModel):
         else:
             assert self.below is not None
             holds, fails = high < self.below, low > self.below
-        return Verdict.HOLDS if holds else Verdict.FAILS if fails else Verdict.UNTOLD
+        return Verdict.HOLDS if holds else Verdict.FAILS if fails else Verdict.UNDECIDED
 
-    def _seen(self, found: Found) -> Verdict:
+    def _seen(self, found: Estimate) -> Verdict:
         wanted = self.some is not None
         if found.count:
             return Verdict.HOLDS if wanted else Verdict.FAILS
         if found.n and found.high <= (self.some or self.never or 0.0):
             return Verdict.FAILS if wanted else Verdict.HOLDS
-        return Verdict.UNTOLD
+        return Verdict.UNDECIDED
 
     def __str__(self) -> str:
         [(name, value)] = self.model_dump(exclude_none=True).items()
@@ -124,7 +124,7 @@ class Claim(StrictModel):
             chosen = f'({self.of}) and {self.each.column} == "{value}"'
             yield value, arguments | {"of": chosen}
 
-    def published(self) -> Found | None:
+    def published(self) -> Estimate | None:
         """The paper's counts as our measures see them."""
         shares = [share(count, of) for count, of in self.paper]
         if len(shares) == 2:
@@ -152,12 +152,12 @@ class Answer:
 
     group: str
     query: str
-    found: Found
+    found: Estimate
     verdict: Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
+class JudgedClaim:
     """A claim, what was found, and its verdict; `why` says what the rule alone does not."""
 
     number: str  # 1.2: the second claim of the first observation
@@ -169,16 +169,16 @@ class Judged:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Summed:
+class JudgedObservation:
     """An observation and its verdict."""
 
     number: int
     title: str
-    claims: tuple[Judged, ...]
+    claims: tuple[JudgedClaim, ...]
     verdict: Verdict
 
 
-def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[Summed, ...]:
+def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[JudgedObservation, ...]:
     """The observations of a file, put to a frame of results.
 
     `lacks`: why these are not the paper's mixture of faults, if they are not. MutatorError with file and line
@@ -192,16 +192,18 @@ def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[Summed,
             for k, claim in enumerate(observation.claims)
         )
         needed = [one.verdict for one in claims if one.claim.needed]
-        made.append(Summed(number=i + 1, title=observation.title, claims=claims, verdict=together(needed)))
+        made.append(
+            JudgedObservation(number=i + 1, title=observation.title, claims=claims, verdict=together(needed))
+        )
     return tuple(made)
 
 
 def together(verdicts: Sequence[Verdict]) -> Verdict:
     """All must hold: one that does not is enough against, one that cannot be told leaves the rest open."""
-    for verdict in (Verdict.FAILS, Verdict.UNTOLD):
+    for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict
-    return Verdict.HOLDS if verdicts else Verdict.UNTOLD
+    return Verdict.HOLDS if verdicts else Verdict.UNDECIDED
 
 
 def _judged(
@@ -211,10 +213,15 @@ def _judged(
     lacks: Sequence[str],
     source: Source,
     keys: tuple[str | int, ...],
-) -> Judged:
+) -> JudgedClaim:
     if claim.measure is None or claim.holds is None:
-        return Judged(
-            number=number, claim=claim, answers=(), verdict=Verdict.UNTOLD, paper=None, why=claim.see.strip()
+        return JudgedClaim(
+            number=number,
+            claim=claim,
+            answers=(),
+            verdict=Verdict.UNDECIDED,
+            paper=None,
+            why=claim.see.strip(),
         )
     answers = tuple(
         _answer(group, claim.measure, claim.holds, arguments, runs, source, keys)
@@ -222,9 +229,9 @@ def _judged(
     )
     verdict, why = together([one.verdict for one in answers]), ""
     if claim.mixture and lacks:
-        verdict, why = Verdict.UNTOLD, "; ".join(lacks)
+        verdict, why = Verdict.UNDECIDED, "; ".join(lacks)
     published = claim.published()
-    return Judged(
+    return JudgedClaim(
         number=number,
         claim=claim,
         answers=answers,
@@ -246,7 +253,7 @@ def _answer(
     query = f"{measure}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"
     call: Any = MEASURES[measure]
     try:
-        found: Found = call(runs, **arguments)
+        found: Estimate = call(runs, **arguments)
     except (NameError, SyntaxError, TypeError, ValueError, KeyError, AttributeError) as err:
         raise source.error(
             keys,

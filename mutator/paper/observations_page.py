@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from mutator._common.tables import Table
-from mutator.paper.observations import FEWEST, Judged, Summed
+from mutator.paper.observations import FEWEST, JudgedClaim, JudgedObservation
 from mutator.statistics.sheet import Cell, Sheet
 
 RULES = f"""\
@@ -25,26 +25,26 @@ runs = load(Path("results.csv"))"""
 HEADS = ("claim", "", "the paper", "rule on its counts", "here", "rule", "verdict")
 
 
-def table(observation: Summed) -> Table:
+def table(observation: JudgedObservation) -> Table:
     """One row for each claim, and one for each of its groups."""
     made = []
     for one in observation.claims:
         rule = str(one.claim.holds or "")
         first = [one.number, _says(one), published(one), str(one.paper or "-")]
         if len(one.answers) == 1:
-            first += [one.answers[0].found.said, rule, _verdict(one)]
+            first += [one.answers[0].found.text, rule, _verdict(one)]
         else:
             first += ["" if one.answers else "-", rule, _verdict(one)]
         made.append(first)
         if len(one.answers) > 1:
-            made += [["", a.group, "", "", a.found.said, "", a.verdict.value] for a in one.answers]
+            made += [["", a.group, "", "", a.found.text, "", a.verdict.value] for a in one.answers]
     return Table(heads=HEADS, rows=made)
 
 
-def published(one: Judged) -> str:
+def published(one: JudgedClaim) -> str:
     """What the paper says, counts first."""
     found = one.claim.published()
-    return "; ".join(text for text in (found.said if found else "", one.claim.told) if text) or "-"
+    return "; ".join(text for text in (found.text if found else "", one.claim.told) if text) or "-"
 
 
 def session(ends: Sequence[tuple[str, float]]) -> str:
@@ -55,7 +55,9 @@ def session(ends: Sequence[tuple[str, float]]) -> str:
     return f'{SESSION}\nruns["t_end"] = runs["scenario"].map({{{told}}})'
 
 
-def markdown(observations: Sequence[Summed], ends: Sequence[tuple[str, float]], coverage: str) -> str:
+def markdown(
+    observations: Sequence[JudgedObservation], ends: Sequence[tuple[str, float]], coverage: str
+) -> str:
     """All of it: verdicts, claims, rules, and the queries as they were evaluated."""
     parts = ["# The paper's observations", coverage, verdicts(observations), rules()]
     for one in observations:
@@ -68,13 +70,13 @@ def markdown(observations: Sequence[Summed], ends: Sequence[tuple[str, float]], 
     return "\n\n".join(parts) + "\n"
 
 
-def verdicts(observations: Sequence[Summed]) -> str:
+def verdicts(observations: Sequence[JudgedObservation]) -> str:
     """The observations with their verdicts as a table."""
     rows = [[str(one.number), one.title, one.verdict.value] for one in observations]
     return Table(heads=("observation", "", "verdict"), rows=rows).as_markdown()
 
 
-def heading(one: Summed) -> str:
+def heading(one: JudgedObservation) -> str:
     return f"Observation {one.number}: {one.title} ({one.verdict.value})"
 
 
@@ -82,7 +84,7 @@ def rules() -> str:
     return RULES.replace("\n", " ") + " Claims that an observation rests on are marked with *."
 
 
-def sheet(observations: Sequence[Summed]) -> Sheet:
+def sheet(observations: Sequence[JudgedObservation]) -> Sheet:
     """One line for each query, its numbers in columns of their own."""
     return Sheet(
         name="observations",
@@ -96,7 +98,7 @@ def sheet(observations: Sequence[Summed]) -> Sheet:
     )
 
 
-def _cells(observations: Sequence[Summed]) -> Iterator[tuple[Cell, ...]]:
+def _cells(observations: Sequence[JudgedObservation]) -> Iterator[tuple[Cell, ...]]:
     for observation in observations:
         for one in observation.claims:
             head = (observation.number, one.number, int(one.claim.needed), one.claim.says)
@@ -109,9 +111,9 @@ def _cells(observations: Sequence[Summed]) -> Iterator[tuple[Cell, ...]]:
                 yield (*head, a.group, paper, by_rule, *numbers, rule, *verdict)
 
 
-def _says(one: Judged) -> str:
+def _says(one: JudgedClaim) -> str:
     return one.claim.says + (" *" if one.claim.needed else "")
 
 
-def _verdict(one: Judged) -> str:
+def _verdict(one: JudgedClaim) -> str:
     return f"{one.verdict.value}: {one.why}" if one.why else one.verdict.value

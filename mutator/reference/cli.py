@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
+from mutator._common.tables import Table
 from mutator.cli.main import EXIT_CODES, GROUPS, app
 from mutator.cli.options import PLACE_OPTIONS
 from mutator.execution import pytest_plugin
@@ -24,9 +25,7 @@ def command_line(workspace: Workspace) -> str:
         "`mutator --help` and `mutator VERB --help` say the same.\n",
         *(f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}" for title, names in GROUPS),
         "\n## Exit codes\n",
-        "| code | meaning |",
-        "|---|---|",
-        *(f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items()),
+        _markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
         "\n1 is also a difference that a command was asked to look for; 3 also a defect of mutator itself, "
         "which is told with\na traceback.\n",
         "An error, on standard error, says file and line, what was found, what was expected, and what "
@@ -71,10 +70,10 @@ def _options(command: Any, params: Iterable[Any]) -> Iterator[str]:
     with command.make_context("mutator", [], resilient_parsing=True) as ctx:
         for param in params:
             if record := param.get_help_record(ctx):
-                left, right = (text.replace("|", r"\|") for text in record)
-                rows.append(f"| `{' '.join(left.split())}` | {' '.join(right.split())} |")
+                left, right = (" ".join(text.replace("|", r"\|").split()) for text in record)
+                rows.append((f"`{left}`", right))
     if rows:
-        yield from ("| argument or option | meaning |", "|---|---|", *rows, "")
+        yield from (_markdown(("argument or option", "meaning"), rows), "")
 
 
 def _paragraphs(text: str) -> str:
@@ -90,9 +89,13 @@ def _plugin() -> Iterator[str]:
         "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign as `mutator run` does, "
         "without its table.\n"
     )
-    yield "| option | meaning |"
-    yield "|---|---|"
-    for option in parser.getgroup("mutator").options:
-        facts = option.attrs()
-        yield f"| `{' '.join(option.names())} {facts['metavar']}` | {facts['help']} |"
+    rows = [
+        (f"`{' '.join(option.names())} {option.attrs()['metavar']}`", str(option.attrs()["help"]))
+        for option in parser.getgroup("mutator").options
+    ]
+    yield _markdown(("option", "meaning"), rows)
     yield ""
+
+
+def _markdown(heads: tuple[str, str], rows: list[tuple[str, str]]) -> str:
+    return Table(heads=heads, rows=rows).as_markdown(escape=False)

@@ -2,9 +2,12 @@
 
 from collections.abc import Iterator
 
+from mutator._common.tables import Table
 from mutator.campaigns import campaign_files as campaign
 from mutator.config import units
 from mutator.faults import specs as spec
+from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
+from mutator.faults.readings import UNDECLARED, ReadingsModel
 from mutator.reference.tables import generated, sections
 from mutator.stpa import analysis as stpa_analysis
 from mutator.stpa import context_tables as stpa
@@ -37,7 +40,8 @@ def fault_spec(workspace: Workspace) -> str:
         f"The first key is `schema: {spec.SCHEMA}`. A file of a newer schema is refused.\n"
         "[An editor can check it](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        *sections("fault-spec.md", spec.SpecModel),
+        *sections("fault-spec.md", spec.spec_model(workspace.readings())),
+        *_readings(),
         "## Units\n",
         *_units(),
         "## Fault models\n",
@@ -98,11 +102,21 @@ def hazard_analysis(workspace: Workspace) -> str:
     )
 
 
+def _readings() -> Iterator[str]:
+    yield "## Readings\n"
+    yield (
+        "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
+        "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
+        f"one, `{UNDECLARED.default}`. The first is the\ndefault: every variant is written in it, and it "
+        "holds where another is not written. The first key of the file is\n"
+        f"`schema: {READINGS_SCHEMA}`.\n"
+    )
+    yield from sections("fault-spec.md", ReadingsModel, below=2)
+
+
 def _units() -> Iterator[str]:
-    yield "| suffix | unit | quantity |"
-    yield "|---|---|---|"
-    for unit in units.UNITS.values():
-        yield f"| `_{unit.suffix}` | {unit.symbol} | {unit.dimension} |"
+    rows = [(f"`_{unit.suffix}`", unit.symbol, unit.dimension) for unit in units.UNITS.values()]
+    yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
 
 

@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Iterator
 
+from mutator._common.tables import Table
 from mutator.faults import fault_models
 from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema
 from mutator.reference.tables import generated, sections
@@ -26,9 +27,8 @@ def fault_models_page(workspace: Workspace) -> str:
     """docs/reference/fault-models.md."""
     models = list(workspace.fault_models())
     parts = [generated("Fault models"), INTRODUCTION]
-    parts += ["| model | what it does |", "|---|---|"]
-    parts += [f"| [{model.name}](#{model.name}) | {_sentence(model.about)} |" for model in models]
-    parts.append("")
+    rows = [(f"[{model.name}](#{model.name})", _sentence(model.about)) for model in models]
+    parts += [Table(heads=("model", "what it does"), rows=rows).as_markdown(escape=False), ""]
     for model in models:
         parts += _model(model)
     parts += [
@@ -45,22 +45,21 @@ def _model(model: FaultModel) -> Iterator[str]:
     yield f"{' '.join(model.about.split())} {does}\n"
     params = [param for param in model.params if param.type != "seed"]
     if params:
-        yield "| parameter | type | unit | meaning |"
-        yield "|---|---|---|---|"
-        yield from map(_param, params)
+        heads = ("parameter", "type", "unit", "meaning")
+        yield Table(heads=heads, rows=list(map(_param, params))).as_markdown(escape=False)
         yield ""
     for example in model.examples:
         yield f"For example, {example.about}:\n"
         yield f"```diff\n{_change(example)}\n```\n"
 
 
-def _param(param: ParamSchema) -> str:
-    unit = {None: "-", TARGET_UNIT: "the variable's"}.get(param.unit, param.unit)
+def _param(param: ParamSchema) -> tuple[str, str, str, str]:
+    unit = "the variable's" if param.unit == TARGET_UNIT else param.unit or "-"
     low = [] if param.min is None else [f"at least {param.min:g}"]
     high = [] if param.max is None else [f"at most {param.max:g}"]
     kind = param.type + (f" ({', '.join(low + high)})" if low or high else "")
     about = param.about + (" (may be left out)" if param.optional else "")
-    return f"| `{param.name}` | {kind} | {unit} | {about} |"
+    return f"`{param.name}`", kind, unit, about
 
 
 def _change(example: Example) -> str:

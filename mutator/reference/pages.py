@@ -4,8 +4,9 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from mutator._common.shipped import refuse_shipped
 from mutator.reference import cli, formats, models, recorded
-from mutator.reference.schemas import FORMATS, editor_schema
+from mutator.reference.schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
 
 FOLDER = Path("docs") / "reference"
@@ -26,15 +27,16 @@ def generated_files(workspace: Workspace) -> dict[Path, str]:
     """Path, relative to the clone, and text of each."""
     files = {FOLDER / name: make(workspace) for name, make in PAGES.items()}
     known = workspace.fault_models()
-    for kind in FORMATS:
+    for kind in file_formats(workspace.readings()):
         text = json.dumps(editor_schema(kind, known), indent=1, ensure_ascii=False)
         files[SCHEMAS / f"{kind.name}.json"] = text + "\n"
     return files
 
 
 def write(workspace: Workspace) -> Iterator[Path]:
-    """Write them into the clone of the library; gives the paths."""
+    """Write them into the clone of the library; gives the paths. MutatorError where there is no clone."""
     clone = workspace.library.parent
+    refuse_shipped(clone)
     for path, text in generated_files(workspace).items():
         (clone / path).parent.mkdir(parents=True, exist_ok=True)
         (clone / path).write_text(text, encoding="utf-8")

@@ -11,11 +11,11 @@ from typing import Any
 from mutator.campaigns import campaign_files as campaign
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
-from mutator.faults import fault_models
+from mutator.faults import fault_models, readings
 from mutator.faults import specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS
-from mutator.reference.words import ABOUT
+from mutator.faults.readings import Readings
 from mutator.stpa import analysis as stpa_analysis
 from mutator.stpa import context_tables as stpa
 from mutator.targets import manifest
@@ -50,7 +50,7 @@ class Format:
 
 
 _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
-    (spec.SpecModel, spec.SCHEMA, "faults/*/*.yaml"),
+    (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
     (campaign.CampaignModel, campaign.SCHEMA, "campaigns/*.yaml"),
     (manifest.ManifestModel, manifest.SCHEMA, "targets/*.yaml"),
     (stpa.HazardsModel, stpa.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
@@ -59,20 +59,26 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (stpa_analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
     (stpa_analysis.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
 )
-FORMATS = (
-    *(Format(model=model, schema=schema, files=f"fault_library/{files}") for model, schema, files in _FILES),
-    Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
-)
+
+
+def file_formats(declared: Readings) -> tuple[Format, ...]:
+    """The kinds of YAML files of a library that declares these readings, and of templates."""
+    specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
+    return (
+        *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
+        Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
+    )
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
-    """Every model that a file of `model` is made of, by its short name (`Variant`), the file's own first.
+    """Every model that a file of `model` is made of, by its short name (`Variant`).
 
-    Each is a JSON Schema whose properties have descriptions. KeyError for a key that `ABOUT` does not know.
+    The file's own comes first. Each is a JSON Schema; that of a model has the title of its class, its
+    docstring in one line, and descriptions of its properties.
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})
-    return {short_name(name): _told(short_name(name), part) for name, part in parts.items()}
+    return {short_name(name): _described(part) for name, part in parts.items()}
 
 
 def short_name(name: str) -> str:
@@ -81,15 +87,19 @@ def short_name(name: str) -> str:
     return match[1] if match else name
 
 
-def _told(name: str, part: dict[str, Any]) -> dict[str, Any]:
-    part = _clean(part)
-    for key, value in part.get("properties", {}).items():
-        value["description"] = ABOUT[f"{name}.{key}"]
-    return part
+def _described(part: dict[str, Any]) -> dict[str, Any]:
+    """The part, clean; a model of ours with its title and description, its properties with theirs."""
+    kept: dict[str, Any] = _clean(part)
+    if "properties" in part:
+        kept["title"] = part["title"]
+        kept["description"] = " ".join(part.get("description", "").split())
+        for key, value in part["properties"].items():
+            kept["properties"][key]["description"] = value["description"]
+    return kept
 
 
 def _clean(value: Any) -> Any:
-    """Without pydantic's titles and Python's docstrings, references by short names."""
+    """Without titles and descriptions, many of which pydantic makes up; references by short names."""
     if isinstance(value, list):
         return [_clean(item) for item in value]
     if not isinstance(value, dict):
@@ -111,7 +121,11 @@ def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
     parts = definitions(kind.model)
     if "Injection" in parts:
         _with_models(parts["Injection"], models)
+    if "Variant" in parts:  # another library may declare other readings
+        parts["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
     for part in parts.values():
+        part.pop("title", None)
+        part.pop("description", None)
         for value in part.get("properties", {}).values():
             value["description"] = _LINK.sub(r"\1", value["description"])
     whole = parts.pop(short_name(kind.model.__name__))

@@ -6,8 +6,9 @@ from typing import Any
 
 from mutator.config.yaml_files import StrictModel
 from mutator.reference.schemas import definitions
-from mutator.reference.words import SECTIONS, TOLD_IN
 
+# Parts of several kinds of files, and the page that has their section.
+_PAGES = {"Injection": "fault-spec.md", "At": "fault-spec.md"}
 _SIGNS = {
     "minimum": "at least",
     "maximum": "at most",
@@ -29,33 +30,58 @@ def generated(title: str) -> str:
 
 
 def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
-    """A section for each model that files of `models` are made of, each once, in the order of `SECTIONS`.
+    """A section for each model that files of `models` are made of, each once, in the order of their keys.
 
-    Headings are of the level below `below`; with several files, those of their parts are a level deeper. What
-    another page tells of is linked there.
+    Headings are of the level below `below`; with several files, those of their parts are a level deeper. A
+    model that has its section on another page is linked there.
     """
     parts: dict[str, dict[str, Any]] = {}
     for model in models:
-        parts |= definitions(model)
-    told = {name: part for name, part in parts.items() if TOLD_IN.get(name, page) == page}
-    enums = {name: told.pop(name)["enum"] for name in parts if "enum" in parts[name]}
+        known = definitions(model)
+        parts |= {name: known[name] for name in reading_order(known)}
     files = {next(iter(definitions(model))) for model in models}
-    words = _Words(page, enums)
-    for name in sorted(told, key=list(SECTIONS).index):
-        title, text = SECTIONS[name]
+    tables = _Tables(page, parts)
+    for name, part in parts.items():
+        if "enum" in part or _PAGES.get(name, page) != page:
+            continue
         deeper = len(models) > 1 and name not in files
-        yield f"{'#' * (below + 1 + deeper)} {title}\n"
-        if text:
-            yield f"{text}\n"
-        yield from words.keys(told[name])
+        yield f"{'#' * (below + 1 + deeper)} {part['title']}\n"
+        if part["description"]:
+            yield f"{part['description']}\n"
+        yield from tables.keys(part)
 
 
-class _Words:
-    """Types of keys in words, as `page` says them; `enums` are the values of enumerations by name."""
+def reading_order(parts: dict[str, dict[str, Any]]) -> list[str]:
+    """The names of models as a reader meets them: the first, then what its keys refer to, each once."""
+    met: dict[str, None] = {}
+    waiting = [next(iter(parts))]
+    while waiting:
+        name = waiting.pop()
+        if name not in met:
+            met[name] = None
+            waiting += reversed(list(_references(parts[name])))
+    return list(met)
 
-    def __init__(self, page: str, enums: dict[str, list[str]]) -> None:
+
+def _references(value: Any) -> Iterator[str]:
+    """The names of the models that a JSON Schema refers to."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _references(item)
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            if key == "$ref":
+                yield inner.rpartition("/")[2]
+            else:
+                yield from _references(inner)
+
+
+class _Tables:
+    """Tables of the keys of models on `page`; `parts` are the models and enumerations by name."""
+
+    def __init__(self, page: str, parts: dict[str, dict[str, Any]]) -> None:
         self._page = page
-        self._enums = enums
+        self._parts = parts
 
     def keys(self, part: dict[str, Any]) -> Iterator[str]:
         """The table of a model's keys."""
@@ -88,10 +114,11 @@ class _Words:
         return _WORDS[value["type"]] + _bounds(value)
 
     def _reference(self, name: str) -> str:
-        if name in self._enums:
-            return _one_of(self._enums[name])
-        title = SECTIONS[name][0].lower()
-        page = TOLD_IN.get(name, self._page)
+        part = self._parts[name]
+        if "enum" in part:
+            return _one_of(part["enum"])
+        title = part["title"].lower()
+        page = _PAGES.get(name, self._page)
         return f"[{title}]({'' if page == self._page else page}#{title.replace(' ', '-')})"
 
 

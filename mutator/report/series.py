@@ -18,6 +18,7 @@ from mutator.figures.run_plot import finite, marks_of
 from mutator.model import Record, Status
 from mutator.outcomes.golden import Trace
 from mutator.outcomes.rows import Row
+from mutator.report.panel import FOLDER as REPORT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import Channel, TargetManifest
 from mutator.web import packed
@@ -88,8 +89,6 @@ def keep(folder: RunFolder, manifest: TargetManifest, golden: Trace, faulty: Tra
 
 def series_path(folder: RunFolder, experiment_id: str) -> Path:
     """Where the page looks for the series of an experiment that it does not carry."""
-    from mutator.report.building import FOLDER as REPORT
-
     return folder.path / REPORT / FOLDER / f"{experiment_id}.js"
 
 

@@ -19,7 +19,7 @@ FILE = "made_from.json"
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     """Digest of all that a report depends on: results, run.json, records, timings, proof, reviews,
-    pictures that it shows, the library's cited numbers, and mutator's own sources."""
+    pictures that it shows, what the library cites, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
@@ -32,7 +32,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     return digest([SCHEMA, own, results, engine, plots, references, reviewed])
 
 
-def read(out: Path) -> dict[str, Any]:
+def read_stamp(out: Path) -> dict[str, Any]:
     """What the report in `out` says it was made from; empty when there is none, or one cut short."""
     try:
         return read_json(out / FILE, SCHEMA)
@@ -45,7 +45,7 @@ def is_of(stamp: dict[str, Any], out: Path, made_from: str) -> bool:
     return bool(stamp) and (stamp["made_from"], stamp.get("series")) == (made_from, _series(out))
 
 
-def write(out: Path, made_from: str, rows: int) -> None:
+def write_stamp(out: Path, made_from: str, rows: int) -> None:
     """Say what the report in `out` was made from and of how many experiments it tells; last of its files."""
     stamp = {"schema": SCHEMA, "made_from": made_from, "rows": rows, "series": _series(out)}
     write_json(out / FILE, stamp)
@@ -56,7 +56,7 @@ def _series(out: Path) -> list[str]:
     return sorted(path.name for path in (out / "series").glob("*.js"))
 
 
-def remove(out: Path) -> None:
+def remove_stamp(out: Path) -> None:
     """Before anything of the report is written: one that is cut short is no report."""
     (out / FILE).unlink(missing_ok=True)
 

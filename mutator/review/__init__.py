@@ -1,1 +1,4 @@
-"""Reviewing generated diffs: mutants grouped by shape, decisions about groups, and where these are shown."""
+"""Review of generated diffs: mutants grouped by shape, decisions about the groups, the page and the gate.
+
+Nothing here runs an experiment.
+"""

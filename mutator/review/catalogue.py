@@ -1,7 +1,7 @@
-"""What there is to review: the mutants of a library or campaign, grouped by place, template and trigger.
+"""What there is to review: the mutants of a library or campaign, grouped by location, template and trigger.
 
-A group does not depend on which of its mutants are asked for: its id comes from what it is about, and what a
-decision about it is bound to (`Bound`) from its diff with holes, the target's functions and the templates.
+A group is the same whichever of its mutants are selected: its id follows from what it is about, and what a
+decision is bound to (`Bound`) from its diff with holes, the target's functions and the templates.
 """
 
 import ast
@@ -11,25 +11,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from mutator._common.hashing import content_id
+from mutator.campaigns.plans import Plan
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
-from mutator.faults.specs import READINGS, FaultSpec
+from mutator.faults.specs import FaultSpec
 from mutator.model import Fault, FaultLocation, Injection, Trigger
-from mutator.mutants.building import OBSERVE_TAG, build
-from mutator.mutants.splicing import PROBE_TAG
+from mutator.mutants.building import build
+from mutator.mutants.probe import adds_fault
+from mutator.mutants.readable_diffs import adds_file, file_patches
 from mutator.review import groups
 from mutator.review.groups import Shape
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always, at_time
+from mutator.workspace import Workspace
 
-if TYPE_CHECKING:
-    from mutator.campaigns.plans import Plan
-    from mutator.workspace import Workspace
-
-_FAULT_TAG = re.compile(rf"^\+.*# fi:(?!{PROBE_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
 _HUNK_HEAD = re.compile(r"^@@ .*$", re.MULTILINE)
 
 
@@ -37,23 +34,23 @@ _HUNK_HEAD = re.compile(r"^@@ .*$", re.MULTILINE)
 class Bound:
     """Digests of what a decision is about; when one of them changes, the decision no longer holds."""
 
-    diff: str  # the hunks with injected lines, their values and line numbers cut out
-    function: str  # the target's functions that they stand in, as they are without them
-    template: str  # the templates that they were made from
+    diff: str  # of the hunks with injected lines, without their values and line numbers
+    function: str  # of the target's functions that are changed, without injected lines
+    template: str  # of the templates that the injected lines were made from
 
     def changed(self, now: "Bound") -> list[str]:
-        """What is no longer what it was, in words."""
+        """What has changed, in words."""
         words = {"template": "template", "function": "target function", "diff": "diff"}
         return [word for name, word in words.items() if getattr(self, name) != getattr(now, name)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Mutants that differ in values alone. `what` says where, with which template, and when, in one line.
+    """Mutants that differ only in values. `what` is one line: the location, the template and the trigger.
 
-    `shapes` are its diffs with holes: one, but where a template writes other lines for other numbers. Their
-    members are `faults`, by id. `runs` is how many experiments a campaign has of it; None: no campaign was
-    asked for.
+    `shapes` are its diffs with holes: more than one if a template writes different lines for different
+    numbers. Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None
+    without a campaign.
     """
 
     id: str
@@ -77,34 +74,34 @@ class Group:
 
     @property
     def specs(self) -> tuple[str, ...]:
-        """The variants that its faults are of."""
+        """The specs and variants of its faults."""
         return tuple(dict.fromkeys(fault.spec for fault in self.faults))
 
 
 _Member = tuple[Fault, Trigger]
 
 
-def of_plan(workspace: "Workspace", plan: "Plan") -> tuple[Group, ...]:
-    """The groups of all that running the plan takes, its canary included; the probe's comes last."""
+def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
+    """The groups of every mutant that the plan runs, its canary included; the probe's comes last."""
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
-    runs = Counter(groups.label(e.fault, e.trigger) for e in plan.experiments)
+    runs = Counter(groups.group_label(e.fault, e.trigger) for e in plan.experiments)
     return _Catalogue(workspace.fault_models(), manifest).groups(members, runs)
 
 
 def of_library(
-    workspace: "Workspace",
+    workspace: Workspace,
     manifest: TargetManifest,
     *,
     specs: Sequence[str] = (),
-    readings: Sequence[str] = READINGS,
+    reading: str | None = None,
     seed: int = 0,
 ) -> tuple[Group, ...]:
     """The groups of the library's faults; the probe's comes last.
 
-    Under every context of its tables, and at a random time: what campaigns make of them, but for those that
-    say how long a fault stays. `specs` are spec files or globs over specs (none: all); MutatorError for one
-    that matches nothing.
+    Each fault is built under every context of the tables and at a random time, as campaigns do that leave
+    open how long a fault stays; without `reading`, in every reading of the library. `specs` are spec files or
+    globs over specs (none: all); MutatorError for one that matches nothing.
     """
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_tables)
@@ -113,15 +110,15 @@ def of_library(
     faults = [
         fault
         for spec in _specs(workspace, specs)
-        for reading in readings
-        for fault in expand(spec, seed, reading, models=models, manifest=manifest)
+        for name in ((reading,) if reading else spec.readings.names)
+        for fault in expand(spec, seed, name, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
     return _Catalogue(models, manifest).groups(members, None)
 
 
-def _specs(workspace: "Workspace", wanted: Sequence[str]) -> Iterator[FaultSpec]:
-    """The specs meant: all, files, or those whose name is like a glob."""
+def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
+    """The wanted specs: all of them, files, or those whose names match a glob."""
     library = workspace.specs()
     if not wanted:
         yield from library
@@ -138,10 +135,10 @@ class _Catalogue:
         self.manifest = manifest
 
     def groups(self, members: Sequence[_Member], runs: Mapping[str, int] | None) -> tuple[Group, ...]:
-        """The groups of `members`, those of one file side by side; `runs` counts experiments by label."""
+        """The groups of `members`, sorted by label; `runs` counts experiments by label."""
         found: dict[str, list[_Member]] = {}
         for fault, trigger in members:
-            found.setdefault(groups.label(fault, trigger), []).append((fault, trigger))
+            found.setdefault(groups.group_label(fault, trigger), []).append((fault, trigger))
         patches: dict[tuple[Injection, ...], str] = {}
         for fault, trigger in members:
             if fault.injections not in patches:
@@ -163,27 +160,29 @@ class _Catalogue:
         return Group(
             id=self._id(what),
             what=what,
-            injections=tuple(map(groups.injected, fault.injections)),
+            injections=tuple(map(groups.injection_label, fault.injections)),
             files=tuple(dict.fromkeys(i.location.path for i in fault.injections)),
             functions=tuple(dict.fromkeys(i.location.function for i in fault.injections)),
             models=tuple(dict.fromkeys(injection.model for injection in fault.injections)),
             trigger=groups.trigger_kind(trigger),
-            hold=groups.hold(fault, trigger).value,
-            shapes=tuple(s.named(groups.parameters(faults[m]) for m in s.members) for s in shapes),
+            hold=groups.hold_of(fault, trigger).value,
+            shapes=tuple(
+                s.with_named_holes(groups.parameter_values(faults[m]) for m in s.members) for s in shapes
+            ),
             faults=tuple(faults.values()),
             triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
             runs=None if runs is None else runs.get(what, 0),
             bound=self._bound(
-                sorted({patches[fault.injections] for fault in faults.values()}, key=groups.cut),
+                sorted({patches[fault.injections] for fault in faults.values()}, key=groups.without_values),
                 [injection.location for injection in fault.injections],
                 {i.model: self.models.get(i.model).template for i in fault.injections},
             ),
         )
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:
-        """What every mutant gets: the probe, its import, and the statement that observes."""
+        """What every mutant has: the probe, its import, and the statement that observes."""
         location = self.manifest.observation.location
-        what = f"the probe, observing at {groups.place(location)}"
+        what = f"the probe, observing at {groups.location_label(location)}"
         patch = build(self.manifest, self.models, None, always()).patch
         return Group(
             id=self._id(what),
@@ -207,7 +206,7 @@ class _Catalogue:
     def _bound(
         self, patches: Sequence[str], locations: Sequence[FaultLocation], templates: dict[str, str]
     ) -> Bound:
-        diffs = dict.fromkeys(_HUNK_HEAD.sub("@@", groups.cut(patch)) for patch in patches)
+        diffs = dict.fromkeys(_HUNK_HEAD.sub("@@", groups.without_values(patch)) for patch in patches)
         sources = {
             f"{place.path} {place.function}": _function(
                 self.manifest.tree.files[place.path], place.function
@@ -222,17 +221,17 @@ class _Catalogue:
 def fault_hunks(patch: str) -> str:
     """The hunks that hold lines of a fault, without those that every mutant has."""
     kept = []
-    for section in re.split(r"^(?=diff --git )", patch, flags=re.MULTILINE):
-        head, *hunks = re.split(r"^(?=@@ )", section, flags=re.MULTILINE)
-        if "\nnew file mode " not in head:
-            own = [hunk for hunk in hunks if _FAULT_TAG.search(hunk)]
+    for section in file_patches(patch):
+        if not adds_file(section):
+            head, *hunks = re.split(r"^(?=@@ )", section, flags=re.MULTILINE)
+            own = [hunk for hunk in hunks if adds_fault(hunk)]
             kept += [head, *own] if own else []
     return "".join(kept)
 
 
 @lru_cache(maxsize=256)
 def _function(data: bytes, name: str) -> bytes:
-    """The source of the functions of that qualified name, decorators included."""
+    """The source of the functions with this qualified name, decorators included."""
     lines = data.splitlines(keepends=True)
     spans = [
         (min(n.lineno for n in (node, *node.decorator_list)), node.end_lineno)

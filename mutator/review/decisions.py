@@ -1,7 +1,7 @@
 """Decisions about groups of mutants: a YAML file for version control, one block for each group, sorted.
 
-A decision holds for what was looked at: the group's diff, the target's functions, the templates. Its digests
-are in the block; when one is another now, the group is `changed` and asks again.
+A decision holds for what the reviewer saw: the group's diff, the target's functions, the templates. Their
+digests are in the block; when one of them differs now, the group is `changed` and needs a new decision.
 """
 
 import json
@@ -14,6 +14,7 @@ from typing import Literal
 from pydantic import Field
 
 from mutator._common.files import make_folder, write_atomic
+from mutator._common.shipped import refuse_shipped
 from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Bound, Group
@@ -27,24 +28,24 @@ _HEAD = """\
 
 
 class Verdict(StrEnum):
-    """What a reviewer said."""
+    """What a reviewer decided."""
 
     APPROVED = "approved"
     REJECTED = "rejected"
 
 
 class State(StrEnum):
-    """Where a group stands; in the order in which groups are listed."""
+    """The state of a group's review, in the order in which groups are listed."""
 
     NEW = "new"  # nobody has decided
-    CHANGED = "changed"  # it is no longer what was decided about
+    CHANGED = "changed"  # since the decision
     REJECTED = "rejected"
     APPROVED = "approved"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What `by` said of a group, and digests of what it was then."""
+    """What `by` decided about a group, and digests of what it was then."""
 
     group: str
     what: str
@@ -54,12 +55,12 @@ class Decision:
     bound: Bound
 
     def changed(self, group: Group) -> list[str]:
-        """What of the group is no longer what was decided about; empty: the decision holds."""
+        """What of the group has changed since; empty: the decision holds."""
         return self.bound.changed(group.bound)
 
     @property
     def words(self) -> str:
-        """Who said what: `approved by Jane Doe: a remark`."""
+        """Who decided what: `approved by Jane Doe: a remark`."""
         return f"{self.verdict} by {self.by}" + (f": {self.remark}" if self.remark else "")
 
 
@@ -81,26 +82,26 @@ class _ReviewModel(StrictModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Review:
-    """The decisions about one target's groups, by group; `path` is their file, there or not yet."""
+    """The decisions about one target's groups, by group; `path` is their file, which need not exist."""
 
     path: Path
     target: str
     decisions: Mapping[str, Decision]
 
     def state(self, group: Group) -> State:
-        """Where the group stands."""
+        """The state of the group's review."""
         decision = self.decisions.get(group.id)
         if decision is None:
             return State.NEW
         return State.CHANGED if decision.changed(group) else State(decision.verdict.value)
 
     def in_turn(self, groups: Iterable[Group]) -> list[Group]:
-        """The groups as they are listed: new and changed ones first."""
+        """The groups in the order of the list: new and changed ones first."""
         order = list(State)
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
-    def told(self, group: Group) -> str:
-        """What there is to say about its state: who decided, what has changed since; empty for a new one."""
+    def describe(self, group: Group) -> str:
+        """Who decided about the group, and what has changed since; empty for a new one."""
         decision = self.decisions.get(group.id)
         if decision is None:
             return ""
@@ -108,7 +109,7 @@ class Review:
         return decision.words + (f" (changed since: {', '.join(changed)})" if changed else "")
 
     def decided(self, groups: Iterable[Group], verdict: Verdict, by: str, remark: str) -> "Review":
-        """The review with this said of `groups`; MutatorError for a name or remark that is no text."""
+        """The review with this decision about `groups`; MutatorError for an unusable name or remark."""
         by, remark = _line(by, "--by"), _line(remark, "--remark")
         if not by:
             raise MutatorError("no name", where="--by", expected="who has reviewed", remedy="give a name")
@@ -121,7 +122,11 @@ class Review:
         return Review(path=self.path, target=self.target, decisions={**self.decisions, **made})
 
     def write(self) -> None:
-        """Write the file, whole or not at all: sorted, so that the work of two people can be merged."""
+        """Write the file, whole or not at all; sorted, so that the work of two people can be merged.
+
+        MutatorError in the library that ships with mutator, which stays as it is.
+        """
+        refuse_shipped(self.path)
         make_folder(self.path.parent)
         blocks = [_block(self.decisions[name]) for name in sorted(self.decisions)]
         entries = "\n" + "".join(blocks) if blocks else " []\n"
@@ -130,7 +135,7 @@ class Review:
 
 
 def load_review(workspace: Workspace, target: str) -> Review:
-    """The decisions about a target; none where there is no file. MutatorError at the line of a mistake."""
+    """The decisions about a target; none without a file. MutatorError at the line of a mistake."""
     path = workspace.library / "reviews" / f"{target}.yaml"
     if not path.exists():
         return Review(path=path, target=target, decisions={})
@@ -173,7 +178,7 @@ def _block(decision: Decision) -> str:
 
 
 def _line(text: str, option: str) -> str:
-    """Text as one line; what YAML could not carry is refused."""
+    """Text as one line; MutatorError for characters that YAML cannot hold."""
     line = " ".join(text.split())
     if not line.isprintable():
         raise MutatorError(f"{line!r}", where=option, expected="plain text", remedy="leave out what is not")

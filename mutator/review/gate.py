@@ -1,4 +1,4 @@
-"""`--require-reviewed`: nothing is run that nobody has approved, and a run says who approved what it ran."""
+"""`--require-reviewed`: a campaign runs only approved mutants, and its run folder says who approved them."""
 
 import shlex
 from collections import Counter
@@ -16,13 +16,13 @@ from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"
 FILE = "reviewed.json"
-_NAMED = 10  # ids in one printed command
+_MOST_IDS = 10  # in one printed command
 
 
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
-    """The decisions that allow the plan to run (canary and probe included), for `write`.
+    """The decisions that allow the plan to run (canary and probe included), for `write_approvals`.
 
-    CheckFailed, which names the groups and how to look at them, unless each group is approved as it is now.
+    CheckFailed unless every group is approved as it is now; it lists the others and says how to review them.
     """
     manifest = workspace.manifest(plan.campaign.target)
     groups = of_plan(workspace, plan)
@@ -34,13 +34,13 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
 
 
-def write(run: Path, approvals: dict[str, Any]) -> None:
-    """Keep in the run folder what was approved, by whom, and the digests of what they saw."""
+def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
+    """Write to the run folder what was approved, by whom, and the digests of what they saw."""
     write_json(run / FILE, approvals)
 
 
-def told(run: Path) -> str:
-    """For a report: what of the run was reviewed; empty when nobody asked for it."""
+def approval_summary(run: Path) -> str:
+    """Who approved the mutants of a run, in words; empty for a run without `--require-reviewed`."""
     if not (run / FILE).exists():
         return ""
     groups = read_json(run / FILE, SCHEMA)["groups"]
@@ -52,12 +52,12 @@ def told(run: Path) -> str:
 
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {review.state(group)}, {_of(group)}: {group.what}"
+        f"  {group.id}  {review.state(group)}, {_share(group)}: {group.what}"
         for group in review.in_turn(refused)
     ]
     many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
-    ids = " ".join(group.id for group in refused) if len(refused) <= _NAMED else "GROUP..."
-    wanted = f"--campaign {_name(workspace, plan)}"
+    ids = " ".join(group.id for group in refused) if len(refused) <= _MOST_IDS else "GROUP..."
+    wanted = f"--campaign {_campaign(workspace, plan)}"
     wanted += f" --reading {plan.reading}" if plan.choices.reading else ""
     return CheckFailed(
         "\n".join([f"{many} not approved:", *lines]),
@@ -67,13 +67,13 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
     )
 
 
-def _of(group: Group) -> str:
-    """What of a campaign a group is: so many experiments, or the canary alone."""
+def _share(group: Group) -> str:
+    """The part of a campaign that a group is: a number of experiments, or the canary alone."""
     return counted(group.runs, "experiment") if group.runs else "the canary"
 
 
-def _name(workspace: Workspace, plan: Plan) -> str:
-    """The campaign as a command names it: by its name where that means this text, else by its file."""
+def _campaign(workspace: Workspace, plan: Plan) -> str:
+    """The campaign as a command names it: by name if the library has this text under it, else by file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
     same = known and workspace.campaign(name).read_bytes() == plan.campaign.source

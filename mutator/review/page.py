@@ -1,15 +1,18 @@
-"""The review page: every group with its state, diff and values, in one file that needs nothing else."""
+"""The review page: every group with its state, diff and values, in one self-contained file."""
 
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Review, State
-from mutator.review.words import conditions, values
+from mutator.review.readable_groups import condition_lines, value_table
 from mutator.web import asset, embedded
 
 STYLES = ("base.css", "review.css")
@@ -17,7 +20,7 @@ SCRIPTS = ("dom.js", "packed.js", "diff.js", "review.js")
 
 
 def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
-    """Write the page of `groups`; its commands name what is reviewed by `options`."""
+    """Write the page of `groups`; the commands on it have these `options`, which select the groups."""
     data = {
         "target": review.target,
         "states": [state.value for state in State],
@@ -25,18 +28,15 @@ def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequ
         "groups": [_group(review, group) for group in groups],
     }
     try:
-        write_atomic(out, page(data).encode())
+        write_atomic(out, render_page(data).encode())
     except OSError as err:
         raise MutatorError(
             f"cannot be written ({err.strerror})", where=out, remedy="name another file"
         ) from None
 
 
-def page(data: dict[str, Any]) -> str:
-    """The page as text: the same each time for the same groups and decisions."""
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
-
+def render_page(data: dict[str, Any]) -> str:
+    """The page as HTML; the same groups and decisions give the same text."""
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -50,16 +50,16 @@ def page(data: dict[str, Any]) -> str:
 
 
 def _group(review: Review, group: Group) -> dict[str, Any]:
-    heads, rows = values(group)
+    heads, rows = value_table(group)
     return {
         "id": group.id,
         "state": review.state(group).value,
-        "told": review.told(group),
+        "decision": review.describe(group),
         "injections": group.injections,
         "specs": group.specs,
         "trigger": group.trigger,
         "hold": group.hold,
-        "conditions": conditions(group.triggers),
+        "conditions": condition_lines(group.triggers),
         "faults": len(group.faults),
         "runs": group.runs,
         "diff": group.diff,

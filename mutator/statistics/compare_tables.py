@@ -2,18 +2,18 @@
 
 import pandas as pd
 
-from mutator.paper.published import Paper
 from mutator.statistics import compare
 from mutator.statistics.compare import WHOLES, Whole
 from mutator.statistics.paired import Matched
+from mutator.statistics.published import OURS, Published, by_source
 from mutator.statistics.share import share
 from mutator.statistics.sheet import Cell, P, Sheet
 from mutator.statistics.tally import by_kind
 
 
-def overall_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
+def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     """Rates, stratified odds ratio and resampled difference, per activated and per injected fault."""
-    sources = ({"paper": paper.coverage} if paper else {}) | {"here": by_kind(frame)}
+    sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
         for source, counts in sources.items():
@@ -42,15 +42,15 @@ def overall_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
 
 
 def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
-    if source == "paper":
+    if source != OURS:  # single runs are needed, which are not published
         return (None,) * 4
     found = compare.resampled(frame, whole)
     return (found.difference, found.low, found.high, found.clusters)
 
 
-def kinds_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
+def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     """Fisher's exact test of each fault type, adjusted over all of them."""
-    sources = ({"paper": paper.coverage} if paper else {}) | {"here": by_kind(frame)}
+    sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
         for source, counts in sources.items():

@@ -5,17 +5,13 @@ from dataclasses import astuple
 
 import pandas as pd
 
-from mutator.paper.published import Paper
 from mutator.statistics import times
+from mutator.statistics.published import Published
 from mutator.statistics.sheet import Cell, Sheet
 
 
-def propagation_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
+def propagation_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     """How fast faults get through, by method and scenario."""
-    published = ""
-    if paper:
-        least, most = paper.least_alert_to_hazard_s, paper.most_alert_to_hazard_s
-        published = f" The paper's mean times from alert to hazard lie between {least:g} and {most:g} s."
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         for step, spread in times.propagation(group).items():
@@ -25,7 +21,8 @@ def propagation_sheet(frame: pd.DataFrame, paper: Paper | None) -> Sheet:
         title="Propagation times by scenario",
         note="s from one event to the other, in the N runs that had both. Manifest: first difference of an "
         "actuator output from the fault-free run. Alert to hazard: where the alert came first; what did not "
-        "happen before the end of the run is left out here, see alert to hazard, censored." + published,
+        "happen before the end of the run is left out here, see alert to hazard, censored."
+        + (f" {published.times_note}" if published else ""),
         heads=(
             "method",
             "scenario",

@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from mutator._common.files import raising_disk_full, write_atomic
-from mutator._common.hashing import canonical, plain
+from mutator._common.hashing import added_values, canonical, plain
 from mutator.errors import MutatorError
 from mutator.model import (
     Anchor,
@@ -23,6 +25,7 @@ from mutator.model import (
 _EXPERIMENTS = "plan/experiments.jsonl"
 _FAULTS = "plan/faults.jsonl"
 
+_T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
 
 
@@ -93,42 +96,58 @@ def to_plain(experiment: Experiment) -> dict[str, Any]:
         "trigger": plain(experiment.trigger),
         "seed": experiment.seed,
         "setting": list(experiment.setting),
+        **added_values(experiment),
     }
 
 
 def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
-    trigger = dict(data["trigger"])
-    return Experiment(
-        fault=faults[data["fault"]],
-        scenario=data["scenario"],
-        scenario_digest=data["scenario_digest"],
-        method=Method(data["method"]),
-        trigger=Trigger(**trigger | {"hold": Hold(trigger["hold"])}),
-        seed=data["seed"],
-        setting=tuple(data["setting"]),
-    )
+    """The experiment of a plan file's line; MutatorError for a field that this version does not know."""
+    trigger = data["trigger"]
+    values = {name: value for name, value in data.items() if name != "id"}
+    read = {
+        "fault": faults[data["fault"]],
+        "method": Method(data["method"]),
+        "trigger": _make(Trigger, trigger, hold=Hold(trigger["hold"])),
+        "setting": tuple(data["setting"]),
+    }
+    return _make(Experiment, values, **read)
 
 
 def fault_from(data: Mapping[str, Any]) -> Fault:
-    fields = dict(data)
-    return Fault(
-        **fields
-        | {
-            "injections": tuple(_injection_from(item) for item in data["injections"]),
-            "hold": Hold(data["hold"]) if data["hold"] else None,
-            "changes": tuple(data["changes"]),
-        }
+    """The fault of a plan file's line; MutatorError for a field that this version does not know."""
+    return _make(
+        Fault,
+        data,
+        injections=tuple(_injection_from(item) for item in data["injections"]),
+        hold=Hold(data["hold"]) if data["hold"] else None,
+        changes=tuple(data["changes"]),
     )
 
 
 def _injection_from(data: Mapping[str, Any]) -> Injection:
     location, anchor = data["location"], data["location"]["anchor"]
-    return Injection(
-        location=FaultLocation(
-            path=location["path"],
-            function=location["function"],
-            anchor=Anchor(kind=AnchorKind(anchor["kind"]), name=anchor["name"], nth=anchor["nth"]),
+    return _make(
+        Injection,
+        data,
+        location=_make(
+            FaultLocation, location, anchor=_make(Anchor, anchor, kind=AnchorKind(anchor["kind"]))
         ),
-        model=data["model"],
         params=tuple((name, value) for name, value in data["params"]),
     )
+
+
+def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
+    """A record from its line, some values of which were `read` already. Fields added since the line was
+    written hold their defaults."""
+    if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
+        raise MutatorError(
+            f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",
+            expected="a plan that this version or an older one wrote",
+            remedy="update mutator, or plan into a new folder",
+        )
+    return kind(**{**data, **read})
+
+
+@lru_cache(maxsize=16)
+def _known(kind: type[Any]) -> frozenset[str]:
+    return frozenset(field.name for field in fields(kind))

@@ -41,84 +41,92 @@ class Category(StrEnum):
     WRONG_DURATION = "wrong_duration"
 
 
-class VariableModel(StrictModel):
-    """A variable of a controller's process model; `observed` names what a trigger may ask instead."""
+class VariableModel(StrictModel, title="A variable"):
+    """What a controller believes about the process."""
 
-    about: str
-    observed: str | None
-
-
-class ComponentModel(StrictModel):
-    """A box of the control structure; `drawn` is row, column and width in columns; `modules` its sources."""
-
-    kind: Kind = Field(strict=False)
-    label: str
-    about: str
-    modules: list[str] = Field(default_factory=list)
-    process_model: dict[str, VariableModel] = Field(default_factory=dict)
-    drawn: list[int] = Field(min_length=3, max_length=3)
+    about: str = Field(description="What it is.")
+    observed: str | None = Field(
+        description="The variable that a trigger may ask in its place; `null` if none."
+    )
 
 
-class LinkModel(StrictModel):
-    """An arrow of the control structure; one that is not studied is drawn dashed."""
+class ComponentModel(StrictModel, title="A component"):
+    """A box of the drawing."""
 
-    from_: str = Field(alias="from")
-    to: str
-    label: str
-    studied: bool = True
-
-
-class ActionModel(StrictModel):
-    """A control action: the link that carries it and the recorded channel that shows it."""
-
-    link: str
-    channel: str
-    about: str
-
-
-class StructureModel(StrictModel):
-    """The control structure."""
-
-    about: str
-    components: dict[str, ComponentModel]
-    control_actions: dict[str, ActionModel]
-    links: dict[str, LinkModel]
+    kind: Kind = Field(strict=False, description="What it is.")
+    label: str = Field(description="What the drawing calls it.")
+    about: str = Field(description="What it does.")
+    modules: list[str] = Field(default_factory=list, description="Its sources, files of the target.")
+    process_model: dict[str, VariableModel] = Field(
+        default_factory=dict, description="Name -> variable of a controller's process model."
+    )
+    drawn: list[int] = Field(
+        min_length=3,
+        max_length=3,
+        description="Row from the top, column from the left, width in columns, of the drawing.",
+    )
 
 
-class UnsafeActionModel(StrictModel):
-    """An unsafe control action; `contexts` are rows as `table/row`."""
+class LinkModel(StrictModel, title="A link"):
+    """An arrow of the drawing."""
 
-    action: str
-    category: Category = Field(strict=False)
-    about: str
-    hazards: list[str] = Field(min_length=1)
-    contexts: list[str] = Field(min_length=1)
-
-
-class UnsafeActionsModel(StrictModel):
-    """All unsafe control actions, and the context tables they come from."""
-
-    about: str
-    tables: list[str]
-    unsafe_control_actions: dict[str, UnsafeActionModel]
+    from_: str = Field(alias="from", description="The component it comes from.")
+    to: str = Field(description="The component it goes to.")
+    label: str = Field(description="What it carries.")
+    studied: bool = Field(True, description="`false`: it is drawn dashed.")
 
 
-class FactorModel(StrictModel):
-    """A causal factor: links or components, places in the target (`file::function`), faults or a reason."""
+class ActionModel(StrictModel, title="A control action"):
+    """What a controller does to what it controls."""
 
-    about: str
-    where: list[str] = Field(min_length=1)
-    at: list[str] = Field(default_factory=list)
-    leads_to: list[str] = Field(min_length=1)
-    faults: list[str] = Field(default_factory=list)
-    no_fault: str | None = None
+    link: str = Field(description="The link that carries it.")
+    channel: str = Field(description="The recorded channel that shows it.")
+    about: str = Field(description="What it does.")
 
 
-class FactorsModel(StrictModel):
-    """All causal factors."""
+class StructureModel(StrictModel, title="control_structure.yaml"):
+    """Who controls what, by which actions, and what is fed back."""
 
-    about: str
-    causal_factors: dict[str, FactorModel]
+    about: str = Field(description="What is shown.")
+    components: dict[str, ComponentModel] = Field(description="Name -> component.")
+    control_actions: dict[str, ActionModel] = Field(description="Name -> control action.")
+    links: dict[str, LinkModel] = Field(description="Name -> link.")
+
+
+class UnsafeActionModel(StrictModel, title="An unsafe control action"):
+    """One way in which a control action leads to a hazard."""
+
+    action: str = Field(description="The control action.")
+    category: Category = Field(strict=False, description="In which of four ways it is unsafe.")
+    about: str = Field(description="What happens.")
+    hazards: list[str] = Field(min_length=1, description="The hazards that follow.")
+    contexts: list[str] = Field(min_length=1, description="The contexts in which they do, as `table/row`.")
+
+
+class UnsafeActionsModel(StrictModel, title="unsafe_control_actions.yaml"):
+    """How each control action can be unsafe, and when."""
+
+    about: str = Field(description="What is listed.")
+    tables: list[str] = Field(description="The context tables that they come from.")
+    unsafe_control_actions: dict[str, UnsafeActionModel] = Field(description="Id -> unsafe control action.")
+
+
+class FactorModel(StrictModel, title="A causal factor"):
+    """Either `faults` or `no_fault` is given."""
+
+    about: str = Field(description="What goes wrong.")
+    where: list[str] = Field(min_length=1, description="Links or components of the control structure.")
+    at: list[str] = Field(default_factory=list, description="Where in the target, as `file::function`.")
+    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions it may lead to.")
+    faults: list[str] = Field(default_factory=list, description="The fault specs that stand for it.")
+    no_fault: str | None = Field(None, description="Why none does.")
+
+
+class FactorsModel(StrictModel, title="causal_factors.yaml"):
+    """What may bring a controller to an unsafe action, and which faults stand for it."""
+
+    about: str = Field(description="What is listed.")
+    causal_factors: dict[str, FactorModel] = Field(description="Id -> causal factor.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import Field
+
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
@@ -84,36 +86,44 @@ class HazardList:
     leads_to: Mapping[str, tuple[str, ...]]
 
 
-class _VerdictsModel(StrictModel):
-    provided: str | None
-    not_provided: str | None
+class _VerdictsModel(StrictModel, title="A verdict"):
+    """For one control action in one context; `null` where there is no hazard."""
+
+    provided: str | None = Field(description="The hazard that follows if the action is given.")
+    not_provided: str | None = Field(description="The hazard that follows if it is not.")
 
 
-class _RowModel(StrictModel):
-    when: str
-    about: str
-    actions: dict[str, _VerdictsModel]
+class _RowModel(StrictModel, title="A context"):
+    when: str = Field(
+        description="A condition over `t` (s), `d_rel` (m), `v_ego`, `v_lead` (m/s), `hwt` (s), `rs` (m/s) "
+        "and the constants."
+    )
+    about: str = Field(description="What it is, in words.")
+    actions: dict[str, _VerdictsModel] = Field(
+        description="Control action -> verdict; every row judges the same actions."
+    )
 
 
-class TableModel(StrictModel):
-    """The file of a context table, but for its key `schema`."""
+class TableModel(StrictModel, title="contexts/*.yaml"):
+    """A context table. Its rows cover everything exactly once: [what is
+    proved](../explanation/hazard-analysis.md#what-is-proved-about-a-context-table)."""
 
-    name: str
-    about: str = ""
-    constants: dict[str, float]
-    contexts: dict[str, _RowModel]
-
-
-class _HazardModel(StrictModel):
-    about: str
-    leads_to: list[str]
+    name: str = Field(description="Its name, that of the file.")
+    about: str = Field("", description="What it is about.")
+    constants: dict[str, float] = Field(description="Name -> number, for use in the conditions.")
+    contexts: dict[str, _RowModel] = Field(description="Id -> context.")
 
 
-class HazardsModel(StrictModel):
-    """The file of accidents and hazards, but for its key `schema`."""
+class _HazardModel(StrictModel, title="A hazard"):
+    about: str = Field(description="What it is.")
+    leads_to: list[str] = Field(description="The accidents it may lead to.")
 
-    accidents: dict[str, str]
-    hazards: dict[str, _HazardModel]
+
+class HazardsModel(StrictModel, title="hazards.yaml"):
+    """Accidents, and the hazards that lead to them."""
+
+    accidents: dict[str, str] = Field(description="Id -> what it is.")
+    hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")
 
 
 def load_context_table(path: Path) -> ContextTable:

@@ -1,16 +1,18 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common import caches
+from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.targets.observation import Observation, ObservationModel, observation
-from mutator.targets.source_tree import SourceTree, read_tree
+from mutator.targets.source_tree import SourceTree, matches, read_tree
 
 SCHEMA = "target/1"
 FILM = "film"  # folder in the output of a run that is filmed
@@ -47,11 +49,11 @@ class TargetManifest:
     name: str
     path: Path  # the manifest file
     root: Path  # absolute source root: goes on sys.path
-    package: str  # the import package in it; the probe becomes <package>/_fi.py
+    package: str  # the import package in it, to which mutants add the probe
     files: tuple[str, ...]  # globs, relative to root: what makes up the tree
     forbid: tuple[str, ...]  # globs: no fault may be injected there
     entry_module: str  # run as `python -m`
-    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}
+    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}
     stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
     independent: tuple[str, ...]  # more arguments, of a run that takes nothing from what others left behind
     reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
@@ -83,10 +85,9 @@ class TargetManifest:
             )
         return tree
 
-    @property
-    def probe_path(self) -> str:
-        """Path of the probe in a mutated tree, relative to its root."""
-        return f"{self.package}/_fi.py"
+    def reads_any(self, paths: Iterable[str]) -> bool:
+        """Whether a run itself reads one of these files: what it caches follows from their content."""
+        return any(matches(path, self.reads_itself) for path in paths)
 
     def arguments(
         self,
@@ -99,7 +100,7 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
         places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
-        places["{film}"] = str(out / FILM)
+        places |= {"{film}": str(out / FILM), "{cache}": str(caches.of_target(self.name))}
         extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:
@@ -125,65 +126,119 @@ class TargetManifest:
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args), stepwise=None)
 
 
-class _ChannelModel(StrictModel):
-    unit: str
-    tolerance: float = Field(0.0, ge=0.0, allow_inf_nan=False)
-    about: str = ""
+class _ChannelModel(StrictModel, title="A channel"):
+    """By its name in the trace."""
+
+    unit: str = Field(description="Its unit, for tables and axes; `-` for none.")
+    tolerance: float = Field(
+        0.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="By how much it may differ from golden and still count as the same.",
+    )
+    about: str = Field("", description="What it is.")
 
 
-class _ChangeModel(StrictModel):
-    args: list[str]
-    same_in: list[str] = Field(min_length=2)
+class _ChangeModel(StrictModel, title="A change"):
+    """A change is a list of further arguments, or this, where it makes scenarios the same run."""
+
+    args: list[str] = Field(description="Further arguments.")
+    same_in: list[str] = Field(
+        min_length=2, description="Scenarios that the change makes the same run: it is driven once."
+    )
 
 
-class _EntryModel(StrictModel):
-    module: str
-    args: list[str]
-    stepwise: str | None = None
-    independent: list[str] = Field(default_factory=list)
-    changes: dict[str, list[str] | _ChangeModel] = Field(default_factory=dict)
+class _EntryModel(StrictModel, title="The entry"):
+    """In the arguments, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for trace
+    and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable or
+    damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
+
+    module: str = Field(description="Run as `python -m`, from the root.")
+    args: list[str] = Field(description="Its arguments.")
+    stepwise: str | None = Field(
+        None,
+        description="A function of the module that takes these arguments and gives a run that is driven "
+        "step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
+        "need.",
+    )
+    independent: list[str] = Field(
+        default_factory=list,
+        description="More arguments, of a run that takes nothing from what other runs left behind: those of "
+        "the equivalence check, and of mutants of a file in `reads_itself`.",
+    )
+    changes: dict[str, list[str] | _ChangeModel] = Field(
+        default_factory=dict, description="Name of a change of the scenario -> its arguments."
+    )
 
 
-class _FilmModel(StrictModel):
-    run: list[str]
-    module: str
-    args: list[str]
-    still: list[str]
+class _FilmModel(StrictModel, title="Films"):
+    """What `mutator show --video` and `--still` need. `{film}`, `{golden}`, `{faulty}`, `{events}`, `{out}`
+    and `{t}` in the arguments are filled in."""
+
+    run: list[str] = Field(description="More arguments of the entry, which make a run leave a film.")
+    module: str = Field(description="Run as `python -m` to show two films.")
+    args: list[str] = Field(description="Its arguments.")
+    still: list[str] = Field(description="More of them for a still picture.")
 
 
-class ManifestModel(StrictModel):
-    """A manifest file, but for its key `schema`."""
+class ManifestModel(StrictModel, title="The file"):
+    """How a target is found, run and observed, and what its runs leave behind."""
 
-    name: str
-    about: str = ""
-    root: str
-    package: str
-    files: list[str]
-    forbid: list[str] = Field(default_factory=list)
-    reads_itself: list[str] = Field(default_factory=list)
-    step_s: float = Field(gt=0.0, allow_inf_nan=False)
-    armed_after_s: float = Field(0.0, ge=0.0, allow_inf_nan=False)
-    entry: _EntryModel
-    trace_file: str
-    time_channel: str
-    record_file: str
-    compare: dict[str, _ChannelModel]
-    plot: dict[str, _ChannelModel] = Field(default_factory=dict)
-    observation: ObservationModel
-    hazards: list[str]
-    alerts: list[str]
-    film: _FilmModel | None = None
+    name: str = Field(description="Its name, which campaigns use.")
+    about: str = Field("", description="What the target is.")
+    root: str = Field(
+        description="The folder that goes on `sys.path`, relative to this file; or `shipped:target`, the "
+        "controller that ships with mutator. `--target` overrides it."
+    )
+    package: str = Field(description="The import package in it. The probe is added to it as `_fi.py`.")
+    files: list[str] = Field(
+        description="Globs, relative to the root: what makes up the tree. `**` stands for any folders."
+    )
+    forbid: list[str] = Field(default_factory=list, description="Globs: no fault may be injected there.")
+    reads_itself: list[str] = Field(
+        default_factory=list,
+        description="Globs: files that a run reads while it runs, as what it caches follows from them. A "
+        "mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
+    )
+    step_s: float = Field(gt=0.0, allow_inf_nan=False, description="The length of a step of simulation.")
+    armed_after_s: float = Field(
+        0.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="When `mutator try` arms triggers, where nothing else is said.",
+    )
+    entry: _EntryModel = Field(description="How a run is started.")
+    trace_file: str = Field(
+        description="The trace's name in `{out}`: an `.npz` with an array for each channel."
+    )
+    time_channel: str = Field(description="The channel that holds time in s.")
+    record_file: str = Field(
+        description="The record's name in `{out}`: a JSON file, see [another controller "
+        "tree](../how-to/add-a-target.md#what-a-run-leaves-behind)."
+    )
+    compare: dict[str, _ChannelModel] = Field(
+        description="Actuator outputs: one that differs from golden means that the fault manifested."
+    )
+    plot: dict[str, _ChannelModel] = Field(
+        default_factory=dict, description="More channels that are worth a plot."
+    )
+    observation: ObservationModel = Field(description="Where ground truth is read.")
+    hazards: list[str] = Field(description="Names of the hazards that the target checks.")
+    alerts: list[str] = Field(
+        description="Names of the alerts that count; others that a record has are left out."
+    )
+    film: _FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
 
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
     model, source = read(path, ManifestModel, SCHEMA)
-    folder = (root or path.parent / model.root).resolve()
+    folder = (root or _root(path, model.root)).resolve()
     if not folder.is_dir():
         raise source.error(
             ("root",),
             f"no folder {folder}",
-            expected="the target's source root, relative to this file",
+            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET}",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
     _check_names(model, source)
@@ -216,6 +271,10 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         source=source,
         film=_film(model.film),
     )
+
+
+def _root(path: Path, root: str) -> Path:
+    return shipped_folder() / "target" if root == SHIPPED_TARGET else path.parent / root
 
 
 def _check_names(model: ManifestModel, source: Source) -> None:

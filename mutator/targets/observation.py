@@ -4,6 +4,8 @@ import ast
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import Field
+
 from mutator.config.locations import AtModel, dotted_name
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.errors import MutatorError
@@ -25,14 +27,15 @@ class Observation:
     expressions: tuple[tuple[str, str], ...]
 
 
-class ObservationModel(StrictModel):
-    """Anchor and expressions."""
+class ObservationModel(StrictModel, title="The observation"):
+    """Where ground truth is read, once in each step. Each value is a name or attribute that the place knows,
+    a number, or a sum, difference or product of these."""
 
-    at: AtModel
-    t: str
-    d_rel: str
-    v_ego: str
-    v_lead: str
+    at: AtModel = Field(description="The place; values are read there.")
+    t: str = Field(description="Time in s.")
+    d_rel: str = Field(description="Distance to the vehicle ahead in m.")
+    v_ego: str = Field(description="The car's own speed in m/s.")
+    v_lead: str = Field(description="Speed of the vehicle ahead in m/s.")
 
 
 def observation(model: ObservationModel, source: Source, root: Path) -> Observation:

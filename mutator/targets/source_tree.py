@@ -1,17 +1,16 @@
-"""A target's files in memory: read once, digested once, each file parsed once."""
+"""A target's files in memory: read once, digested once, and what others derive from each of them."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TypeVar, cast
 
-from mutator._common import hashing as ids
+from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
 
-if TYPE_CHECKING:
-    from mutator.mutants.anchors import ParsedFile
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -22,13 +21,17 @@ class SourceTree:
     files: Mapping[str, bytes]
     digest: str
     _entries: Mapping[str, str] = field(repr=False)  # what the digest is made of
-    _parsed: dict[str, "ParsedFile"] = field(default_factory=dict, repr=False, compare=False)
+    _derived: dict[tuple[str, Callable[..., Any]], Any] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
-    def parsed(self, path: str) -> "ParsedFile":
-        """The file at `path`, parsed; MutatorError when it is not a Python file of the target."""
-        if path not in self._parsed:
-            from mutator.mutants.anchors import parse_file  # anchors needs the tree's types
+    def derived(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
+        """What `make(path, data, root)` returns for a file of the target; called once for each path.
 
+        MutatorError when the target has no file at `path`; errors of `make` pass through.
+        """
+        key = (path, make)
+        if key not in self._derived:
             if path not in self.files:
                 raise MutatorError(
                     f"no file '{path}' in the target",
@@ -36,13 +39,13 @@ class SourceTree:
                     expected="a path relative to the target's root, among the manifest's files",
                     remedy="correct the path, or add the file to the manifest's `files`",
                 )
-            self._parsed[path] = parse_file(path, self.files[path], self.root)
-        return self._parsed[path]
+            self._derived[key] = make(path, self.files[path], self.root)
+        return cast("T", self._derived[key])
 
     @property
     def digests(self) -> dict[str, str]:
         """The digest of each file, by path."""
-        return {path: ids.digest(data) for path, data in self.files.items()}
+        return {path: digest(data) for path, data in self.files.items()}
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
         """Digest of the tree with `changed` put in."""
@@ -51,12 +54,12 @@ class SourceTree:
 
 def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
     """What each file puts into its tree's digest: its path and its own, as canonical text."""
-    return {path: ids.canonical([path, ids.digest(data)]) for path, data in files.items()}
+    return {path: canonical([path, digest(data)]) for path, data in files.items()}
 
 
 def _digest(entries: Mapping[str, str]) -> str:
-    """Digest of a tree: of the canonical text of its sorted [path, digest], put together from its parts."""
-    return ids.digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
+    """Digest of a tree: of the canonical text of its sorted [path, digest] entries, joined from its parts."""
+    return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
 def read_tree(root: Path, globs: Iterable[str]) -> SourceTree:

@@ -6,16 +6,19 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from mutator.campaigns.campaign_files import check_readings, load_campaign
+from mutator.campaigns.studies import find_study
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import Example, FaultModel, FaultModels
 from mutator.faults.parameters import resolve
-from mutator.faults.specs import READINGS, FaultSpec, Variant
+from mutator.faults.readings import Readings
+from mutator.faults.specs import FaultSpec, Variant
 from mutator.model import Fault
-from mutator.mutants import splicing as splice
-from mutator.mutants.anchors import parse_file
-from mutator.mutants.building import build, injection_edit, unsplice
+from mutator.mutants.anchors import parse_file, parsed
+from mutator.mutants.building import build, injection_edit
+from mutator.mutants.splicing import apply_edits, joined, unsplice
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -30,18 +33,18 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of library, templates and target, in the order of the files; empty when all is well.
 
     Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
-    that every spec expands in both readings; that every anchor is found in the target exactly once; that one
-    mutant of every shape compiles and un-splices; that published numbers, if any are cited, agree with one
-    another and with the library; and that a hazard analysis, if there is one, has no gap.
+    that every spec expands in every reading; that every anchor is found in the target exactly once; that one
+    mutant of every shape compiles and un-splices; that campaigns load and the studies that they ask for find
+    their data in order; and that a hazard analysis, if there is one, has no gap.
     """
-    from mutator.paper.published_checks import check_paper  # pandas takes long to import
-
     found = _Found()
     manifest = found.tried(lambda: workspace.manifest(target))
     models = found.tried(workspace.fault_models)
     hazards = found.tried(workspace.hazards)
     tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
-    specs = [found.tried(partial(workspace.spec, path)) for path in workspace.spec_files()]
+    readings = found.tried(workspace.readings)
+    spec_files = workspace.spec_files() if readings else ()
+    specs = [found.tried(partial(workspace.spec, path)) for path in spec_files]
     if models:
         found.problems += check_examples(models)
     if manifest and hazards:
@@ -49,12 +52,26 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     if manifest and models and found.tried(lambda: build(manifest, models, None, always())):
         for spec in specs:
             found.problems += check_spec(spec, models, manifest) if spec else ()
-    found.problems += check_paper(workspace)
+    if readings:
+        found.problems += check_campaigns(workspace, readings)
     if not found.problems:
         checked = found.tried(workspace.specs)
         analysis = found.tried(workspace.analysis)
         if analysis and checked and manifest:
             found.problems += check_analysis(analysis, checked, manifest)
+    return found.problems
+
+
+def check_campaigns(workspace: Workspace, readings: Readings) -> list[MutatorError]:
+    """Problems of the library's campaigns, and those that the studies they ask for find in its data."""
+    found, studies = _Found(), set()
+    for name in workspace.campaigns:
+        campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
+        if campaign:
+            found.tried(partial(check_readings, campaign, readings))
+            studies |= {campaign.study} if campaign.study else set()
+    for study in sorted(studies):
+        found.problems += find_study(study).check(workspace)
     return found.problems
 
 
@@ -74,8 +91,8 @@ class _Found:
 
 
 def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Problems of one spec: expansion in both readings, anchors, and a mutant of each shape."""
-    for reading in READINGS:
+    """Problems of one spec: expansion in every reading, anchors, and a mutant of each shape."""
+    for reading in spec.readings.names:
         try:
             faults = expand(spec, 0, reading, models=models, manifest=manifest)
         except MutatorError as error:
@@ -96,7 +113,8 @@ def _unbuildable(
     try:
         for i, injection in enumerate(fault.injections):
             keys = (*variant.keys, fault.reading, "injections", i, "at")
-            injection_edit(manifest.tree.parsed(injection.location.path), models, injection, EXAMPLE_TAG)
+            file = parsed(manifest.tree, injection.location.path)
+            injection_edit(file, models, injection, EXAMPLE_TAG)
         keys = (*variant.keys, fault.reading)
         build(manifest, models, fault, always())
     except MutatorError as error:
@@ -155,7 +173,7 @@ def run_example(model: FaultModel, models: FaultModels, example: Example) -> str
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
-    after = splice.joined(splice.apply(file, [edit]))
+    after = joined(apply_edits(file, [edit]))
     if unsplice(after) != file.data:
         raise MutatorError("the example does not un-splice to its `before`")
     return after.decode()

@@ -15,8 +15,8 @@ from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Status
-from mutator.mutants import building as mutant
-from mutator.mutants.building import InvalidMutant
+from mutator.mutants.building import InvalidMutant, build
+from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput
 from mutator.store import plan_file as planfile
@@ -92,12 +92,15 @@ class _Checks:
         try:
             found = read_json(place / FILE, SCHEMA)
             results = self._passed(found, place)
-        except (MutatorError, KeyError, TypeError, AttributeError):
+        except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # none is there, or a damaged one
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            with raising_disk_full(self.folder.path):
-                check_cache.copy(place, self.folder.path, FILE)
+            try:
+                with raising_disk_full(self.folder.path):
+                    check_cache.copy(place, self.folder.path, FILE)
+            except OSError:
+                return None  # it was deleted meanwhile
         return results
 
     def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
@@ -173,7 +176,7 @@ class _Checks:
         return runs
 
     def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
-        null = mutant.build(self.manifest, self.models, None, always())
+        null = build(self.manifest, self.models, None, always())
         for key in self.keys:
             scenario, changes = key
             common: dict[str, Any] = {
@@ -186,7 +189,7 @@ class _Checks:
             yield (_AGAIN, key), Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
             yield (_NULL, key), Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
         canary = self.canary
-        built = mutant.build(self.manifest, self.models, canary.fault, canary.trigger)
+        built = build(self.manifest, self.models, canary.fault, canary.trigger)
         yield (
             (_CANARY, None),
             Job(
@@ -226,7 +229,7 @@ class _Checks:
             trace=golden.trace_digest(self.manifest, execution.out),
             alerts=tuple(golden.alerts_of(record, self.manifest.alerts)),
             hazards=tuple(golden.hazards_of(record, self.manifest.hazards)),
-            triggered=bool(execution.probe and execution.probe["triggered"]),
+            triggered=was_triggered(execution.probe),
             cpu_s=execution.cpu_s,
         )
 
@@ -264,7 +267,7 @@ class _Checks:
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:
-                mutant.build(self.manifest, self.models, fault, always())
+                build(self.manifest, self.models, fault, always())
             except InvalidMutant:
                 continue
             except MutatorError as err:

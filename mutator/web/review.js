@@ -94,7 +94,7 @@ const Review = (() => {
         el("header", {},
           el("h2", { id: `id-${g.id}` }, el("a", { href: `#g=${g.id}`, onclick: (event) => this.#linked(event, g.id) }, g.id)),
           el(`span.state.${g.state}`, {}, g.state),
-          el("span.quiet", {}, g.told),
+          el("span.quiet", {}, g.decision),
           el("span.marks", {}, mark("approve"), mark("reject"))),
         el("ul", {}, g.injections.map((text) => el("li", {}, injection(text)))),
         el("p.facts.quiet", {}, `${when}${g.faults ? `; ${plural(g.faults, "fault")}` : ""}${runs}`),
@@ -191,7 +191,7 @@ const Review = (() => {
   }
 
   /** All that a group can be found by. */
-  const words = (g) => [g.id, g.state, g.told, ...g.injections, ...g.specs, g.trigger, g.hold].join(" ").toLowerCase();
+  const words = (g) => [g.id, g.state, g.decision, ...g.injections, ...g.specs, g.trigger, g.hold].join(" ").toLowerCase();
 
   /** `place: model(parameters)` with the model standing out. */
   function injection(text) {

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from mutator.campaigns.plans import freeze, make_plan
-from mutator.figures import figures
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes import results
 from mutator.report import building as report
 from mutator.report import series as report_series
+from mutator.report.panels import figures
 from mutator.store.records import SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

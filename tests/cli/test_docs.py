@@ -20,12 +20,14 @@ from typing import Any
 import pytest
 
 from mutator.reference.pages import SCHEMAS
-from mutator.reference.schemas import FORMATS
+from mutator.reference.schemas import file_formats
+from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
+CONTRIBUTING = CLONE / "CONTRIBUTING.md"
 BENCHMARKS = CLONE / "benchmarks" / "README.md"
-PAGES = [README, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
+PAGES = [README, CONTRIBUTING, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 HOW_TO = CLONE / "docs" / "how-to"
 COMPARISON = HOW_TO / "compare-with-openpilot.md"
@@ -49,6 +51,10 @@ FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 # What differs from machine to machine: how long it took.
 TIME = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b")
+
+
+# A package called mutator on an index is not this project.
+BY_NAME = re.compile(r"\b(?:pip|pipx|uv)\b[^\n`]*\b(?:install|add)\b[^\n`]*(?<![\w/.-])mutator(?![\w/.*-])")
 
 
 def name(page: Path) -> str:
@@ -207,6 +213,19 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_nobody_is_told_to_install_by_name(page: Path) -> None:
+    """On an index the name is somebody else's project, so pages install from a clone or from a file."""
+    assert not BY_NAME.search(page.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
+def test_installing_by_name_would_be_noticed(command: str) -> None:
+    """The pattern finds such commands, and lets those pass that name a folder or a file."""
+    assert BY_NAME.search(command)
+    assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
+
+
 def test_every_page_can_be_reached() -> None:
     """The index of the documentation names every page, but for what belongs to one that it names."""
     listed = {file for file, _ in links(INDEX)}
@@ -223,7 +242,10 @@ def test_editors_are_told_of_every_schema() -> None:
     """The settings that the guide prints map each schema to the files that it is made for."""
     page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
     [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
-    expected = {f"./{SCHEMAS.as_posix()}/{kind.name}.json": kind.files for kind in FORMATS}
+    expected = {
+        f"./{SCHEMAS.as_posix()}/{kind.name}.json": kind.files
+        for kind in file_formats(Workspace.find(root=CLONE).readings())
+    }
     expected[f"./{SCHEMAS.as_posix()}/scenario.json"] = "fault_library/scenarios/*.yaml"
     assert settings["yaml.schemas"] == expected
 

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 
 
@@ -72,8 +74,11 @@ def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
     assert "target toycar" in answer.out
 
 
-def test_doctor_without_library_fails_and_helps(cli: Cli, nowhere: Path) -> None:
+def test_doctor_without_library_fails_and_helps(
+    cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Without a library doctor still looks at the rest, says what to do, and exits with 1."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("doctor")
     assert answer.code == 1
     assert "MUTATOR_ROOT" in answer.out

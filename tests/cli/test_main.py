@@ -98,8 +98,16 @@ def test_wrong_use_is_two_and_says_where_to_look(cli: Cli, words: list[str], sai
     assert "Traceback" not in answer.err
 
 
-def test_outside_a_clone_the_way_in_is_told(cli: Cli, nowhere: Path) -> None:
-    """Without library the answer names the options and variables that give one."""
+def test_outside_a_clone_what_ships_is_there(cli: Cli, nowhere: Path) -> None:
+    """In an empty folder the verbs have the library that ships with the harness."""
+    answer = cli("list", "specs")
+    assert answer.code == 0
+    assert "radar/chaff" in answer.out
+
+
+def test_a_library_that_is_missing_is_told(cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the environment names a folder that is not there, the answer names options and variables."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("list")
     assert answer.code == 2
     assert "--root" in answer.err

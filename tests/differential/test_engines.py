@@ -23,7 +23,7 @@ from mutator.model import (
     Trigger,
     Value,
 )
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
@@ -112,7 +112,7 @@ class Engines:
         return self._goldens[scenario]
 
     def job(self, fault: Fault | None, trigger: Trigger, scenario: str = "A") -> Job:
-        built = mutant.build(self.manifest, self.models, fault, trigger)
+        built = build(self.manifest, self.models, fault, trigger)
         return Job(
             name="job",
             scenario=self.toy.scenario(scenario),

@@ -60,12 +60,12 @@ def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
     """The merged run says who approved what if every shard does, not what is true of one shard alone."""
     said = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
-    gate.write(shards[0], said)
+    gate.write_approvals(shards[0], said)
     merge(shards, tmp_path / "half")
-    assert gate.told(tmp_path / "half") == ""
-    gate.write(shards[1], said)
+    assert gate.approval_summary(tmp_path / "half") == ""
+    gate.write_approvals(shards[1], said)
     merge(shards, tmp_path / "out")
-    assert gate.told(tmp_path / "out") == "all of 1 group approved, by Jane Doe (1)"
+    assert gate.approval_summary(tmp_path / "out") == "all of 1 group approved, by Jane Doe (1)"
 
 
 def test_shards_are_disjoint_and_all(runs: Runs) -> None:

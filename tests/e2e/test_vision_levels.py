@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from selfdrive.sim.detection_memory import FILE
 
 from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
@@ -44,12 +45,13 @@ def test_the_cache_of_pictures_changes_nothing(
     workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A campaign that finds no pictures in the cache, and one that finds them, come to the same bytes."""
-    monkeypatch.setenv("HOME", str(tmp_path))
+    cache = tmp_path / "cache"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     runs = [tmp_path / "cold", tmp_path / "warm"]
     for out in runs:
-        assert not (out.name == "cold" and (tmp_path / ".cache").exists())
+        assert not (out.name == "cold" and cache.exists())
         assert run_campaign(workspace, "vision_levels_paper", out, workers=2, choices=FEW).exit_code == 0
-    assert (tmp_path / ".cache" / "selfdrive").is_dir()
+    assert (cache / "mutator" / "targets" / "openpilot" / FILE).exists()
     cold, warm = runs
     assert len(read_records(cold)) == 2
     assert read_records(cold) == read_records(warm)

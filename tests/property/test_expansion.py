@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.faults.expansion import draw_values, expand
-from mutator.faults.specs import AS_CODED, AS_DESCRIBED, READINGS, Draw
+from mutator.faults.specs import Draw
 from mutator.model import Fault
 from mutator.workspace import Workspace
 
@@ -71,13 +71,13 @@ def test_more_ranges_leave_earlier_values_alone(
 @given(SEEDS)
 def test_readings_are_matched(seed: int) -> None:
     """Whatever the seed, both readings have the same specs and values in the same order, and unique ids."""
-    described, coded = library(seed, AS_DESCRIBED), library(seed, AS_CODED)
+    described, coded = library(seed, "as_described"), library(seed, "as_coded")
     assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
     assert len({f.id for f in (*described, *coded)}) == 2 * sum(spec.count for spec in SPECS)
 
 
 @settings(max_examples=10, deadline=None)
-@given(SEEDS, st.permutations(SPECS), st.sampled_from(READINGS))
+@given(SEEDS, st.permutations(SPECS), st.sampled_from(CLONE.readings().names))
 def test_order_does_not_matter(seed: int, specs: list, reading: str) -> None:
     """A fault is the same in whatever order, and in whatever company, its spec is expanded."""
     found = {f.id for s in specs for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)}

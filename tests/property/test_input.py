@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mutator.config import yaml_files as yamlio
 from mutator.errors import MutatorError
+from mutator.faults.readings import UNDECLARED
 from mutator.faults.specs import load_spec
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.rendering import literal, signed
@@ -71,7 +72,7 @@ def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
     path = tmp_path / "x.yaml"
     path.write_text("\n".join(lines), encoding="utf-8", errors="surrogatepass")
     try:
-        spec = load_spec(path)
+        spec = load_spec(path, UNDECLARED)
     except MutatorError as error:
         assert str(error).startswith(str(path)) and error.got
     else:

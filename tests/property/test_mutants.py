@@ -1,4 +1,4 @@
-"""Mutants from molds are those of the direct way, byte for byte, for the faults of the paper and others."""
+"""Mutants from reused changes equal spliced ones, byte for byte, for the faults of the paper and others."""
 
 import math
 from dataclasses import replace
@@ -13,14 +13,15 @@ from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
-from mutator.faults.specs import READINGS
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
+from mutator.mutants.anchors import parsed
 from mutator.mutants.building import Mutant, build, build_directly
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import VARIABLES
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
+READINGS = Workspace.find(root=ROOT).readings().names
 NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 35.0, 1e22, 5e-324, math.nan, math.inf])
 CONDITIONS = st.one_of(
     st.floats(-1e3, 1e9).map(lambda t: f"t >= {t!r}"),
@@ -43,7 +44,10 @@ def faults() -> list[Fault]:
     manifest, models = paper()
     specs = Workspace.find(root=ROOT).specs()
     return [
-        f for r in READINGS for spec in specs for f in expand(spec, 1, r, models=models, manifest=manifest)
+        fault
+        for reading in READINGS
+        for spec in specs
+        for fault in expand(spec, 1, reading, models=models, manifest=manifest)
     ]
 
 
@@ -81,7 +85,7 @@ def others(draw: st.DrawFn) -> Fault:
     if model.kind is SnippetKind.GUARD:
         kind = AnchorKind(location.anchor.kind.replace("after_", "before_"))
         location = replace(location, anchor=replace(location.anchor, kind=kind))
-    names = sorted(manifest.tree.parsed(location.path).resolve(location).names)
+    names = sorted(parsed(manifest.tree, location.path).resolve(location).names)
     params = tuple((p.name, draw(values(p, names))) for p in model.params)
     return replace(fault, injections=(Injection(location=location, model=model.name, params=params),))
 
@@ -108,16 +112,16 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 
 @settings(max_examples=50, deadline=None)
 @given(varied() | others(), triggers())
-def test_molds_give_what_the_direct_way_gives(fault: Fault, trigger: Trigger) -> None:
+def test_reused_changes_give_what_splicing_gives(fault: Fault, trigger: Trigger) -> None:
     """Files, patch, ids and digest are the same whatever numbers, models and triggers are; errors too."""
-    made(build, fault, trigger)  # leaves a mold, if it is the first of its shape
+    made(build, fault, trigger)  # leaves a reusable change, if it is the first of its kind
     assert made(build, fault, trigger) == made(build_directly, fault, trigger)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", READINGS)
 def test_the_whole_library(reading: str) -> None:
-    """Every mutant of the paper's campaign is the one that the direct way makes."""
+    """Every mutant of the paper's campaign is the one that splicing makes."""
     plan = make_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
     pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
     assert len(pairs) > 6000

@@ -9,10 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.faults.expansion import expand
-from mutator.faults.specs import READINGS
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.building import build
-from mutator.review.groups import label, parameters, shapes
+from mutator.review.groups import group_label, parameter_values, shapes
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])
@@ -25,7 +24,7 @@ def setting() -> tuple[object, object, list[Fault]]:
     """Target, models, and one fault of each variant in both readings."""
     manifest, models = WORKSPACE.manifest("openpilot"), WORKSPACE.fault_models()
     found = {}
-    for reading in READINGS:
+    for reading in WORKSPACE.readings().names:
         for spec in WORKSPACE.specs():
             for fault in expand(spec, 1, reading, models=models, manifest=manifest):
                 found[reading, fault.spec] = fault
@@ -58,11 +57,11 @@ def test_every_patch_is_given_back(families: list[list[tuple[Fault, Trigger]]]) 
     for family in families:
         for fault, trigger in family:
             patch = build(manifest, models, fault, trigger).patch  # type: ignore[arg-type]
-            made[str(len(made))] = (fault, label(fault, trigger), patch)
+            made[str(len(made))] = (fault, group_label(fault, trigger), patch)
     found = shapes((key, name, patch) for key, (_, name, patch) in made.items())
     assert len(found) == len({name for _, name, _ in made.values()})
     for shape in found:
-        named = shape.named(parameters(made[key][0]) for key in shape.members)
+        named = shape.with_named_holes(parameter_values(made[key][0]) for key in shape.members)
         assert len(set(named.holes)) == len(named.holes)
         for i, key in enumerate(named.members):
             assert named.patch(i) == made[key][2]

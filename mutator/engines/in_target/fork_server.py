@@ -37,7 +37,7 @@ def _beside(name: str) -> Any:
 
 
 child = _beside("run_once")
-transplant = _beside("swap")
+swap = _beside("swap")
 
 
 def main(connection: int, start_file: str) -> int:
@@ -247,22 +247,23 @@ class Process:
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
         probe, known = None, set(sys.modules) if job["watch"] else set()
         try:
-            probe = transplant.install(job["probe_name"], job["probe"])
-            transplant.exchange(job["functions"], probe)
+            probe = swap.install(job["probe_name"], job["probe"])
+            swap.swap_code(job["functions"], probe)
             probe.limit(job["steps"])
-            if job["observed"]:  # what it would know had it been there from the beginning
-                probe._run.observed, probe._run.t = job["observed"], job["t"]
-            seen = transplant.record(probe) if job["watch"] else None
+            holder, state = job["probe_state"]  # what it would know had it been there from the beginning
+            for name, value in state.items():
+                setattr(getattr(probe, holder), name, value)
+            seen = swap.keep_observations(probe, job["watch"]) if job["watch"] else None
             run = self.begin(job["args"]) if self.run is None else self.run
             if seen is not None:
-                report |= {"seen": seen, "before": transplant.watched(run, seen)}
+                report |= {"seen": seen, "before": swap.observations_before_steps(run, seen)}
             while not run.done:
                 run.step()
             run.write(Path(job["out"]))
             if seen is not None:
                 report["libraries"] = child.libraries(known, self.start["package"])
-        except transplant.Unfit as why:
-            report |= {"ended": "unfit", "error": str(why)}
+        except swap.SwapRefused as why:
+            report |= {"ended": "swap refused", "error": str(why)}
         except BaseException as err:
             report |= child.describe(err, self.start["tree"], probe)
         if probe is not None:

@@ -1,7 +1,7 @@
 """Puts a mutant's code into the modules that are loaded in this process. Standard library only.
 
 Only the process that runs the target imports this module. `mutator.engines.code_swap` decides what may be
-exchanged; this module makes sure that what is loaded is what was looked at there.
+swapped; this module makes sure that the loaded program is the one for which that was decided.
 """
 
 import sys
@@ -13,12 +13,12 @@ _INSIDE = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")  # of meth
 _OWN_REFERENCES = 3  # to a code object: its function's, a local's, an argument's
 
 
-class Unfit(Exception):
-    """The loaded program is not the one that the exchange was made for."""
+class SwapRefused(Exception):
+    """The loaded program is not the one that the swap was made for."""
 
 
 def install(name: str, code: types.CodeType) -> Any:
-    """The probe `name` (`package._fi`), loaded as an import would have."""
+    """The probe module `name` (dotted), loaded as an import would load it."""
     package, _, own = name.rpartition(".")
     module = types.ModuleType(name)
     module.__file__, module.__package__ = code.co_filename, package
@@ -28,37 +28,38 @@ def install(name: str, code: types.CodeType) -> Any:
     return module
 
 
-def exchange(functions: Sequence[Sequence[Any]], probe: Any) -> None:
-    """Give each function (module, path, code it has, code it shall have) its new code."""
-    found = [(function(module, path, old), new) for module, path, old, new in functions]
-    for changed, new in found:
-        changed.__code__ = new
-        changed.__globals__["_fi"] = probe
+def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
+    """Give each function (module, path, old code, new code) its new code; all of them or none."""
+    name = probe.__name__.rpartition(".")[2]
+    found = [(live_function(module, path, old), new) for module, path, old, new in functions]
+    for function, new in found:
+        function.__code__ = new
+        function.__globals__[name] = probe
 
 
-def function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
-    """The one live function at `path` in a module that has this code and is not at work."""
+def live_function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
+    """The function at `path` that alone has this code; SwapRefused if there is none, or if it is at work."""
     where = ".".join((module, *path))
     if module not in sys.modules:
-        raise Unfit(f"{module} is not loaded")
+        raise SwapRefused(f"{module} is not loaded")
     holder: Any = sys.modules[module]
     for name in path[:-1]:
         holder = vars(holder).get(_mangled(holder, name))
         if not isinstance(holder, type):
-            raise Unfit(f"{where} is not found")
+            raise SwapRefused(f"{where} is not found")
     named = vars(holder).get(_mangled(holder, path[-1]))
     found = {id(f): f for f in _functions(named) if f.__code__ == code}
     if len(found) != 1:
-        raise Unfit(f"{where} is not found")
+        raise SwapRefused(f"{where} is not found")
     (live,) = found.values()
     own = live.__code__
     if sys.getrefcount(own) > _OWN_REFERENCES:
-        raise Unfit(f"{where} is at work, or there are several of it")
+        raise SwapRefused(f"{where} is at work, or there are several of it")
     return live
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """The functions that a name stands for: itself, what a method or property is made of, what is wrapped."""
+    """The functions behind a name: itself, those that make up a method or property, what is wrapped."""
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
@@ -67,26 +68,26 @@ def _functions(named: Any) -> Iterator[types.FunctionType]:
 
 
 def _mangled(holder: Any, name: str) -> str:
-    """The name as a class has it in its dict."""
+    """The name as it is in the dict of a class."""
     private = isinstance(holder, type) and name.startswith("__") and not name.endswith("__")
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 
 
-def record(probe: Any) -> list[tuple[float, float, float, float]]:
-    """Have the probe keep what it observes; the list that it fills."""
+def keep_observations(probe: Any, names: Sequence[str]) -> list[tuple[float, ...]]:
+    """Have the probe keep what it observes; the list that it fills with the values of these `names`."""
     observe = probe.observe
-    seen: list[tuple[float, float, float, float]] = []
+    seen: list[tuple[float, ...]] = []
 
-    def observe_and_keep(t: Any, d_rel: Any, v_ego: Any, v_lead: Any) -> None:
-        seen.append((float(t), float(d_rel), float(v_ego), float(v_lead)))
-        observe(t, d_rel, v_ego, v_lead)
+    def observe_and_keep(**values: Any) -> None:
+        seen.append(tuple(float(values[name]) for name in names))
+        observe(**values)
 
     probe.observe = observe_and_keep
     return seen
 
 
-def watched(run: Any, seen: list[Any]) -> list[int]:
-    """Drive the run to its end; how much its probe had observed (`seen`) before each step."""
+def observations_before_steps(run: Any, seen: list[Any]) -> list[int]:
+    """Drive the run to its end; the number of observations (`seen`) before each step."""
     before = []
     while not run.done:
         before.append(len(seen))

@@ -29,9 +29,9 @@ def use(cache: Path | None) -> None:
     _folder = None
     if cache is not None:
         try:
-            folder = cache.expanduser() / FOLDER
+            folder = cache / FOLDER
             _folder = folder if any(folder.glob(f"*{SUFFIX}")) else None
-        except (RuntimeError, OSError):  # a home that nobody knows, a folder that nobody may look into
+        except OSError:  # a folder that nobody may look into
             return
 
 

@@ -1,7 +1,8 @@
-"""Compiles the slowest steps of a run's arithmetic: `python -m selfdrive.sim.compile_helpers [--cache DIR]`.
+"""Compiles the slowest steps of a run's arithmetic: `python -m selfdrive.sim.compile_helpers --cache DIR`.
 
-Later runs find them in the cache and give the same bytes in less time. Each is compared with the code that
-it stands for before it is kept. Exit code 2 where there is no C compiler, or one that calculates otherwise.
+Later runs with that cache find them there and give the same bytes in less time. Each is compared with the
+code that it stands for before it is kept. Exit code 2 where there is no C compiler, or one that calculates
+otherwise.
 """
 
 import argparse
@@ -23,9 +24,7 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.controls.lib.lateral_mpc import lateral_ocp
 from selfdrive.controls.lib.long_mpc import long_ocp
 from selfdrive.controls.lib.mpc_solver import condense, integrators_of, made_of
-from selfdrive.sim.image_library import cache_folder
 from selfdrive.sim.run import EXIT_INPUT
-from selfdrive.sim.vision import DEFAULT_CACHE
 from selfdrive.visiond import compiled_hog
 from selfdrive.visiond.compiled_hog import C_SOURCE, CompiledHog
 from selfdrive.visiond.hog import Hog
@@ -61,7 +60,7 @@ def make(
 
     Raises ConfigError where it may not, or cannot be made.
     """
-    folder = cache_folder(cache) / compiled.FOLDER
+    folder = cache / compiled.FOLDER
     with writing(folder, expected="a folder for compiled helpers", remedy="choose another --cache"):
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder) as scratch:
@@ -131,9 +130,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.compile_helpers", description="Compile the slowest steps of a run's arithmetic."
     )
-    parser.add_argument(
-        "--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="where runs look for them"
-    )
+    parser.add_argument("--cache", type=Path, required=True, metavar="DIR", help="where runs look for them")
     options = parser.parse_args()
     try:
         for path in compile_helpers(options.cache):

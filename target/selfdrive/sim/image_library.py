@@ -2,6 +2,7 @@
 
 Pictures are made or decoded once and kept in a cache folder, in a file whose name is the digest of all they
 follow from. Processes map that file and so share its memory. A file appears there whole or not at all.
+Without a cache, or with one that cannot be written, each process makes its own.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,7 +17,6 @@ import numpy as np
 
 from selfdrive.common import camera_model
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.common.errors import ConfigError
 from selfdrive.sim import image_folder, lead_picture, road_look, road_renderer, road_texture
 from selfdrive.sim.image_folder import ImageFolder
 from selfdrive.sim.picture import Picture
@@ -54,28 +54,14 @@ class ImageLibrary:
 
 
 def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
-    """The pictures a run asks for, from the cache where they are there. ConfigError where it cannot be."""
+    """The pictures a run asks for, from the cache where they are there. ConfigError for unusable frames."""
     cv2.setNumThreads(1)
-    cache = cache_folder(pictures.cache)
     if pictures.frames is not None:
-        return _own(ImageFolder(pictures.frames), cache)
-    return _rendered(CameraModel(), pictures.marks, seed, cache)
+        return _own(ImageFolder(pictures.frames), pictures.cache)
+    return _rendered(CameraModel(), pictures.marks, seed, pictures.cache)
 
 
-def cache_folder(cache: Path) -> Path:
-    """The folder to keep pictures in. Raises ConfigError where it is in a home that nobody knows."""
-    try:
-        return cache.expanduser()
-    except RuntimeError:
-        raise ConfigError(
-            "no home folder is known",
-            where=str(cache),
-            expected="a folder to keep pictures in",
-            remedy="choose another --cache, or set HOME",
-        ) from None
-
-
-def _rendered(model: CameraModel, marks: str, seed: int, cache: Path) -> ImageLibrary:
+def _rendered(model: CameraModel, marks: str, seed: int, cache: Path | None) -> ImageLibrary:
     made_by = (camera_model, lead_picture, road_look, road_renderer, road_texture)
     parts = [repr((marks, seed, astuple(model), FRAMES, PERIODS, cv2.__version__, np.__version__)).encode()]
     digest = _digest(parts + [Path(module.__file__).read_bytes() for module in made_by])
@@ -89,7 +75,7 @@ def _rendered(model: CameraModel, marks: str, seed: int, cache: Path) -> ImageLi
     return ImageLibrary(name=name, digest=digest, model=model, frames=frames, spacing=SPACING, fps=None)
 
 
-def _own(folder: ImageFolder, cache: Path) -> ImageLibrary:
+def _own(folder: ImageFolder, cache: Path | None) -> ImageLibrary:
     model = folder.model
     read_by = [Path(module.__file__).read_bytes() for module in (camera_model, image_folder)]
     digest = _digest([cv2.__version__.encode(), folder.digest.encode(), *read_by])
@@ -104,10 +90,22 @@ def _own(folder: ImageFolder, cache: Path) -> ImageLibrary:
     )
 
 
-def cached(cache: Path, digest: str, shape: tuple[int, int, int], make: Callable[[], Frames]) -> np.ndarray:
-    """The frames `make` gives, as an array of this shape mapped from a file that is made where it is missing
-    or damaged. Processes may do so at the same time.
+def cached(
+    cache: Path | None, digest: str, shape: tuple[int, int, int], make: Callable[[], Frames]
+) -> np.ndarray:
+    """The frames `make` gives, as a read-only array of this shape.
+
+    It is mapped from a file of the cache that is made where it is missing or damaged, by any number of
+    processes at the same time. Without a cache that can be written the frames are made in memory.
     """
+    frames = _kept(cache, digest, shape, make) if cache is not None else None
+    return _in_memory(shape, make()) if frames is None else frames
+
+
+def _kept(
+    cache: Path, digest: str, shape: tuple[int, int, int], make: Callable[[], Frames]
+) -> np.ndarray | None:
+    """The frames in their file of the cache, made if need be; None where that cannot be."""
     path = cache / f"frames-{digest[:32]}.npy"
     try:
         frames = _mapped(path, shape)
@@ -115,20 +113,16 @@ def cached(cache: Path, digest: str, shape: tuple[int, int, int], make: Callable
             cache.mkdir(parents=True, exist_ok=True)
             _write(path, shape, make())
             frames = _mapped(path, shape)
-    except OSError as error:
-        raise ConfigError(
-            error.strerror or str(error),
-            where=str(cache),
-            expected=f"a folder that {_size(shape) / 1e6:.0f} MB of pictures can be kept in",
-            remedy="choose another --cache",
-        ) from None
-    if frames is None:
-        raise ConfigError(
-            "pictures that change as they are written",
-            where=str(path),
-            expected="a sound file system",
-            remedy="choose another --cache",
-        )
+    except OSError:
+        return None
+    return frames
+
+
+def _in_memory(shape: tuple[int, int, int], made: Frames) -> np.ndarray:
+    frames = np.empty(shape, np.uint8)
+    for number, frame in enumerate(made):
+        frames[number] = frame
+    frames.flags.writeable = False
     return frames
 
 

@@ -1,7 +1,6 @@
 """A lane detector that looks up what it would see before it looks."""
 
 import platform
-import re
 import sys
 from collections.abc import Iterator
 from hashlib import blake2b, sha256
@@ -37,9 +36,6 @@ SEEING = (
     "visiond/hog.c",
     "visiond/lane_net.npz",
 )
-# A line that carries this mark acts at some times and not at others, and whether it acted is counted: what
-# was seen cannot stand for what would be seen.
-_AT_TIMES = re.compile(rb"# fi:\w")
 _NUMBERS = 9  # of three lines
 
 
@@ -52,7 +48,8 @@ class StatedDetector(LaneDetector, Protocol):
 class RememberingDetector:
     """Sees what `detector` sees, also without the pixels where `memory` has what it saw.
 
-    `made_of` tells the detector from others that the same files describe: its name, its camera.
+    The code that sees must see the same in the same picture at any time of a run. `made_of` tells the
+    detector from others that the same files describe: its name, its camera.
     """
 
     def __init__(self, detector: StatedDetector, made_of: object, memory: DetectionMemory) -> None:
@@ -84,11 +81,6 @@ def seeing_digest(root: Path) -> bytes:
         digest.update(repr(name).encode())
         digest.update(sha256(data).digest())
     return digest.digest()
-
-
-def sees_alike(root: Path) -> bool:
-    """Whether the code that sees, as it lies in the package at `root`, always sees the same in a picture."""
-    return not any(_AT_TIMES.search(data) for _, data in _seeing(root))
 
 
 def _seeing(root: Path) -> Iterator[tuple[str, bytes]]:

@@ -18,7 +18,7 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
 from selfdrive.sim.trace_file import pieces
-from selfdrive.sim.vision import DEFAULT_CACHE, DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
+from selfdrive.sim.vision import DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
 
 EXIT_INPUT = 2
 
@@ -121,7 +121,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
     )
     parser.add_argument(
-        "--cache", type=Path, default=DEFAULT_CACHE, metavar="DIR", help="pictures, compiled code"
+        "--cache", type=Path, metavar="DIR", help="keep pictures and detections here, find compiled code here"
     )
     parser.add_argument(
         "--forget", action="store_true", help="take no detection and no compiled code from the cache"

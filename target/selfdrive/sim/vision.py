@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-import selfdrive
 from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
@@ -20,7 +19,6 @@ from selfdrive.visiond.detector import IdealDetector, LaneDetector
 DETECTORS = PAPER, ROBUST = "paper", "robust"
 MARKS = SOLID, DASHED = "solid", "dashed"
 TRANSLATIONS = GROUND, SHIFT = "ground", "shift"
-DEFAULT_CACHE = Path("~/.cache/selfdrive")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,17 +26,18 @@ class Pictures:
     """The pictures of a run and who looks at them.
 
     `frames` is a folder of a user's own frames; None: a rendered road with these `marks` (left and right
-    both solid, or the right one dashed), kept in `cache`. `translation` is how a frame is moved to the
-    car's offset and heading: by the ground's homography, or shifted as a whole, as in the paper. With
-    `forget`, and always by code that acts at some times only, a picture is looked at also where `cache` tells
-    what was seen in it; what is seen is the same.
+    both solid, or the right one dashed). `translation` is how a frame is moved to the car's offset and
+    heading: by the ground's homography, or shifted as a whole, as in the paper. Frames, and what was seen in
+    pictures, are kept in the folder `cache`; None: nothing is kept. With `forget` every picture is looked at,
+    also where `cache` tells what was seen in it. What is seen is the same, unless the code that sees acts
+    differently at different times: such code must run with `forget` or without a cache.
     """
 
     detector: str = PAPER
     marks: str = SOLID
     frames: Path | None = None
     translation: str = GROUND
-    cache: Path = DEFAULT_CACHE
+    cache: Path | None = None
     forget: bool = False
 
 
@@ -97,16 +96,16 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
 
 def _detector(pictures: Pictures, library) -> LaneDetector:
     from selfdrive.sim.detection_memory import DetectionMemory
-    from selfdrive.sim.image_library import cache_folder
-    from selfdrive.sim.remembering_detector import RememberingDetector, sees_alike
+    from selfdrive.sim.remembering_detector import RememberingDetector
 
     if pictures.detector == PAPER:
         from selfdrive.visiond.paper_detector import PaperDetector as Detector
     else:
         from selfdrive.visiond.robust_detector import RobustDetector as Detector
-    if pictures.forget or not sees_alike(Path(selfdrive.__path__[0])):
-        compiled.use(None)  # what acts at times acts in the Python code
+    if pictures.forget:
+        compiled.use(None)
+    if pictures.forget or pictures.cache is None:
         return Detector(library.model)
-    detector, memory = Detector(library.model), DetectionMemory(cache_folder(pictures.cache))
+    detector, memory = Detector(library.model), DetectionMemory(pictures.cache)
     made_of = (pictures.detector, library.model, detector.calculated_by)
     return RememberingDetector(detector, made_of, memory)

@@ -9,7 +9,7 @@ from mutator.engines.fork_pool import Pool
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import prepare_base
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
@@ -35,7 +35,7 @@ class Fork:
             base = prepare_base(self.manifest, self.folder / "base")
             work = self.folder / "work"
             work.mkdir()
-            null = mutant.build(self.manifest, self.models, None, always()).files
+            null = build(self.manifest, self.models, None, always()).files
             self._engine = ForkEngine(self.manifest, base, work, self.limits, null=null)
             golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
@@ -50,7 +50,7 @@ class Fork:
         )
         injection = Injection(location=place, model="offset", params=(("by", 20.0), ("target", anchor)))
         fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
-        built = mutant.build(self.manifest, self.models, fault, trigger)
+        built = build(self.manifest, self.models, fault, trigger)
         scenario = self.toy.scenario("A")
         return Job(
             name="j", scenario=scenario, seed=7, files=built.files, mutant=built.id, golden=self.golden

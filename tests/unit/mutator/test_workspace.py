@@ -7,6 +7,8 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
+CLONE = Path(__file__).parents[3]
+
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -47,12 +49,24 @@ def test_options_go_before_the_environment(
     assert Workspace.find(target=root / "target").target == root / "target"
 
 
-def test_nothing_found(elsewhere: Path) -> None:
-    """Outside a clone the message says which options and variables help."""
-    with pytest.raises(
-        MutatorError, match=r"no folder fault_library/ here or in any folder above.*MUTATOR_ROOT"
-    ):
-        Workspace.find()
+def test_outside_a_clone_there_is_what_ships(elsewhere: Path) -> None:
+    """With nothing named and no library upward, library and templates are the shipped ones."""
+    found = Workspace.find()
+    assert (found.library, found.templates) == (CLONE / "fault_library", CLONE / "templates")
+    assert found.manifest("openpilot").root == CLONE / "target"
+
+
+def test_a_library_without_templates_uses_those_that_ship(elsewhere: Path) -> None:
+    """A folder upward counts for what it holds; a root that is named must hold both."""
+    (elsewhere / "fault_library").mkdir()
+    found = Workspace.find()
+    assert (found.library, found.templates) == (elsewhere / "fault_library", CLONE / "templates")
+    with pytest.raises(MutatorError, match=r"no folder .*elsewhere/templates; expected the templates folder"):
+        Workspace.find(root=elsewhere)
+
+
+def test_a_named_folder_must_be_there(elsewhere: Path) -> None:
+    """What ships never stands in for a folder that was named: the message says what to correct."""
     with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*--library"):
         Workspace.find(library=elsewhere / "none", templates=elsewhere)
 

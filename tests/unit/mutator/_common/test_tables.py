@@ -13,7 +13,7 @@ def test_a_table_without_rows_is_its_heads() -> None:
     """An empty table still says what it would list."""
     table = Table(heads=("a", "b"), rows=[])
     assert table.as_text() == "a  b"
-    assert table.as_markdown() == "| a | b |\n| --- | --- |"
+    assert table.as_markdown() == "| a | b |\n|---|---|"
     assert "<tbody>\n</tbody>" in table.as_html()
 
 

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.campaign_files import load_campaign
+from mutator.campaigns.campaign_files import check_readings, load_campaign
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Method
+from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 TEXT = """\
@@ -38,7 +40,7 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
     assert campaign.methods == (Method.GUIDED, Method.RANDOM)
     assert [selection.values for selection in campaign.faults] == [None, 2]
     assert campaign.armed_after_s == {"as_described": 1.5, "as_coded": 0.0}
-    assert (campaign.sample, campaign.rows, campaign.reading) == (None, None, "as_described")
+    assert (campaign.sample, campaign.rows, campaign.reading) == (None, None, None)
     assert campaign.limits.wall_s > campaign.limits.cpu_s
     assert campaign.source == TEXT.encode()
 
@@ -83,3 +85,58 @@ def test_the_campaigns_that_ship_are_read(clone: Workspace) -> None:
     assert "quickstart" in names
     for name in names:
         assert load_campaign(clone.campaign(name)).name == name
+
+
+KNOWN = "reading 'as_built'; expected one of as_described, as_coded"
+
+
+def in_library(toycar: Workspace, old: str, new: str) -> Path:
+    """A campaign of the toy car's library with one change."""
+    path = toycar.library / "campaigns" / "mine.yaml"
+    text = TEXT.replace(old, new)
+    assert new in text
+    path.write_text(text)
+    return path
+
+
+def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
+    """A number says what a mapping with that number for each reading says."""
+    path = in_library(toycar, "{as_described: 1.5, as_coded: 0.0}", "1.25")
+    campaign = load_campaign(path)
+    check_readings(campaign, toycar.readings())
+    assert [campaign.armed_after(name) for name in toycar.readings().names] == [1.25, 1.25]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "told"),
+    [
+        (
+            "methods:",
+            "reading: as_built\nmethods:",
+            9,
+            "reading 'as_built'; expected one of as_described, as_coded",
+        ),
+        ("as_coded: 0.0", "as_built: 0.0", 12, "reading 'as_built'; expected one of as_described, as_coded"),
+        (", as_coded: 0.0", "", 12, "no time for reading 'as_coded'"),
+    ],
+)
+def test_readings_are_those_of_the_library(
+    toycar: Workspace, old: str, new: str, line: int, told: str
+) -> None:
+    """A reading that is not declared, or left out, is answered with the line and the ones that there are."""
+    path = in_library(toycar, old, new)
+    with pytest.raises(MutatorError) as error:
+        make_plan(toycar, path)
+    assert f"{path}:{line}: {told}" in str(error.value)
+    assert any(told in str(problem) for problem in check_library(toycar, "toycar"))
+
+
+def test_a_study_that_is_not_installed_is_refused(tmp_path: Path) -> None:
+    """With its line and the studies that there are; without one, a campaign has none."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(TEXT)
+    assert load_campaign(path).study is None
+    path.write_text(TEXT.replace("target: toycar", "target: toycar\nstudy: moon_landing"))
+    said = "mine.yaml:5: study 'moon_landing' is not installed; expected one of driving_agent_resilience"
+    with pytest.raises(MutatorError, match=said):
+        load_campaign(path)

@@ -296,3 +296,28 @@ def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp
     ]
     assert values[0] == values[1]
     shutil.rmtree(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("campaign", "reading", "promised"),
+    [
+        ("quickstart", "as_described", "c3e2fa1f50b8700d8fc1156e3272f0f38b86eb0efc9f0f1e5d2ffa7d54fd9cb1"),
+        ("quickstart", "as_coded", "73ce60ef41b9c752913d1544a96d39f3885319be2a38b3b8314dd035d373e18f"),
+        ("paper_smoke", "as_described", "57c3e4b4ed636eac636c9bf6a61aa3141f93c4fbccdd803a5fc3ee6b1a7730ff"),
+        ("paper_smoke", "as_coded", "04e5658f198741a4341b22e79abe3e3093ee5e519487eae02cbb57909da8c030"),
+    ],
+)
+def test_published_plans_keep_their_digests(
+    clone: Workspace, campaign: str, reading: str, promised: str
+) -> None:
+    """Whoever cites a plan's digest, and with it all its experiments' ids, finds it in every version."""
+    assert make_plan(clone, campaign, reading=reading).digest == promised
+
+
+def test_the_run_schema_is_no_part_of_the_plan_digest(
+    toycar: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plan keeps its digest when the schema of the run folder rises."""
+    before = make_plan(toycar, "small").digest
+    monkeypatch.setattr("mutator.campaigns.plans.SCHEMA", "run/9")
+    assert make_plan(toycar, "small").digest == before

@@ -8,7 +8,8 @@ import pytest
 
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
-from mutator.mutants import building as mutant
+from mutator.mutants.building import build
+from mutator.mutants.probe import probe_path, state_after
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
@@ -20,7 +21,7 @@ def probe(toycar: Workspace):
 
     def make(trigger: Trigger) -> types.CodeType:
         return compile(
-            mutant.build(manifest, models, None, trigger).files[manifest.probe_path], "_fi", "exec"
+            build(manifest, models, None, trigger).files[probe_path(manifest.package)], "_fi", "exec"
         )
 
     return make
@@ -83,7 +84,7 @@ def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: f
 
 
 def test_several_observations_in_a_step(probe) -> None:
-    """Steps that observe never or often are told apart: the run is left before that of the observation."""
+    """A step may observe never or often; a mutant leaves the golden run before the step that observes."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
     starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
@@ -91,21 +92,23 @@ def test_several_observations_in_a_step(probe) -> None:
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
-def test_a_probe_that_is_told_is_as_one_that_saw(probe, trigger: Trigger) -> None:
-    """A probe that is told how much was observed is in the state of one that observed it all."""
+def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigger) -> None:
+    """A probe that is given the state after some observations equals one that made them all."""
     start = first_active(probe(trigger), SEEN)
     saw: dict = {}
-    told: dict = {}
-    for module in (saw, told):
+    given: dict = {}
+    for module in (saw, given):
         exec(probe(trigger), module)
     for values in SEEN.values[: start.observed]:
         saw["observe"](*values)
-    told["_run"].observed, told["_run"].t = start.observed, start.t
-    state = [
-        {name: getattr(module["_run"], name) for name in module["_Run"].__slots__} for module in (saw, told)
+    holder, state = state_after(start.observed, start.t)
+    for name, value in state.items():
+        setattr(given[holder], name, value)
+    states = [
+        {name: getattr(module["_run"], name) for name in module["_Run"].__slots__} for module in (saw, given)
     ]
-    assert state[0] == state[1]
-    assert not math.isinf(state[0]["t"])
+    assert states[0] == states[1]
+    assert not math.isinf(states[0]["t"])
 
 
 def test_probes_of_one_trigger_are_asked_once(probe) -> None:

@@ -1,4 +1,4 @@
-"""What a mutant changes in a loaded program, and what keeps it from being put there."""
+"""What a mutant changes in a loaded program, and what keeps it from being swapped in."""
 
 import re
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.engines.code_swap import Exchange, NotExchangeable, exchange
+from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
 from mutator.targets.source_tree import SourceTree
 
 PROBE = b"def observe(): pass\n"
@@ -36,14 +36,14 @@ def reads():
 
 limit = 3.0
 """
-Changes = Callable[..., Exchange]
+Changes = Callable[..., CodeSwap]
 
 
 @pytest.fixture
 def changes() -> Changes:
-    """The exchange for PRISTINE with lines put before those that hold a text."""
+    """The code swap for PRISTINE with lines inserted before those that contain a text."""
 
-    def make(*inserted: tuple[str, str], reads_itself: tuple[str, ...] = ()) -> Exchange:
+    def make(*inserted: tuple[str, str], reads_itself: tuple[str, ...] = ()) -> CodeSwap:
         text = "from car import _fi  # fi:probe\n" + PRISTINE
         for before, lines in inserted:
             (line,) = re.findall(rf"^.*{re.escape(before)}.*\n", text, re.MULTILINE)
@@ -51,8 +51,8 @@ def changes() -> Changes:
             new = "".join(f"{indent}{one}  # fi:abc\n" for one in lines.split("\n"))
             text = text.replace(line, new + line)
         tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
-        manifest = SimpleNamespace(probe_path="car/_fi.py", reads_itself=reads_itself, tree=tree)
-        return exchange(manifest, {"car/car.py": text.encode(), "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+        manifest = SimpleNamespace(package="car", reads_itself=reads_itself, tree=tree)
+        return plan_swap(manifest, {"car/car.py": text.encode(), "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
 
     return make
 
@@ -75,7 +75,7 @@ def test_functions_that_changed_are_found(changes: Changes) -> None:
     assert found.imports == ()
 
 
-def test_imports_of_injected_lines_are_told(changes: Changes) -> None:
+def test_imports_of_injected_lines(changes: Changes) -> None:
     """Modules that injected lines import can be loaded beforehand."""
     lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
     assert changes(("return [value", lines)).imports == ("car.rain",)
@@ -94,32 +94,32 @@ def test_imports_of_injected_lines_are_told(changes: Changes) -> None:
         ("limit = 3.0", 'if _fi.active("abc"):\n    limit = 0.0', None),
     ],
 )
-def test_what_cannot_be_exchanged(changes: Changes, before: str, lines: str, why: str | None) -> None:
+def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
     """A statement that acts without its trigger, a generator, an inner function, a hidden name: each is
-    told; nothing is exchanged for what stands outside functions."""
+    refused with its reason. Code outside functions needs no swap."""
     if why is None:
         assert changes((before, lines)).functions == ()
         return
-    with pytest.raises(NotExchangeable, match=re.escape(why)):
+    with pytest.raises(NotSwappable, match=re.escape(why)):
         changes((before, lines))
 
 
 def test_files_that_are_read_by_the_run(changes: Changes) -> None:
     """A mutant of a file that the run digests must be on the disk."""
-    with pytest.raises(NotExchangeable, match="read by the run itself"):
+    with pytest.raises(NotSwappable, match="read by the run itself"):
         changes(reads_itself=("car/*.py",))
 
 
 def test_more_than_inserted_lines(changes: Changes) -> None:
-    """A file that is another one altogether is not exchanged."""
+    """A file that differs by more than inserted lines is not swapped."""
     manifest = SimpleNamespace(
-        probe_path="car/_fi.py",
+        package="car",
         reads_itself=(),
         tree=SimpleNamespace(files={"car/car.py": b"x = 1\n"}),
     )
-    with pytest.raises(NotExchangeable, match="more than inserted lines"):
-        exchange(manifest, {"car/car.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
-    with pytest.raises(NotExchangeable, match="new file"):
-        exchange(manifest, {"car/new.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
-    with pytest.raises(NotExchangeable, match="no probe"):
-        exchange(manifest, {"car/car.py": b"x = 1\n"}, "/tree")  # type: ignore[arg-type]
+    with pytest.raises(NotSwappable, match="more than inserted lines"):
+        plan_swap(manifest, {"car/car.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+    with pytest.raises(NotSwappable, match="new file"):
+        plan_swap(manifest, {"car/new.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+    with pytest.raises(NotSwappable, match="no probe"):
+        plan_swap(manifest, {"car/car.py": b"x = 1\n"}, "/tree")  # type: ignore[arg-type]

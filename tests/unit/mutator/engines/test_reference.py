@@ -1,5 +1,6 @@
 """The reference engine: isolation, limits, and how each way to end is named."""
 
+import json
 import os
 import shutil
 import signal
@@ -49,6 +50,21 @@ def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
 def entry(body: str) -> dict[str, str]:
     """The target with another entry module."""
     return {"toycar/go.py": body}
+
+
+def test_a_mutant_of_what_runs_read_shares_nothing(
+    toycar: Workspace, manifest: TargetManifest, tmp_path: Path
+) -> None:
+    """A mutant of a file in `reads_itself` is given the arguments of an independent run; no other is."""
+    said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
+    changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
+    engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
+    for read in ("toycar/sensing.py", "toycar/driver.py"):
+        files = {"toycar/go.py": said.encode(), read: b""}
+        job = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=files)
+        execution = engine.execute(job, tmp_path / Path(read).stem)
+        words = json.loads((execution.out / "words.json").read_text())
+        assert ("--forget" in words) is (read == "toycar/sensing.py")
 
 
 def test_a_good_run_leaves_its_files(run: Run) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines.jobs import Execution, Job
-from mutator.execution.runner import Goldens, Runner, activation_of
+from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.workspace import Workspace
 
@@ -160,9 +160,3 @@ def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Pa
     del manifest.tree.files["toycar/sensing.py"]  # type: ignore[attr-defined]
     statuses = [f.record.status for f in runner.run(experiments[:1])]
     assert statuses == [Status.HARNESS_ERROR]
-
-
-@pytest.mark.parametrize("report", [{}, {"injections": {}}, {"injections": NEVER}, {"injections": None}])
-def test_no_activation(report: dict) -> None:
-    """Reports without an executed injection have no activation."""
-    assert activation_of(report) is None

@@ -70,3 +70,12 @@ def test_names_are_defined_in_many_ways(toy: Workspace, line: str) -> None:
     """A package that only passes a name on defines it too."""
     (Path(toy.manifest("toy").root) / "toycar" / "sky.py").write_text(f"{line}\n")
     check_import(toy.manifest("toy"), "toycar.sky.Rain")
+
+
+def test_a_module_that_does_not_parse(toy: Workspace) -> None:
+    """A module of the target that is not Python is an error at its line, not a traceback."""
+    path = Path(toy.manifest("toy").root) / "toycar" / "sky.py"
+    path.write_text("class Rain:\n    x = = 1\n")
+    with pytest.raises(MutatorError, match="not valid Python: invalid syntax") as caught:
+        check_import(toy.manifest("toy"), "toycar.sky.Rain")
+    assert (caught.value.where, caught.value.line) == (str(path), 2)

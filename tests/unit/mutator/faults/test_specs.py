@@ -6,14 +6,14 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.faults.expansion import draw_values, expand
-from mutator.faults.specs import AS_CODED, AS_DESCRIBED, Draw, load_spec
+from mutator.faults.specs import Draw, load_spec
 from mutator.model import Fault, Hold
 from mutator.workspace import Workspace
 
 NAME = "sensor/distance"
 
 
-def faults(workspace: Workspace, seed: int = 3, reading: str = AS_DESCRIBED) -> tuple[Fault, ...]:
+def faults(workspace: Workspace, seed: int = 3, reading: str | None = None) -> tuple[Fault, ...]:
     return expand(
         workspace.spec(NAME),
         seed,
@@ -57,9 +57,9 @@ def test_expansion_converts_units(toy: Workspace) -> None:
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
     """As coded the same number is taken for one of another unit; without an own part nothing differs."""
-    described, coded = faults(toy), faults(toy, reading=AS_CODED)
+    described, coded = faults(toy), faults(toy, reading="as_coded")
     assert [f.value for f in described] == [f.value for f in coded]
-    assert all(f.reading == AS_CODED for f in coded)
+    assert all(f.reading == "as_coded" for f in coded)
     for fault in of(coded, "both"):
         assert dict(fault.injections[1].params)["by"] == -float(fault.value)
     assert of(coded, "longer")[0].injections == of(described, "longer")[0].injections
@@ -203,6 +203,12 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "14: 2 anchors (after_assign, before_call); expected exactly one of after_assign",
         ),
         ("last: [30, 39]", "last: [31, 40]", "for 'integers_from'; expected a last range"),
+        (
+            "as_coded:",
+            "as_built:",
+            "43: unknown key 'as_built'; expected one of aim, about, changes, hold, draw, "
+            "as_described, as_coded",
+        ),
         ("integers_from", "integers_form", "11: unknown key 'integers_form'; expected one of integers_"),
         ("first: [10, 19], step: 10", "first: [10.5, 19.5], step: 0.5", "a range with fractions"),
         ("error_m:\n", "error_m:\n        decimals: 1\n", "11: 1 decimals; expected them with reals"),
@@ -231,10 +237,10 @@ def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Works
     """A file anywhere is a spec like any other."""
     path = tmp_path / "mine.yaml"
     path.write_text((toy.library / "faults" / "sensor" / "distance.yaml").read_text())
-    assert load_spec(path).count == toy.spec(path).count == 6
+    assert load_spec(path, toy.readings()).count == toy.spec(path).count == 6
 
 
 def test_an_unknown_reading(toy: Workspace) -> None:
-    """There are two readings."""
+    """The error lists the readings that the library declares."""
     with pytest.raises(MutatorError, match="reading 'as_built'; expected one of as_described, as_coded"):
         faults(toy, reading="as_built")

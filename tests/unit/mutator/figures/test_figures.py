@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from mutator.figures import hazards, heat_map, propagation
-from mutator.figures.figures import drawings, write
+from mutator.figures.figures import drawings, write_drawings
 
 from ..statistics.results_frame import results
 
@@ -72,7 +72,7 @@ def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> No
     """SVG and PNG of a figure, the same bytes when drawn again; names are text in the SVG."""
     contents = []
     for _ in range(2):
-        write(drawings(frame)[:1], tmp_path)
+        write_drawings(drawings(frame)[:1], tmp_path)
         contents.append({file.name: file.read_bytes() for file in (tmp_path / "figures").iterdir()})
     assert contents[0] == contents[1]
     assert len(contents[0]) == 2
@@ -91,5 +91,5 @@ def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> Non
 def test_runs_without_any_hazard_or_time_are_drawn(frame: pd.DataFrame, tmp_path: Path) -> None:
     """A campaign in which nothing happened has its figures, too."""
     nothing = results({}, BLUR | {"scenario": "S2"})
-    write(drawings(nothing), tmp_path)
+    write_drawings(drawings(nothing), tmp_path)
     assert len(list((tmp_path / "figures").iterdir())) == 6

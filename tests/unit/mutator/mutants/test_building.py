@@ -12,8 +12,10 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
-from mutator.mutants import building as mutant
-from mutator.mutants.building import InvalidMutant
+from mutator.mutants import building
+from mutator.mutants.building import InvalidMutant, Mutant, write_tree
+from mutator.mutants.probe import probe_path
+from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
@@ -30,8 +32,8 @@ def toy_faults(toy: Workspace, reading: str = "as_described") -> dict[str, Fault
     return {fault.spec.rpartition("/")[2]: fault for fault in reversed(found)}
 
 
-def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> mutant.Mutant:
-    return mutant.build(toy.manifest("toy"), toy.fault_models(), fault, trigger)
+def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> Mutant:
+    return building.build(toy.manifest("toy"), toy.fault_models(), fault, trigger)
 
 
 def one(**location: object) -> Fault:
@@ -76,7 +78,7 @@ def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
         compile(data, path, "exec")
         if path != "toycar/_fi.py":
             assert data != manifest.tree.files[path]
-            assert mutant.unsplice(data) == manifest.tree.files[path]
+            assert unsplice(data) == manifest.tree.files[path]
 
 
 def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
@@ -84,8 +86,8 @@ def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
-    files = (*manifest.files, manifest.probe_path)
-    mutant.write_tree(manifest, made, tmp_path / "tree")
+    files = (*manifest.files, probe_path(manifest.package))
+    write_tree(manifest, made, tmp_path / "tree")
     assert read_tree(tmp_path / "tree", files).digest == made.tree_digest != before
     if shutil.which("patch"):
         shutil.copytree(manifest.root, tmp_path / "copy")
@@ -118,9 +120,9 @@ def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
     assert b'HOLD = "to_end"' in build(toy, toy_faults(toy)["silent"]).files["toycar/_fi.py"]
 
 
-def run(toy: Workspace, made: mutant.Mutant, place: Path, steps: int = 100) -> dict[str, object]:
+def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str, object]:
     """Drive the mutated toy; its positions and the probe's report."""
-    mutant.write_tree(toy.manifest("toy"), made, place / "tree")
+    write_tree(toy.manifest("toy"), made, place / "tree")
     program = (
         "import json; from toycar.world import World; from toycar import _fi; w = World(); gaps = []\n"
         f"for _ in range({steps}): w.step(); gaps.append(w.gap)\n"

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants import patches as patch
-from mutator.mutants import splicing as splice
+from mutator.mutants import patches, splicing
 from mutator.mutants.anchors import parse_file
 
 LONG = "".join(f"y{i} = {i}\n" for i in range(20))
@@ -18,16 +17,16 @@ BODY = "".join(f"    y{i} = {i}\n" for i in range(10))
 def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
     """(patch, new bytes) for insertions after assignments to `names`, and an import of the probe."""
     file = parse_file("pack/m.py", data, Path("root"))
-    edits = [splice.probe_import(file, "pack")]
+    edits = [splicing.probe_import(file, "pack")]
     for name in names:
         kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
         site = file.resolve(
             FaultLocation(path="pack/m.py", function="f", anchor=Anchor(kind=kind, name=name))
         )
-        maker = splice.guard if guard else splice.insertion
+        maker = splicing.guard if guard else splicing.insertion
         edits.append(maker(file, site, ["if 1:"] if guard else ["x = 1"], "ab"))
-    pieces = splice.apply(file, edits)
-    return patch.changed_file("pack/m.py", pieces), splice.joined(pieces)
+    pieces = splicing.apply_edits(file, edits)
+    return patches.changed_file("pack/m.py", pieces), splicing.joined(pieces)
 
 
 @pytest.mark.parametrize("guard", [False, True])
@@ -70,11 +69,11 @@ def test_hunks_are_joined_when_close() -> None:
 
 def test_names_with_spaces() -> None:
     """A file name with a space ends in a tab, as patch wants it."""
-    assert "+++ b/a file.py\t\n" in patch.new_file("a file.py", "x = 1\n")
+    assert "+++ b/a file.py\t\n" in patches.new_file("a file.py", "x = 1\n")
 
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
 def test_a_new_file(end: str, told: str) -> None:
     """Every line is an added one, an empty one too; a missing line end is told."""
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
-    assert patch.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"
+    assert patches.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

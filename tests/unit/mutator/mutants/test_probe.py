@@ -1,4 +1,4 @@
-"""The probe: triggers, holds, counts and memory, in the module that goes into a mutant."""
+"""The probe: triggers, holds, counts and memory, and that the contract says what the template does."""
 
 import math
 import random
@@ -7,9 +7,12 @@ from typing import Any
 
 import pytest
 
-from mutator.model import Hold
+from mutator.errors import MutatorError
+from mutator.model import Activation, Hold, Trigger
+from mutator.mutants import probe as contract
 from mutator.mutants.rendering import render
 from mutator.triggers.conditions import check_condition, evaluate, to_code
+from mutator.web import asset
 from mutator.workspace import Workspace
 
 
@@ -177,3 +180,125 @@ def test_bit_flips(clone: Workspace, value: float, bit: int, result: float) -> N
     fi = probe(clone)
     assert fi.flip_bit(value, bit) == result
     assert fi.flip_bit(fi.flip_bit(value, bit), bit) == value
+
+
+TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s=0.25)
+
+
+def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
+    """The text of a probe that is rendered as a mutant's is."""
+    models = clone.fault_models()
+    values = contract.template_values("0123456789abcdef", trigger, trigger.hold, ("0a1b2c3d", "4e5f6071"))
+    return render(models.probe, values, models.folder / "_fi.py.j2")
+
+
+def test_the_decision_is_the_probes(clone: Workspace) -> None:
+    """Asked directly, a probe is first active when `observe` says so."""
+    code = compile(source(clone), "_fi", "exec")
+    armed_t, holds = contract.decision(code)
+    module: dict[str, Any] = {}
+    exec(code, module)
+    draw = random.Random(7)
+    for _ in range(200):
+        values = (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0)
+        module["_run"] = module["_Run"]()
+        module["observe"](*values)
+        assert module["_run"].active == (values[0] >= armed_t and holds(*contract.truth(*values)))
+
+
+def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
+    """What the contract writes it recognizes: import, observation, guards, and the ids in them."""
+    lines = {
+        contract.import_statement("car"): ("probe", 0, False),
+        contract.tagged(contract.observe_call([("t", "now.time")]), contract.OBSERVE_TAG): (
+            "observe",
+            0,
+            False,
+        ),
+        contract.tagged('if _fi.active("0a1b2c3d"):', "0a1b2c3d"): ("0a1b2c3d", 0, True),
+        contract.tagged('if not _fi.active("0a1b2c3d"):', "0a1b2c3d", 12): ("0a1b2c3d", 12, True),
+        contract.tagged("    x = 1", "0a1b2c3d"): ("0a1b2c3d", 0, True),
+    }
+    for line, (name, guarded, of_fault) in lines.items():
+        for end in ("", "\n", "\r\n"):
+            tag = contract.tag_of((line + end).encode())
+            assert tag is not None
+            assert (tag.id, tag.guarded, tag.of_fault) == (name, guarded, of_fault)
+            assert tag.asks_probe == ("if " in line)
+            assert tag.code.decode() == line.partition("  #")[0]
+        assert contract.instrumented_line(f"x = 1\n{line}\n".encode()) == 1
+        assert contract.adds_fault(f"+{line}") is of_fault
+        assert list(contract.tagged_additions(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
+
+
+def test_what_is_no_tag(clone: Workspace) -> None:
+    """A tag ends its line, in lower case; a comment that only resembles one is the target's own."""
+    for line in (
+        b"x = 1",
+        b"x = 1  # fi",
+        b"x = 1  # fi:",
+        b"x  # fi:ABC",
+        b"x  # fi:abc, say",
+        b"y  # fi:a guard:",
+    ):
+        assert contract.tag_of(line) is None
+    assert contract.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
+
+
+def test_settings_are_all_that_differs(clone: Workspace) -> None:
+    """Probes of two triggers are equal but for their settings, and these are found by their names."""
+    other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
+    rests, found = [], []
+    for trigger in (TRIGGER, other):
+        patch = "".join(f"+{line}\n" for line in source(clone, trigger).splitlines())
+        spans = list(contract.settings(patch, 0, len(patch)))
+        found.append({name: patch[begin:end] for begin, end, name in spans})
+        for begin, end, _ in reversed(spans):
+            patch = patch[:begin] + patch[end:]
+        rests.append(patch)
+    assert rests[0] == rests[1]
+    assert found[1] == {
+        "mutant": "0123456789abcdef",
+        "id": "4e5f6071",
+        "hold": "for",
+        "hold_s": "2.5",
+        "armed_after_s": "1.0",
+        "condition": "t >= 3.0",
+    }
+
+
+def test_a_hold_time_is_needed() -> None:
+    """A trigger that holds for a time must say how long."""
+    with pytest.raises(MutatorError, match="holds for a time"):
+        contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, ())
+
+
+NEVER = {"first": None, "last": None, "count": 0}
+RAN = {"first": 0.5, "last": 2.0, "count": 3}
+
+
+@pytest.mark.parametrize(
+    "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
+)
+def test_no_activation(report: dict[str, Any]) -> None:
+    """Reports without an executed injection have no activation."""
+    assert contract.activation_of(report) is None
+
+
+def test_reports_are_read(clone: Workspace) -> None:
+    """Injections count together; the report of a mutant that never triggers reads like a probe's own."""
+    early = {"first": 0.25, "last": 0.75, "count": 1}
+    report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
+    assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
+    fi = probe(clone)
+    for read in (contract.mutant_of, contract.was_triggered, contract.activation_of):
+        assert read(fi.report()) == read(contract.silent_report("m1"))  # type: ignore[operator]
+    drive(fi, "xx")
+    assert contract.was_triggered(fi.report())
+    assert contract.mutant_of(None) is None
+    assert not contract.was_triggered(None)
+
+
+def test_pages_know_the_tags() -> None:
+    """The script that shows diffs cannot ask the contract, so it must spell the tags as the contract does."""
+    assert f"fi:({contract.IMPORT_TAG}|{contract.OBSERVE_TAG})" in asset("diff.js")

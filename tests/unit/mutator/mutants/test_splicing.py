@@ -6,7 +6,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants import splicing as splice
+from mutator.mutants import splicing
 from mutator.mutants.anchors import ParsedFile, parse_file
 
 CODE = ('if _fi.active("ab12"):', "    x = x + 1.0")
@@ -19,18 +19,18 @@ def parsed(text: str | bytes) -> ParsedFile:
 
 def edit(
     file: ParsedFile, kind: AnchorKind, name: str = "x", *, guard: bool = False, nth: int | None = None
-) -> splice.Edit:
+) -> splicing.Edit:
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name=name, nth=nth))
-    make, code = (splice.guard, GUARD) if guard else (splice.insertion, CODE)
+    make, code = (splicing.guard, GUARD) if guard else (splicing.insertion, CODE)
     return make(file, file.resolve(location), code, "ab12")
 
 
 def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
-    """The mutated bytes; they must compile and un-splice."""
+    """The mutated bytes; they must compile and un-splicing."""
     file = parsed(text)
-    result = splice.joined(splice.apply(file, [edit(file, kind, name, guard=guard)]))
+    result = splicing.joined(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
     compile(result, "m.py", "exec")
-    assert splice.unsplice(result.splitlines(keepends=True)) == file.data
+    assert splicing.unsplice(result) == file.data
     return result
 
 
@@ -148,9 +148,9 @@ def test_edits_at_one_boundary() -> None:
         edit(file, AnchorKind.AFTER_ASSIGN),
         edit(file, AnchorKind.AFTER_CALL, "g"),
     ]
-    result = splice.joined(splice.apply(file, edits))
+    result = splicing.joined(splicing.apply_edits(file, edits))
     compile(result, "m.py", "exec")
-    assert splice.unsplice(result.splitlines(keepends=True)) == file.data
+    assert splicing.unsplice(result) == file.data
     margins = [len(line) - len(line.lstrip()) for line in result.decode().splitlines()[3:]]
     assert margins == [8, 12, 4, 8, 4, 8, 4, 8, 4]
     assert b"guard:1\n        g(1)\n" in result
@@ -161,16 +161,16 @@ def test_two_guards_around_one_statement() -> None:
     file = parsed("def f(x):\n    g(1)\n")
     guard = edit(file, AnchorKind.BEFORE_CALL, "g", guard=True)
     with pytest.raises(MutatorError, match="two guards around one statement"):
-        splice.apply(file, [guard, guard])
+        splicing.apply_edits(file, [guard, guard])
 
 
 def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
     """The last line of the result has no newline either, whichever edit it comes from."""
     file = parsed("def f(x):\n    x = g(1)")
     edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
-    result = splice.joined(splice.apply(file, edits))
+    result = splicing.joined(splicing.apply_edits(file, edits))
     assert result.count(b"# fi:ab12\n") == 3 and result.endswith(b"# fi:ab12")
-    assert splice.unsplice(result.splitlines(keepends=True)) == file.data
+    assert splicing.unsplice(result) == file.data
 
 
 def test_names_that_the_encoding_lacks() -> None:
@@ -180,13 +180,13 @@ def test_names_that_the_encoding_lacks() -> None:
         FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
     )
     with pytest.raises(MutatorError, match="cannot be written in ascii"):
-        splice.insertion(file, site, ["gr\xf6\xdfe = 1"], "ab12")
+        splicing.insertion(file, site, ["gr\xf6\xdfe = 1"], "ab12")
 
 
 def test_the_probe_is_imported() -> None:
     """The import goes below docstring and future imports and carries the probe's tag."""
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
-    result = splice.joined(splice.apply(file, [splice.probe_import(file, "pack")]))
+    result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     assert result.decode() == (
         '"""Doc."""\nfrom __future__ import annotations\nfrom pack import _fi  # fi:probe\n\nimport os\n'
     )
@@ -195,8 +195,8 @@ def test_the_probe_is_imported() -> None:
 def test_a_byte_order_mark_stays_first() -> None:
     """Nothing goes before the mark: below a docstring the import is fine, otherwise it is refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
-    result = splice.joined(splice.apply(file, [splice.probe_import(file, "pack")]))
+    result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")
     assert result.startswith(b"\xef\xbb\xbf'Doc.'\nfrom pack")
     with pytest.raises(MutatorError, match="a byte order mark right before"):
-        splice.probe_import(parsed(b"\xef\xbb\xbfx = 1\n"), "pack")
+        splicing.probe_import(parsed(b"\xef\xbb\xbfx = 1\n"), "pack")

@@ -11,8 +11,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.paper import observations, observations_page
-from mutator.paper.measures import Found, median_time, of_difference, of_share
-from mutator.paper.observations import Judged, Rule, Summed, Verdict, judge, together
+from mutator.paper.measures import Estimate, median_time, of_difference, of_share
+from mutator.paper.observations import JudgedClaim, JudgedObservation, Rule, Verdict, judge, together
 from mutator.paper.published import load_paper
 from mutator.statistics.share import share
 from mutator.statistics.tally import Tally
@@ -21,7 +21,7 @@ from ..statistics.results_frame import results
 
 REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 FILE = REFERENCES / observations.FILE
-HOLDS, FAILS, UNTOLD = Verdict
+HOLDS, FAILS, UNDECIDED = Verdict
 ACTIVATED = {"t_activation": 1.0}
 EVENTS = {  # by count of a tally: what happened in such a run
     "manifested": {"t_manifest": 2.0},
@@ -60,7 +60,7 @@ def of_rows(*rows: dict[str, Any]) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def table_2() -> dict[str, Judged]:
+def table_2() -> dict[str, JudgedClaim]:
     """The claims, put to runs as the paper's table II counts them."""
     counts = load_paper(REFERENCES).summary
     frame = frame_of(runs_of(t, method=method, scenario=s) for (method, s), t in counts.items())
@@ -68,7 +68,7 @@ def table_2() -> dict[str, Judged]:
 
 
 @pytest.fixture(scope="module")
-def table_3() -> dict[str, Judged]:
+def table_3() -> dict[str, JudgedClaim]:
     """The claims, put to runs as the paper's table III counts them."""
     parts = []
     for (method, kind), tally in load_paper(REFERENCES).coverage.items():
@@ -79,26 +79,26 @@ def table_3() -> dict[str, Judged]:
 
 
 @pytest.mark.parametrize("number", ["1.1", "1.2", "2.4", "3.4", "4.1", "4.2", "4.3"])
-def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, Judged], number: str) -> None:
+def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, JudgedClaim], number: str) -> None:
     """On runs as the paper counts them a claim's query gives the paper's number, and the same verdict."""
     one = table_2[number]
     [answer] = one.answers
     published = one.claim.published()
     assert published is not None
-    assert answer.found.said == published.said
+    assert answer.found.text == published.text
     assert answer.verdict == one.paper
 
 
 @pytest.mark.parametrize("number", ["2.1", "2.2", "2.7", "4.1"])
-def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged], number: str) -> None:
+def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, JudgedClaim], number: str) -> None:
     """The same of claims about fault types."""
     one = table_3[number]
     published = one.claim.published()
     assert published is not None
-    assert one.answers[0].found.said == published.said
+    assert one.answers[0].found.text == published.text
 
 
-def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, Judged]) -> None:
+def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, JudgedClaim]) -> None:
     """Its guided advantage holds of activated faults and reverses of injected ones, resampled by fault and
     in the same fault type; and each image effect is told apart."""
     assert table_3["4.4"].verdict is HOLDS
@@ -123,23 +123,23 @@ def test_the_cited_time_is_the_drivers() -> None:
     [
         (Rule(above=0.5), of_share(share(60, 100)), HOLDS),
         (Rule(above=0.5), of_share(share(40, 100)), FAILS),
-        (Rule(above=0.5), of_share(share(52, 100)), UNTOLD),
-        (Rule(above=0.5), of_share(share(9, 9)), UNTOLD),  # few runs, whatever their interval
+        (Rule(above=0.5), of_share(share(52, 100)), UNDECIDED),
+        (Rule(above=0.5), of_share(share(9, 9)), UNDECIDED),  # few runs, whatever their interval
         (Rule(below=0.05), of_share(share(0, 100)), HOLDS),
         (Rule(below=0.05), of_share(share(20, 100)), FAILS),
-        (Rule(below=0.05), of_share(share(0, 0)), UNTOLD),
+        (Rule(below=0.05), of_share(share(0, 0)), UNDECIDED),
         (Rule(within=0.1), of_difference(share(500, 1000), share(510, 1000)), HOLDS),
         (Rule(within=0.1), of_difference(share(500, 1000), share(900, 1000)), FAILS),
-        (Rule(within=0.1), of_difference(share(5, 10), share(5, 10)), UNTOLD),
+        (Rule(within=0.1), of_difference(share(5, 10), share(5, 10)), UNDECIDED),
         (Rule(some=0.05), of_share(share(1, 2)), HOLDS),
         (Rule(some=0.05), of_share(share(0, 100)), FAILS),
-        (Rule(some=0.05), of_share(share(0, 20)), UNTOLD),
+        (Rule(some=0.05), of_share(share(0, 20)), UNDECIDED),
         (Rule(never=0.05), of_share(share(0, 100)), HOLDS),
         (Rule(never=0.05), of_share(share(1, 1000)), FAILS),
-        (Rule(never=0.05), of_share(share(0, 0)), UNTOLD),
+        (Rule(never=0.05), of_share(share(0, 0)), UNDECIDED),
     ],
 )
-def test_each_rule_reaches_each_verdict(rule: Rule, found: Found, verdict: Verdict) -> None:
+def test_each_rule_reaches_each_verdict(rule: Rule, found: Estimate, verdict: Verdict) -> None:
     """The interval decides, or a single run where one is enough; few data leave it open."""
     assert rule.verdict(found) is verdict
 
@@ -147,17 +147,17 @@ def test_each_rule_reaches_each_verdict(rule: Rule, found: Found, verdict: Verdi
 def test_an_observation_holds_if_all_it_rests_on_does() -> None:
     """One claim against it is enough; one that cannot be told leaves the rest open."""
     assert together([HOLDS, HOLDS]) is HOLDS
-    assert together([HOLDS, UNTOLD]) is UNTOLD
-    assert together([UNTOLD, FAILS]) is FAILS
-    assert together([]) is UNTOLD
+    assert together([HOLDS, UNDECIDED]) is UNDECIDED
+    assert together([UNDECIDED, FAILS]) is FAILS
+    assert together([]) is UNDECIDED
 
 
-def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, Judged]) -> None:
+def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, JudgedClaim]) -> None:
     """From a run of another mixture it cannot be told, whatever its number; others can be."""
     frame = of_rows(*[ACTIVATED] * 200, *[ACTIVATED | {"t_h1": 9.0, "t_h3": 8.0}] * 20)
     first = judge(FILE, frame, ["a type is missing", "5 are left"])[0].claims
     assert table_2["1.1"].verdict is HOLDS
-    assert (first[0].answers[0].verdict, first[0].verdict) == (HOLDS, UNTOLD)
+    assert (first[0].answers[0].verdict, first[0].verdict) == (HOLDS, UNDECIDED)
     assert first[0].why == "a type is missing; 5 are left"
     assert first[3].verdict is HOLDS
 
@@ -166,8 +166,8 @@ def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
     """FCW in one of the three scenarios is not FCW in all three."""
     frame = of_rows(ACTIVATED | {"scenario": "S2", "alerts": "fcw", "t_alert": 2.0})
     fcw = judge(FILE, frame, [])[0].claims[4]
-    assert [answer.verdict for answer in fcw.answers] == [HOLDS, UNTOLD, UNTOLD]
-    assert fcw.verdict is UNTOLD
+    assert [answer.verdict for answer in fcw.answers] == [HOLDS, UNDECIDED, UNDECIDED]
+    assert fcw.verdict is UNDECIDED
 
 
 def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
@@ -208,10 +208,10 @@ def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str)
 def test_what_is_shown_is_what_was_evaluated() -> None:
     """The lines of the report, run as Python, give the numbers beside them."""
     frame = of_rows(*[ACTIVATED] * 3, ACTIVATED | {"alerts": "fcw", "t_alert": 2.0, "t_h1": 9.0})
-    told: tuple[Summed, ...] = judge(FILE, frame, [])
+    told: tuple[JudgedObservation, ...] = judge(FILE, frame, [])
     names: dict[str, object] = {"runs": frame}
     exec("from mutator.paper.measures import *", names)
     answers = [answer for one in told for claim in one.claims for answer in claim.answers]
     assert len(answers) > 30
-    assert [eval(answer.query, names).said for answer in answers] == [a.found.said for a in answers]
+    assert [eval(answer.query, names).text for answer in answers] == [a.found.text for a in answers]
     assert all(a.query in observations_page.markdown(told, (), "") for a in answers)

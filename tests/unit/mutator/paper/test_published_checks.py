@@ -73,9 +73,15 @@ def test_what_is_wrong_is_told_where_it_stands(
     assert re.search(told, problems), problems
 
 
-def test_the_check_of_a_library_includes_it(toy: Workspace) -> None:
-    """A library that cites a part of the published numbers is told which file is missing."""
-    references = toy.library / "references"
+def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar: Workspace) -> None:
+    """One that cites a part of the published numbers is told which file is missing, if a campaign asks."""
+    references = toycar.library / "references"
     references.mkdir()
     shutil.copy(CLONE / "fault_library" / "references" / "paper_coverage.yaml", references)
-    assert [str(references / "paper_summary.yaml") in str(p) for p in check_library(toy, "toy")] == [True]
+    told = [str(problem) for problem in check_library(toycar, "toycar")]
+    assert not any("paper_summary.yaml" in problem for problem in told)
+    campaign = toycar.library / "campaigns" / "small.yaml"
+    campaign.write_text(f"{campaign.read_text()}study: driving_agent_resilience\n")
+    asked = [str(problem) for problem in check_library(toycar, "toycar")]
+    [new] = [problem for problem in asked if problem not in told]
+    assert str(references / "paper_summary.yaml") in new

@@ -9,14 +9,18 @@ import jsonschema
 import pytest
 from typer.main import get_command
 
+from mutator._common import shipped
 from mutator.cli.main import GROUPS, app
 from mutator.config import yaml_files as yamlio
-from mutator.reference import words
-from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files
-from mutator.reference.schemas import FORMATS, Format, definitions
+from mutator.errors import MutatorError
+from mutator.faults.specs import spec_model
+from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files, write
+from mutator.reference.schemas import Format, definitions, file_formats, short_name
+from mutator.reference.tables import reading_order
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
+FORMATS = file_formats(Workspace.find(CLONE).readings())
 CHAFF = CLONE / "fault_library" / "faults" / "radar" / "chaff.yaml"
 
 
@@ -26,6 +30,13 @@ def validator(kind: str) -> jsonschema.Draft7Validator:
 
 def told(kind: Format) -> dict[str, dict[str, Any]]:
     return {name: part for name, part in definitions(kind.model).items() if "properties" in part}
+
+
+def described(kind: Format) -> dict[str, Any]:
+    """The parts of a file as its model describes them itself."""
+    whole = kind.model.model_json_schema()
+    parts = {kind.model.__name__: whole} | whole.get("$defs", {})
+    return {short_name(name): part for name, part in parts.items() if "properties" in part}
 
 
 @pytest.mark.parametrize(
@@ -57,11 +68,21 @@ def test_nothing_else_says_that_it_is_generated() -> None:
     assert found - {SCHEMAS / "scenario.json"} == {*_generated()}
 
 
-def test_every_key_is_told_and_none_that_is_gone() -> None:
-    """The words know exactly the models and keys of the file formats."""
-    parts = {name: part for kind in FORMATS for name, part in told(kind).items()}
-    assert {*words.SECTIONS} == {*parts}
-    assert {*words.ABOUT} == {f"{name}.{key}" for name, part in parts.items() for key in part["properties"]}
+@pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
+def test_every_model_and_key_is_described(kind: Format) -> None:
+    """Each model of a file format has a title, and each of its keys is described in a sentence."""
+    parts = told(kind)
+    assert parts
+    for name, part in parts.items():
+        assert not part["title"].endswith("Model"), f"{name}: give the class a title"
+        for key, value in part["properties"].items():
+            assert value["description"].endswith("."), f"{name}.{key}: a sentence"
+
+
+def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
+    """The file's own model first, then those of its keys, each where it is first needed."""
+    names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
+    assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 
 def test_every_verb_is_in_a_group() -> None:
@@ -113,3 +134,13 @@ def test_a_schema_takes_a_model_of_ones_own() -> None:
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
     assert validator("fault_spec").is_valid(data)
+
+
+def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the library is the one that came with a wheel, there is no clone to write pages into."""
+    monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
+    with pytest.raises(MutatorError, match="ships with mutator"):
+        next(write(Workspace(library=library, templates=library.with_name("templates"))))
+    assert list(tmp_path.iterdir()) == []

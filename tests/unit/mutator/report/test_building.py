@@ -5,118 +5,26 @@ import csv
 import gzip
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.columns import result_columns
 from mutator.report import building as report
-from mutator.report import page as report_page
+from mutator.report.panels import failed
 from mutator.review import gate
-from mutator.store import plan_file as planfile
 from mutator.workspace import Workspace
 
-COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
+from .made_run import COLUMNS, HEAD, OK, PATCH, Page, make_run
+
 HERE = Workspace.find(Path(__file__).parents[4])
-HEAD = {
-    "schema": "run/1",
-    "campaign": "night_<b>drive</b>",
-    "plan": "ab" * 32,
-    "seed": 7,
-    "reading": "as_described",
-    "choices": {"seed": None, "limit": 3},
-    "target": "openpilot",
-    "goldens": [],
-    "experiments": 3,
-    "runs": 2,
-    "sources": {"target": "cd" * 32},
-    "provenance": {
-        "mutator": "0.1.0",
-        "python": "3.11.7",
-        "machine": "Linux",
-        "packages": {"numpy": "2.4.6"},
-    },
-}
-OK = {
-    "module": "radar",
-    "fault_type": "chaff",
-    "variant": "distance",
-    "value": "35",
-    "unit": "m",
-    "scenario": "S1",
-    "method": "guided",
-    "trigger": "C2",
-    "status": "ok",
-    "outcome": "hazard",
-    "t_activation": "7.0",
-    "t_manifest": "7.1",
-    "h1": "1",
-    "t_h1": "18.25",
-    "h2": "0",
-    "h3": "0",
-}
-NONE = {"outcome": "", "h1": "", "t_h1": "", "h2": "", "h3": ""}
-PATCH = """\
-diff --git a/pkg/_fi.py b/pkg/_fi.py
-new file mode 100644
---- /dev/null
-+++ b/pkg/_fi.py
-@@ -0,0 +1,1 @@
-+HOLD = "while"
-diff --git a/pkg/radar.py b/pkg/radar.py
---- a/pkg/radar.py
-+++ b/pkg/radar.py
-@@ -1,2 +1,3 @@
- d_rel = see()
-+d_rel = d_rel + 35.0  # fi:0a1b2c3d
- v_rel = 0
-"""
-BAD = OK | NONE | {"status": "harness_error", "detail": "the disk | is <gone>"}
-CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run folder with a hazard, a crash and a harness error; the hazard has its patch and a still."""
-    (tmp_path / "run.json").write_text(json.dumps(HEAD))
-    with (tmp_path / "results.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="")
-        table.writeheader()
-        for i, line in enumerate((OK, BAD, CRASHED)):
-            table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
-    planfile.write(tmp_path, [], [])
-    (tmp_path / "patches/00").mkdir(parents=True)
-    (tmp_path / "patches/00" / ("0" * 16 + ".patch")).write_text(PATCH)
-    (tmp_path / "plots").mkdir()
-    (tmp_path / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
-    return tmp_path
-
-
-class Page(HTMLParser):
-    """Text and links of a page; fails on tags that are not closed in order."""
-
-    VOID = ("meta", "link", "br", "img", "input")
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.texts: list[str] = []
-        self.links: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in self.VOID:
-            self.open.append(tag)
-        self.links += [value or "" for name, value in attrs if name in ("href", "src")]
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.texts.append(data.strip())
+    """A made-up run whose campaign asks for no study."""
+    return make_run(tmp_path)
 
 
 def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
@@ -174,7 +82,7 @@ def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> 
 
 def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A page of 100,000 crashes does not list each; the rest is one filter away."""
-    monkeypatch.setattr(report_page, "PAGE_LISTED", 1)
+    monkeypatch.setattr(failed, "PAGE_LISTED", 1)
     text = report.write(run, None).page.read_text()
     assert "1 more: " in text
     assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
@@ -191,7 +99,9 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
     """Approvals that a run kept are told in both forms, and one that has none says nothing of them."""
     assert "reviewed" not in report.write(run, None).markdown.read_text()
-    gate.write(run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]})
+    gate.write_approvals(
+        run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
+    )
     written = report.ensure(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "all of 2 groups approved, by Jane (1), Joe (1)" in text
@@ -203,15 +113,6 @@ def test_the_report_is_the_same_each_time(run: Path) -> None:
     before = written.page.read_bytes(), written.markdown.read_bytes()
     again = report.write(run, None)
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
-
-
-def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
-    """They are in the Markdown, in the page, and in files of their own."""
-    written = report.write(run, HERE)
-    cell = "35.6 % (154/432; 31.3 to 40.3)"
-    files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
-    assert all(cell in file.read_text() for file in (written.markdown, written.page, files[0]))
-    assert files[1].read_text().splitlines()[1].startswith("radar/chaff,paper,432,480,0.9,")
 
 
 def test_no_report_without_a_run(tmp_path: Path) -> None:
@@ -242,25 +143,6 @@ def test_experiments_and_runs_are_told_apart(run: Path) -> None:
     )
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in report.write(run, None).markdown.read_text()
-
-
-def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
-    """A claim's query stands in the file and in the page; the table has a line for each query."""
-    written = report.write(run, HERE)
-    file, table = run / "report/observations.md", run / "report/tables/observations.csv"
-    query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
-    assert query in file.read_text()
-    assert query in "".join(Page(written.page.read_text()).texts)
-    assert "(observations.md)" in written.markdown.read_text()
-    with table.open(newline="") as lines:
-        assert query in [line["query"] for line in csv.DictReader(lines)]
-
-
-def test_without_a_library_there_are_no_observations(run: Path) -> None:
-    """A report can be written anywhere; what was published is then not in it."""
-    written = report.write(run, None)
-    assert "observation" not in written.markdown.read_text() + written.page.read_text()
-    assert not (run / "report" / "observations.md").exists()
 
 
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:
@@ -296,11 +178,24 @@ def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) 
     assert drawn_again(run, None)
 
 
-def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
-    """A hazard whose experiment is in no plan has no trace: both forms say so, none shows a picture."""
-    written = report.write(run, HERE)
-    for text in (written.markdown.read_text(), " ".join(Page(written.page.read_text()).texts)):
-        assert "No figure: the traces it needs cannot be had" in text
-        assert "t_h1 > t_activation" in text
-    assert "action_" not in written.markdown.read_text()
-    assert "<figure" not in written.page.read_text().replace('el("figure"', "")
+@pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])
+def test_a_campaign_without_a_study_is_reported_without_its_words(
+    run: Path, workspace: Workspace | None
+) -> None:
+    """Published fault types alone bring no published numbers into a report, whatever the library cites."""
+    written = report.write(run, workspace)
+    page = re.sub(r"(?s)<(style|script).*?</\1>", "", written.page.read_text())
+    shown = written.markdown.read_text() + page
+    assert not {"paper", "observation", "study"} & set(re.findall(r"[a-z]+", shown.lower()))
+    assert not (run / "report" / "observations.md").exists()
+    assert not list((run / "report").glob("tables/*"))
+
+
+@pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])
+def test_a_study_that_cannot_be_asked_is_said_and_left_out(
+    tmp_path: Path, workspace: Workspace | None
+) -> None:
+    """The package may be missing here, or the library: the report is written, and its origin says why."""
+    text = report.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
+    assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
+    assert ("moon_landing, which needs a fault library" in text) == (workspace is None)

@@ -1,10 +1,12 @@
-"""The file of decisions: what stands in it is what was said; a mistake is told at its line."""
+"""The file of decisions: it holds what was decided; a mistake is reported at its line."""
 
+import dataclasses
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from mutator._common import shipped
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Bound, Group
 from mutator.review.decisions import Review, State, Verdict, load_review
@@ -55,16 +57,16 @@ def test_states(toycar: Workspace) -> None:
     assert states == list(State)
     assert found.in_turn([group("a"), group("b"), group("c")]) == [group("c"), group("b"), group("a")]
     assert (
-        found.told(group("a", other))
+        found.describe(group("a", other))
         == "approved by Jane Doe: fine (changed since: template, target function)"
     )
-    assert (found.told(group("b")), found.told(group("c"))) == ("rejected by Jane", "")
+    assert (found.describe(group("b")), found.describe(group("c"))) == ("rejected by Jane", "")
 
 
 def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
     """A group has one block in the file."""
     found = review(toycar, "a").decided([group("a")], Verdict.REJECTED, "Joe", "no")
-    assert found.told(group("a")) == "rejected by Joe: no"
+    assert found.describe(group("a")) == "rejected by Joe: no"
     assert len(found.decisions) == 1
 
 
@@ -142,3 +144,15 @@ def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytes
         review(toycar, "b").write()
     assert review(toycar).path.read_bytes() == before
     assert [path.name for path in review(toycar).path.parent.iterdir()] == ["toycar.yaml"]
+
+
+def test_the_shipped_library_takes_no_decisions(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decisions about the library that came with a wheel are refused before anything is written."""
+    monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "cache" / "mutator" / "shipped" / "0" / "reviews" / "toycar.yaml"
+    with pytest.raises(MutatorError, match=r"reviews/toycar.yaml: .*ships with mutator.*mutator init DIR"):
+        dataclasses.replace(review(toycar, "a"), path=path).write()
+    assert not (tmp_path / "cache").exists()

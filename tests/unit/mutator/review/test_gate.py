@@ -26,12 +26,12 @@ def decide(toy: Workspace, plan: Plan, verdict: Verdict = Verdict.APPROVED, coun
 
 def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
     """The run folder keeps who approved what, and a report can say so."""
-    assert gate.told(tmp_path) == ""
+    assert gate.approval_summary(tmp_path) == ""
     decide(toycar, plan)
     decide(toycar, plan, count=1)
-    gate.write(tmp_path, gate.approvals(toycar, plan))
+    gate.write_approvals(tmp_path, gate.approvals(toycar, plan))
     total = len(of_plan(toycar, plan))
-    assert gate.told(tmp_path) == (
+    assert gate.approval_summary(tmp_path) == (
         f"all of {total} groups approved, by Reviewer 1 (1), Reviewer None ({total - 1})"
     )
 

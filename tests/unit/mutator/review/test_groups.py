@@ -7,7 +7,7 @@ import pytest
 from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.building import build
-from mutator.review.groups import Shape, cut, label, parameters, shapes
+from mutator.review.groups import Shape, group_label, parameter_values, shapes, without_values
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
@@ -24,7 +24,7 @@ def faults(toy: Workspace, name: str, spec: str = "sensor/distance") -> list[Fau
 def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
     manifest, models = toy.manifest("toycar"), toy.fault_models()
     return shapes(
-        (f"{i}", label(fault, trigger), build(manifest, models, fault, trigger).patch)
+        (f"{i}", group_label(fault, trigger), build(manifest, models, fault, trigger).patch)
         for i, (fault, trigger) in enumerate(pairs)
     )
 
@@ -43,11 +43,11 @@ def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
     """The table has ids, the trigger's condition and the fault's parameter; what all share is text."""
     pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
     (shape,) = grouped(toycar, pairs)
-    named = shape.named(parameters(fault) for fault, _ in pairs)
+    named = shape.with_named_holes(parameter_values(fault) for fault, _ in pairs)
     assert named.holes == ("mutant", "id", "by")
     assert "gap = gap ⟨by⟩  # fi:⟨id⟩" in named.diff
     assert "gap = max(gap, 0.0)" in named.diff
-    assert [row[2] for row in named.values] == [f"- {-dict(parameters(f))['by']}" for f, _ in pairs]
+    assert [row[2] for row in named.values] == [f"- {-dict(parameter_values(f))['by']}" for f, _ in pairs]
 
 
 def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
@@ -66,7 +66,7 @@ def test_not_a_number_is_a_value(toycar: Workspace) -> None:
     params = (("by", float("nan")), ("target", "gap"))
     wrong = replace(second, injections=(replace(injection, params=params),))
     (shape,) = grouped(toycar, [(first, NEAR), (wrong, NEAR)])
-    named = shape.named(map(parameters, (first, wrong)))
+    named = shape.with_named_holes(map(parameter_values, (first, wrong)))
     assert named.values[1][named.holes.index("by")] == "+ float('nan')"
 
 
@@ -108,6 +108,6 @@ def test_pristine_lines_are_never_cut() -> None:
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,2 @@\n x = 3\n+y = 4  # fi:01234567\n"
     )
-    assert cut(patch).count("\0") == 2
-    assert cut(patch) != cut(patch.replace("x = 3", "x = 5"))
-    assert cut(patch) == cut(patch.replace("y = 4", "y = -5.5e-7"))
+    assert without_values(patch).count("\0") == 2
+    assert without_values(patch) != without_values(patch.replace("x = 3", "x = 5"))
+    assert without_values(patch) == without_values(patch.replace("y = 4", "y = -5.5e-7"))

@@ -1,27 +1,19 @@
 """Guided against random triggers."""
 
 import math
-from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from mutator.paper.published import Paper, load_paper
 from mutator.statistics import compare
 from mutator.statistics.compare import Stratum
-from mutator.statistics.compare_tables import kinds_sheet, overall_sheet, pairs_sheet
+from mutator.statistics.compare_tables import pairs_sheet
 from mutator.statistics.paired import Matched
 
 from .results_frame import results
 
-REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 RAN = {"t_activation": 7.0}
 HIT = RAN | {"h3": 1, "t_h3": 9.0}
-
-
-@pytest.fixture(scope="module")
-def paper() -> Paper:
-    return load_paper(REFERENCES)
 
 
 def pair(fault: str, guided: dict[str, object], random: dict[str, object]) -> list[dict[str, object]]:
@@ -55,17 +47,6 @@ def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
     assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
     assert pooled.low < 1 < pooled.odds_ratio < pooled.high
     assert 0.05 < pooled.p < 1
-
-
-def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
-    """Held constant over fault types, guided faults are the more hazardous ones per activated fault only."""
-    activated, injected = (
-        compare.mantel_haenszel(compare.strata(paper.coverage, whole)) for whole in compare.WHOLES
-    )
-    assert activated.strata == injected.strata == 17
-    assert injected.high < 1
-    assert injected.p < 1e-6
-    assert activated.low > 1
 
 
 def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
@@ -121,14 +102,3 @@ def test_a_difference_needs_runs_of_both_methods() -> None:
     found = compare.resampled(results(HIT, RAN), "activated")
     assert math.isnan(found.difference)
     assert math.isnan(found.low)
-
-
-def test_the_sheets_tell_both_wholes_for_paper_and_here(frame: pd.DataFrame, paper: Paper) -> None:
-    """Per activated and per injected fault, the paper's counts are put to the same tests as ours."""
-    overall, kinds = overall_sheet(frame, paper), kinds_sheet(frame, paper)
-    assert [line[:2] for line in overall.lines] == [
-        (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")
-    ]
-    assert str(overall.lines[0][2]).startswith("35.8 % (1316/3678")
-    assert len(kinds.lines) == 2 * (17 + 1)
-    assert all(line[-1] >= line[-2] for line in kinds.lines)  # type: ignore[operator]

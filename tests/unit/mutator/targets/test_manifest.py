@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common import caches
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
@@ -16,7 +17,6 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     """Root, package, entry, channels and the place of observation come from the file."""
     manifest = toy.manifest("toy")
     assert manifest.root == (toy.library.parent / "target").resolve()
-    assert manifest.probe_path == "toycar/_fi.py"
     assert manifest.step_s == 0.1
     assert [(c.name, c.unit, c.tolerance) for c in manifest.compared] == [("speed", "m/s", 0.5)]
     assert manifest.observation.location.anchor.kind is AnchorKind.AFTER_ASSIGN
@@ -39,6 +39,16 @@ def test_arguments(toy: Workspace) -> None:
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
     with pytest.raises(MutatorError, match="change 'no_lead'; expected one of alone"):
         manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
+
+
+def test_the_harness_names_the_cache(toy: Workspace) -> None:
+    """`{cache}` is the target's own folder below the user's cache, the same in every run."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
+    manifest = toy.manifest("toy")
+    for independent in (False, True):
+        given = manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
+        assert given[given.index("--cache") + 1] == str(caches.of_target("toy"))
 
 
 def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
@@ -70,6 +80,20 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
     assert load_manifest(path, other).root == other.resolve()
     with pytest.raises(MutatorError, match=r"toy.yaml:3: no folder .*none.*MUTATOR_TARGET"):
         load_manifest(path, tmp_path / "none")
+
+
+def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
+    """`shipped:target` is the controller that ships with the harness, wherever the manifest lies."""
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text()
+    line = next(line for line in text.splitlines() if line.startswith("root:"))
+    path.write_text(text.replace(line, "root: shipped:target"))
+    assert (load_manifest(path).root / "selfdrive" / "sim" / "run.py").is_file()
+    path.write_text(text.replace(line, "root: shipped:other"))
+    with pytest.raises(
+        MutatorError, match=r"toy.yaml:3: no folder .*relative to this file, or shipped:target"
+    ):
+        load_manifest(path)
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:

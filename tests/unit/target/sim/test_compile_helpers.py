@@ -122,12 +122,6 @@ def test_a_cache_without_libraries_is_no_error(tmp_path, cache):
     assert compiled.library("hog", pytest.fail) is None
 
 
-def test_an_unknown_home_is_no_error():
-    """Runs without pictures need none."""
-    compiled.use(Path("~no-such-user/cache"))
-    assert compiled.library("hog", pytest.fail) is None
-
-
 @pytest.mark.parametrize("given", ["no-such-compiler", "/", "cc '"])
 def test_without_a_compiler_it_says_so_and_leaves_nothing(tmp_path, monkeypatch, capsys, given):
     """The message has what CC is, what was expected and the remedy; exit code 2."""

@@ -1,11 +1,10 @@
 """Files whose content the detections' memory depends on, and mutants of them."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -18,17 +17,16 @@ from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.compiled_hog import C_SOURCE, made_of
 
-from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
-from mutator.mutants import building as mutant
+from mutator._common import caches
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
+from mutator.mutants.building import build
 from mutator.targets.source_tree import matches
 from mutator.triggers.kinds import at_time
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[4]
-DRIVE = (
-    "import json, sys; from selfdrive.sim.run import main; from selfdrive import _fi\n"
-    "assert main(sys.argv[1:]) == 0; print(json.dumps(_fi.report()['injections']))"
-)
 Drive = Callable[..., tuple[str, str]]
 
 
@@ -37,8 +35,9 @@ def drive(tmp_path: Path) -> Drive:
     """Drives a mutant for a second, on three frames: its record with the trace's digest, its counts. The
     fault is in `function` of a file, after the assignment of `name`, and acts from `time_s` on.
     """
-    frames = tmp_path / "frames"
+    frames, work = tmp_path / "frames", tmp_path / "work"
     frames.mkdir()
+    work.mkdir()
     values = {"files": "*.png", "width": 640, "rows": 480, "fx_px": 309.4, "fy_px": 344.2, "cx_px": 317.9}
     values |= {"cy_px": 256.5, "height_m": 2.18, "pitch_deg": 14, "spacing_m": SPACING}
     (frames / "camera.yaml").write_text(json.dumps({"schema": "camera/1", "name": "three"} | values))
@@ -47,33 +46,30 @@ def drive(tmp_path: Path) -> Drive:
         cv2.imwrite(str(frames / f"{number}.png"), renderer.grey(number * SPACING))
     workspace = Workspace.find(root=ROOT)
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
+    more = ("--pictures", "--frames", str(frames), "--max-steps", "100")
+    manifest = replace(manifest, entry_args=(*manifest.entry_args, *more))
+    base, numbers = prepare_base(manifest, tmp_path / "base"), count()
 
-    def driven(place: tuple[str, str, str], time_s: float, *more: str) -> tuple[str, str]:
+    def driven(place: tuple[str, str, str], time_s: float, *, independent: bool = False) -> tuple[str, str]:
         path, function, name = place
         anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name=name)
         location = FaultLocation(path=path, function=function, anchor=anchor)
         params = (("by", -1000.0), ("target", name))
         injection = Injection(location=location, model="offset", params=params)
         fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
-        made = mutant.build(manifest, models, fault, at_time(time_s))
-        tree, out = tmp_path / made.id, tmp_path / "out"
-        mutant.write_tree(manifest, made, tree)
-        command = [
-            sys.executable,
-            "-c",
-            DRIVE,
-            "--scenario",
-            str(workspace.scenario("S1")),
-            "--out",
-            str(out),
-        ]
-        command += ["--pictures", "--frames", str(frames), "--cache", str(tmp_path / "cache")]
-        command += ["--max-steps", "100", *more]
-        env = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
-        done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
-        return (out / "record.json").read_text(), done.stdout
+        made = build(manifest, models, fault, at_time(time_s))
+        engine = ReferenceEngine(manifest, base, work, Limits(), independent=independent)
+        job = Job(name="job", scenario=workspace.scenario("S1"), seed=0, files=made.files, mutant=made.id)
+        execution = engine.execute(job, work / str(next(numbers)))
+        assert execution.status is Status.OK and execution.probe, execution.detail
+        return (execution.out / "record.json").read_text(), json.dumps(execution.probe["injections"])
 
     return driven
+
+
+def memory() -> Path:
+    """Where the harness has the target keep what was seen."""
+    return caches.of_target("openpilot") / FILE
 
 
 def test_the_manifest_names_every_file_that_sees() -> None:
@@ -94,28 +90,29 @@ def test_the_manifest_names_every_file_that_sees() -> None:
         assert not matches(path, manifest.reads_itself)
 
 
-def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive, tmp_path: Path) -> None:
-    """A fault in a detector's code gives the same trace and the same counts without a memory, with one, and
-    after runs of itself and of the same fault at another time; nothing of it is kept.
+def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> None:
+    """A fault in a detector's code gives the same trace and the same counts in a run that shares nothing, and
+    in runs after itself and after the same fault at another time; nothing of it is kept.
     """
     place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
-    early, late = (drive(place, time_s, "--forget") for time_s in (0.3, 0.7))
+    early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))
     assert early[0] != late[0] and '"count": 14' in early[1] and '"count": 6' in late[1]
     assert [drive(place, time_s) for time_s in (0.3, 0.3, 0.7)] == [early, early, late]
-    assert not (tmp_path / "cache" / FILE).exists()
+    assert not memory().exists()
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which(compile_helpers.compiler()[0]) is None, reason="there is no C compiler")
-def test_a_fault_in_code_that_was_compiled_acts(drive: Drive, tmp_path: Path) -> None:
+def test_a_fault_in_code_that_was_compiled_acts(drive: Drive) -> None:
     """Compiled helpers do not stand for a mutant of the code that they were made of."""
-    compile_helpers.make(tmp_path / "cache", "hog", made_of(), C_SOURCE.read_text(), lambda library: True)
+    cache = caches.of_target("openpilot")
+    compile_helpers.make(cache, "hog", made_of(), C_SOURCE.read_text(), lambda library: True)
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
     acted = drive(place, 0.3)
-    assert '"count": 14' in acted[1] and acted == drive(place, 0.3, "--forget")
+    assert '"count": 14' in acted[1] and acted == drive(place, 0.3, independent=True)
 
 
-def test_a_fault_elsewhere_leaves_the_memory_in_use(drive: Drive, tmp_path: Path) -> None:
+def test_a_fault_elsewhere_leaves_the_memory_in_use(drive: Drive) -> None:
     """What a mutant's pristine detector saw is kept."""
     drive(("selfdrive/controls/lib/latcontrol.py", "LatControl.plan", "factor"), 0.3)
-    assert (tmp_path / "cache" / FILE).exists()
+    assert memory().exists()

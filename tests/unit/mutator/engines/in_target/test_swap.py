@@ -7,8 +7,8 @@ from functools import lru_cache, wraps  # noqa: F401 - used in LOADED
 
 import pytest
 
-from mutator.engines.code_swap import _changed
-from mutator.engines.in_target import swap as transplant
+from mutator.engines.code_swap import changed_functions
+from mutator.engines.in_target.swap import SwapRefused, swap_code
 
 LOADED = """
 from functools import lru_cache, wraps
@@ -66,7 +66,7 @@ again = types.FunctionType(twice.__code__, globals())
 def walk():
     return work(), "old walk"
 """
-PROBE = types.SimpleNamespace()
+PROBE = types.ModuleType("car._fi")
 
 
 @pytest.fixture
@@ -84,7 +84,8 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
     before = compile(LOADED, "car.py", "exec", dont_inherit=True)
     after = compile(LOADED.replace(old, new), "car.py", "exec", dont_inherit=True)
     return [
-        ("some_loaded_car", path, one, other) for path, one, other in _changed(before, after, (), "car.py")
+        ("some_loaded_car", path, one, other)
+        for path, one, other in changed_functions(before, after, "car.py")
     ]
 
 
@@ -111,7 +112,7 @@ def test_everyone_who_holds_a_function_gets_the_new_code(
     for _ in range(200):
         if word != "cached":
             assert kept(loaded) == f"old {word}"
-    transplant.exchange(functions(f'"old {word}"', f'"new {word}"'), PROBE)
+    swap_code(functions(f'"old {word}"', f'"new {word}"'), PROBE)
     assert kept(loaded) == f"new {word}"
     assert vars(loaded)["_fi"] is PROBE
 
@@ -119,39 +120,39 @@ def test_everyone_who_holds_a_function_gets_the_new_code(
 def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType) -> None:
     """A name imported elsewhere and a bound method are the same function as ever, with new code."""
     plain, method = loaded.plain, loaded.Car().method
-    transplant.exchange(functions('"old plain"', '"new plain"'), PROBE)
-    transplant.exchange(functions('"old method"', '"new method"'), PROBE)
+    swap_code(functions('"old plain"', '"new plain"'), PROBE)
+    swap_code(functions('"old method"', '"new method"'), PROBE)
     assert (plain(), method()) == ("new plain", "new method")
 
 
 def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -> None:
-    """What is not what it was when it was loaded is not exchanged, and neither is anything else."""
+    """If one function is not the one that was loaded, no code is swapped at all."""
     vars(loaded)["plain"] = lambda: "mine"
     changed = functions('"old', '"new')
-    with pytest.raises(transplant.Unfit, match=r"some_loaded_car\.plain is not found"):
-        transplant.exchange(changed, PROBE)
+    with pytest.raises(SwapRefused, match=r"some_loaded_car\.plain is not found"):
+        swap_code(changed, PROBE)
     assert loaded.Car.static() == "old static"
 
 
 def test_a_function_that_there_are_two_of_is_left_alone(loaded: types.ModuleType) -> None:
-    """A code that a second function has, too, is not exchanged in one of them."""
-    with pytest.raises(transplant.Unfit, match="several of it"):
-        transplant.exchange(functions('"old twice"', '"new twice"'), PROBE)
+    """Code that two functions share is not swapped in one of them."""
+    with pytest.raises(SwapRefused, match="several of it"):
+        swap_code(functions('"old twice"', '"new twice"'), PROBE)
 
 
 def test_a_function_at_work_is_left_alone(loaded: types.ModuleType) -> None:
-    """A function on the stack would go on with its old code, so it is not exchanged."""
+    """A function on the stack would go on with its old code, so it is not swapped."""
 
     def work() -> None:
-        transplant.exchange(functions('"old walk"', '"new walk"'), PROBE)
+        swap_code(functions('"old walk"', '"new walk"'), PROBE)
 
     vars(loaded)["work"] = work
-    with pytest.raises(transplant.Unfit, match="at work"):
+    with pytest.raises(SwapRefused, match="at work"):
         loaded.walk()
 
 
 def test_a_module_that_is_not_loaded(loaded: types.ModuleType) -> None:
     """A module that was not imported yet cannot be changed."""
     changed = [("car_nobody_loaded", path, old, new) for _, path, old, new in functions('"old', '"new')]
-    with pytest.raises(transplant.Unfit, match="car_nobody_loaded is not loaded"):
-        transplant.exchange(changed, PROBE)
+    with pytest.raises(SwapRefused, match="car_nobody_loaded is not loaded"):
+        swap_code(changed, PROBE)

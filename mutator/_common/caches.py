@@ -1,0 +1,120 @@
+"""What is kept from one command to the next: where it lies, how much it is, and how it is kept small.
+
+    $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
+      checks/<digest>/     passed checks of campaigns, with their golden runs
+      targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
+
+Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
+used. An unwritable or damaged cache is ignored, and any entry may be deleted at any time.
+"""
+
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+CHECKS, TARGETS = "checks", "targets"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """Something in the cache that is kept or deleted as a whole.
+
+    `what` says whose it is: `checks`, `target openpilot`. `size` is what it takes on the disk, in bytes, and
+    `used` when it was last read or written, in seconds since the epoch.
+    """
+
+    what: str
+    path: Path
+    size: int
+    used: float
+
+    def delete(self) -> None:
+        """Delete it; nothing happens when it is gone already."""
+        if self.path.is_dir() and not self.path.is_symlink():
+            shutil.rmtree(self.path, ignore_errors=True)
+        else:
+            self.path.unlink(missing_ok=True)
+
+
+def folder() -> Path:
+    """The folder of all caches, which need not exist. Where no home is known it is one that cannot."""
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if named.is_absolute():
+        return named / "mutator"
+    try:
+        return Path.home() / ".cache" / "mutator"
+    except RuntimeError:
+        return Path(os.devnull) / "mutator"
+
+
+def of_checks() -> Path:
+    """Where passed checks are kept."""
+    return folder() / CHECKS
+
+
+def of_target(name: str) -> Path:
+    """Where the target of that name keeps what its runs share; any name is one folder there."""
+    return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
+
+
+def entries() -> list[Entry]:
+    """All that is cached: each campaign's checks, and each file that a target keeps."""
+    found = [_entry(CHECKS, path) for path in _children(of_checks())]
+    for target in _children(folder() / TARGETS):
+        found += [_entry(f"target {target.name}", path) for path in _files(target)]
+    return sorted(found, key=lambda entry: (entry.what, entry.path))
+
+
+def prune(most: int) -> list[Entry]:
+    """Delete the least recently used entries until at most `most` bytes are left; what was deleted."""
+    kept = entries()
+    total = sum(entry.size for entry in kept)
+    deleted = []
+    for entry in sorted(kept, key=lambda entry: entry.used):
+        if total <= most:
+            break
+        entry.delete()
+        deleted.append(entry)
+        total -= entry.size
+    return deleted
+
+
+def clear() -> list[Entry]:
+    """Delete all of it; what was deleted."""
+    deleted = entries()
+    for entry in deleted:
+        entry.delete()
+    return deleted
+
+
+def _entry(what: str, path: Path) -> Entry:
+    states = list(_states([path, *_files(path)] if path.is_dir() else [path]))
+    return Entry(
+        what=what,
+        path=path,
+        size=sum(state.st_blocks * 512 for state in states),  # a table with holes is smaller than it says
+        used=max((max(state.st_atime, state.st_mtime) for state in states), default=0.0),
+    )
+
+
+def _states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
+    """The state of each that is still there."""
+    for path in paths:
+        try:
+            yield path.lstat()
+        except OSError:
+            continue
+
+
+def _children(place: Path) -> list[Path]:
+    try:
+        return sorted(place.iterdir())
+    except OSError:  # not there, or not ours
+        return []
+
+
+def _files(place: Path) -> list[Path]:
+    return [path for path in sorted(place.rglob("*")) if path.is_symlink() or not path.is_dir()]

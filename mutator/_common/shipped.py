@@ -1,0 +1,126 @@
+"""What ships with the harness: the controller under test, its fault library, the templates.
+
+In a clone they are folders beside the package. A wheel carries them as one archive, for two reasons: pip
+compiles every .py file that it installs, and no bytecode may lie beside a target's sources; and nothing must
+make `selfdrive` importable. The archive is unpacked once into the user's cache.
+"""
+
+import os
+import shutil
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from zipfile import ZipFile
+
+from mutator._common.hashing import digest
+from mutator.errors import MutatorError
+
+ARCHIVE = Path(__file__).with_name("shipped.zip")  # made by setup.py; a clone has none
+CLONE = Path(__file__).resolve().parents[2]
+SHIPPED_TARGET = "shipped:target"  # as `root` of a manifest
+_README = Path(__file__).with_name("new_library.md")
+_ROOT_IN_CLONE = "root: ../../target\n"
+_SHOWN = 3  # names of changed files in an error
+
+
+def shipped_folder() -> Path:
+    """The folder that holds target/, fault_library/ and templates/ as they ship.
+
+    An unpacked archive is compared with the archive, byte for byte, once in each process. MutatorError when
+    it was changed or cannot be unpacked.
+    """
+    return _unpacked(ARCHIVE, _cache()) if ARCHIVE.exists() else CLONE
+
+
+def refuse_shipped(path: Path) -> None:
+    """MutatorError when `path`, which is about to be written, is in the unpacked archive."""
+    if ARCHIVE.exists() and path.absolute().is_relative_to(_cache()):
+        raise MutatorError(
+            "part of the library that ships with mutator, which stays as it is",
+            where=path,
+            expected="a library of your own",
+            remedy="make one: `mutator init DIR`, then work in DIR",
+        )
+
+
+def write_library(folder: Path) -> None:
+    """Write a library and templates to edit, and a README, into a new or empty `folder`.
+
+    The manifest of the copy says `root: shipped:target`, so it finds the controller wherever the folder is
+    moved and whichever mutator is installed. MutatorError for a folder that holds anything.
+    """
+    shipped = shipped_folder()
+    _make_empty(folder)
+    for name in ("fault_library", "templates"):
+        shutil.copytree(shipped / name, folder / name, ignore=shutil.ignore_patterns(".*"))
+    for manifest in (folder / "fault_library" / "targets").glob("*.yaml"):
+        text = manifest.read_text(encoding="utf-8")
+        manifest.write_text(text.replace(_ROOT_IN_CLONE, f"root: {SHIPPED_TARGET}\n"), encoding="utf-8")
+    shutil.copyfile(_README, folder / "README.md")
+
+
+def _make_empty(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        problem = f"not empty ({sorted(folder.iterdir())[0].name})" if any(folder.iterdir()) else ""
+    except OSError as err:
+        problem = f"cannot be made ({err.strerror})"
+    if problem:
+        raise MutatorError(
+            problem,
+            where=folder,
+            expected="a new or empty folder to write a library into",
+            remedy="choose another DIR",
+        )
+
+
+def _cache() -> Path:
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    base = named if named.is_absolute() else Path("~/.cache").expanduser()
+    return base / "mutator" / "shipped"
+
+
+@lru_cache(maxsize=1)
+def _unpacked(archive: Path, cache: Path) -> Path:
+    """The archive's folder in the cache, named by its digest, made whole or not at all."""
+    folder = cache / digest(archive.read_bytes())[:16]
+    if not folder.is_dir():
+        _unpack(archive, folder)
+    if changed := _changed(archive, folder):
+        more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
+        raise MutatorError(
+            f"no longer as it ships: {', '.join(changed[:_SHOWN])}{more}",
+            where=folder,
+            expected="the files that were installed with mutator, unedited",
+            remedy="delete this folder to have it unpacked again; edit in a library of `mutator init DIR`",
+        )
+    return folder
+
+
+def _unpack(archive: Path, folder: Path) -> None:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent) as scratch:
+            whole = Path(scratch) / "whole"
+            with ZipFile(archive) as file:
+                file.extractall(whole)
+            whole.rename(folder)
+    except OSError as err:
+        if folder.is_dir():
+            return  # another process was faster
+        raise MutatorError(
+            f"cannot unpack what ships with mutator ({err.strerror})",
+            where=folder,
+            expected="a cache folder that can be written",
+            remedy="set XDG_CACHE_HOME to one, or work in a clone",
+        ) from None
+
+
+def _changed(archive: Path, folder: Path) -> list[str]:
+    """Files that were edited, added or deleted since they were unpacked; bytecode is no part of a tree."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
+    found = {path.relative_to(folder).as_posix(): path for path in files}
+    with ZipFile(archive) as file:
+        names = set(file.namelist())
+        same = {n for n in names & found.keys() if found[n].read_bytes() == file.read(n)}
+    return sorted((names | found.keys()) - same)

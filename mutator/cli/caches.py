@@ -1,0 +1,93 @@
+"""`cache`: what is kept from one command to the next."""
+
+import re
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from mutator._common import caches
+from mutator._common.text import counted
+from mutator.cli.console import Terminal, short_path
+from mutator.cli.options import Json
+from mutator.errors import MutatorError
+
+_UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    app.command("cache", epilog=EXAMPLES)(cache)
+
+
+EXAMPLES = """\b
+Examples:
+  mutator cache
+  mutator cache --max 2GB
+  mutator cache --clear
+  ls "$(mutator cache --path)"
+"""
+
+
+def cache(
+    path: Annotated[bool, typer.Option("--path", help="Print the folder and nothing else.")] = False,
+    most: Annotated[
+        str | None,
+        typer.Option(
+            "--max", metavar="SIZE", help="Delete the least recently used entries until it is no larger."
+        ),
+    ] = None,
+    clear: Annotated[bool, typer.Option("--clear", help="Delete all of it.")] = False,
+    as_json: Json = False,
+) -> None:
+    """List what is cached on this machine, and delete what is too much.
+
+    Passed checks of campaigns are kept for other run folders, pictures and detections of a target for its
+    other runs. It lies below XDG_CACHE_HOME, or in ~/.cache. Results never depend on it; without it runs take
+    longer.
+    """
+    if path + clear + (most is not None) > 1:
+        raise MutatorError("--path, --max and --clear together", expected="one of them")
+    if path:
+        typer.echo(caches.folder())
+        return
+    terminal = Terminal(as_json)
+    deleted = caches.clear() if clear else caches.prune(parse_size(most)) if most is not None else None
+    kept = caches.entries()
+    if as_json:
+        document = {"path": str(caches.folder()), "kept": _facts(kept)}
+        terminal.emit(document if deleted is None else {**document, "deleted": _facts(deleted)})
+        return
+    if deleted is not None:
+        terminal.say(f"deleted {counted(len(deleted), 'entry', 'entries')}, {_size(deleted)}")
+    rows = [(what, len(of), _size(of)) for what, of in _by_what(kept).items()]
+    rows.append(("total", len(kept), _size(kept)))
+    terminal.table(("what", "entries", "size"), rows, right=(1, 2), total=True)
+    terminal.say(f"in {short_path(caches.folder())}")
+
+
+def parse_size(text: str) -> int:
+    """Bytes of a size as people write it: 2GB, 500 MB, 0; MutatorError for anything else."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kKMGT]?B)?", text.strip())
+    if not found:
+        raise MutatorError(
+            f"size '{text}'", expected="a number of B, kB, MB, GB or TB", remedy="write it like 2GB"
+        )
+    return int(float(found[1]) * _UNITS[(found[2] or "B").upper()])
+
+
+def _by_what(entries: Sequence[caches.Entry]) -> dict[str, list[caches.Entry]]:
+    groups: dict[str, list[caches.Entry]] = {}
+    for entry in entries:
+        groups.setdefault(entry.what, []).append(entry)
+    return groups
+
+
+def _size(entries: Sequence[caches.Entry]) -> str:
+    size = sum(entry.size for entry in entries)
+    unit = next((unit for unit in ("GB", "MB") if size >= _UNITS[unit]), "KB")
+    return f"{size / _UNITS[unit]:.1f} {unit.replace('K', 'k')}"
+
+
+def _facts(entries: Sequence[caches.Entry]) -> list[dict[str, object]]:
+    return [{"what": e.what, "path": str(e.path), "bytes": e.size} for e in entries]

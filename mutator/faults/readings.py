@@ -1,0 +1,68 @@
+"""Readings: ways to understand the same written faults, by the names that a library declares for them."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator.config.yaml_files import StrictModel, read
+from mutator.errors import MutatorError
+
+SCHEMA = "readings/1"
+FILE = "readings.yaml"  # of a library
+_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Readings:
+    """The readings of a library, in its order. The first is the default: every variant is written in it."""
+
+    names: tuple[str, ...]
+    about: tuple[str, ...]  # of each, what it means
+
+    @property
+    def default(self) -> str:
+        return self.names[0]
+
+    def check(self, name: str) -> None:
+        """MutatorError that lists the readings for a name that is none of them."""
+        if name not in self.names:
+            raise MutatorError(
+                f"reading '{name}'",
+                expected=f"one of {', '.join(self.names)}",
+                remedy=f"correct the name, or declare the reading in the library's {FILE}",
+            )
+
+
+UNDECLARED = Readings(
+    names=("as_described",), about=("The injections, as the text that describes the fault means them.",)
+)
+"""The one reading of a library that declares none. Its name is in the ids of faults and must stay."""
+
+
+class _DeclaredReadingModel(StrictModel, title="A declared reading"):
+    about: str = Field(description="What it means.")
+
+
+class ReadingsModel(StrictModel, title="readings.yaml"):
+    """Which readings there are."""
+
+    readings: dict[str, _DeclaredReadingModel] = Field(
+        min_length=1, description="By name: small letters, digits and `_`. The first is the default."
+    )
+
+
+def load_readings(library: Path) -> Readings:
+    """The readings that a library declares, `UNDECLARED` where it has no file of them."""
+    path = library / FILE
+    if not path.is_file():
+        return UNDECLARED
+    model, source = read(path, ReadingsModel, SCHEMA)
+    for name in model.readings:
+        if not _NAME.match(name):
+            raise source.error(
+                ("readings", name), f"'{name}'", expected="small letters, digits and _", remedy="rename it"
+            )
+    about = tuple(reading.about.strip() for reading in model.readings.values())
+    return Readings(names=tuple(model.readings), about=about)

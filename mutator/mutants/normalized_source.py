@@ -1,0 +1,43 @@
+"""Source with its numbers and ids replaced, so that compiling it once stands for many sources.
+
+Compiling a file takes milliseconds, and mutants of one kind differ only in the digits of their numbers and in
+their ids. If the normalized source compiles, so does every source that normalizes to it:
+
+* A number becomes 0, or 0.0 if it has a point or an exponent. Only whole literals as `repr` writes them are
+  replaced, and only up to a length that Python always accepts, so a token becomes one of the same kind. The
+  compiler cares about that kind alone. Where it cares about more (a mapping pattern may not repeat a key),
+  equal numbers are the hardest case.
+* An id (hex digits) becomes one that is neither a token by itself (`0f...`) nor a character (`\\U0f...`). So
+  normalized source compiles only where ids are in strings, comments or names, and there any id compiles.
+  Equal ids stay equal, different ones different.
+"""
+
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+
+_PART = r"[\w.\\\x80-\U0010ffff]"  # beside a literal: it continues, or belongs to a name or an escape
+_NUMBER = re.compile(  # the digit comes first because searching for it is fast; the lookbehind follows
+    rf"[0-9](?<!{_PART}[0-9])(?:(?<!0)[0-9]{{1,19}})?((?:\.[0-9]{{1,20}})?(?:e[+-]?[0-9]{{1,3}})?)(?!{_PART})"
+)
+
+
+def normalized(text: str, ids: Iterable[str]) -> str:
+    """`text` with its numbers and `ids` replaced."""
+    for i, name in enumerate(ids):
+        text = text.replace(name, f"0f0f{i:04x}")
+    return _NUMBER.sub(_zero, text)
+
+
+def _zero(number: re.Match[str]) -> str:
+    return "0.0" if number[1] else "0"
+
+
+@lru_cache(maxsize=256)
+def compiles(text: bytes) -> bool:
+    """Whether normalized source compiles, and with it every source that it stands for."""
+    try:
+        compile(text, "<normalized>", "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, RecursionError):
+        return False
+    return True

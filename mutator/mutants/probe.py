@@ -1,0 +1,219 @@
+"""The probe's contract: what `_fi` offers, how its calls and tags look in source, and what it reports.
+
+Every mutant carries the probe, a module rendered from `templates/_fi.py.j2`. Whoever writes, finds or reads
+injected lines asks this module. Code inside a target's process cannot import it, so engines pass on what that
+code needs.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import CodeType
+from typing import Any
+
+from mutator._common.hashing import content_id
+from mutator.config.locations import PROBE_NAME
+from mutator.errors import MutatorError
+from mutator.model import Activation, Hold, Injection, Trigger
+from mutator.triggers.conditions import check_condition, to_code
+
+IMPORT_TAG = "probe"  # on the line that imports the probe
+OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
+INJECTION_ID = r"(?<![0-9A-Za-z])[0-9a-f]{8}(?![0-9A-Za-z])"
+
+Truth = tuple[float, ...]
+
+_MARK = "# fi:"
+_TAG = rf"{_MARK}([0-9a-z]+)(?: guard:(\d+))?"
+_TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
+_NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
+_GUARD = re.compile(
+    rf'\s*if (not )?{PROBE_NAME}\.active\("[0-9a-z]+"\)( or {PROBE_NAME}\.steps\(\))?:\Z'.encode()
+)
+_TAGGED_ADDITION = re.compile(rf"^\+.*{_TAG}\r?$", re.MULTILINE)
+_FAULT_ADDITION = re.compile(rf"^\+.*{_MARK}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
+_SETTING = re.compile(
+    r"(?P<mutant>(?<![0-9A-Za-z])[0-9a-f]{16}(?![0-9A-Za-z]))"
+    rf"|(?P<id>{INJECTION_ID})"
+    r'|^\+HOLD = "(?P<hold>\w+)"$'
+    r"|^\+HOLD_S = (?P<hold_s>.+)$"
+    r"|^\+ARMED_AFTER_S = (?P<armed_after_s>.+)$"
+    r"|^\+def _condition\(.*\n\+    return (?P<condition>.+)$",
+    re.MULTILINE,
+)
+
+
+def probe_path(package: str) -> str:
+    """Path of the probe in a mutated tree, relative to the tree's root."""
+    return f"{package}/{PROBE_NAME}.py"
+
+
+def probe_module(package: str) -> str:
+    """The probe's module name."""
+    return f"{package}.{PROBE_NAME}"
+
+
+def injection_id(index: int, injection: Injection) -> str:
+    """The id that an injection has in tags and reports: from its content and its place in the fault."""
+    return content_id([index, injection])[:8]
+
+
+def template_values(
+    mutant: str, trigger: Trigger, hold: Hold, injections: Sequence[str]
+) -> dict[str, object]:
+    """What the probe's template is rendered with; MutatorError for a hold time that is missing."""
+    if hold is Hold.FOR and trigger.hold_s is None:
+        raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
+    return {
+        "mutant": mutant,
+        "condition": to_code(check_condition(trigger.condition)),
+        "hold": hold.value,
+        "hold_s": float(trigger.hold_s or 0.0),
+        "armed_after_s": float(trigger.armed_after_s),
+        "injections": injections,
+    }
+
+
+# Injected lines
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tag:
+    """The tag at the end of an injected line: the injection's id (or IMPORT_TAG, OBSERVE_TAG).
+
+    `guarded` is the number of lines that a guard indents, 0 in other lines; `code` the line without its tag.
+    """
+
+    id: str
+    guarded: int
+    code: bytes
+
+    @property
+    def of_fault(self) -> bool:
+        """Whether the line belongs to a fault; the others are in every mutant."""
+        return self.id not in (IMPORT_TAG, OBSERVE_TAG)
+
+    @property
+    def asks_probe(self) -> bool:
+        """Whether the line opens a block that runs only if the probe says so."""
+        return _GUARD.match(self.code) is not None
+
+
+def tag_of(line: bytes) -> Tag | None:
+    """The tag of a line, with or without its line end; None for a line of the target."""
+    match = _TAG_OF_LINE.search(line)
+    if match is None:
+        return None
+    return Tag(id=match[1].decode(), guarded=int(match[2] or 0), code=line[: match.start()])
+
+
+def tagged(code: str, tag: str, guarded: int = 0) -> str:
+    """`code` with its tag; every line of a guard carries the number of lines that it guards."""
+    return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
+
+
+def import_statement(package: str) -> str:
+    """The tagged line that imports the probe."""
+    return tagged(f"from {package} import {PROBE_NAME}", IMPORT_TAG)
+
+
+def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
+    """The call that passes on the ground truth: the name of each observed value and its expression."""
+    return f"{PROBE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
+
+
+def instrumented_line(data: bytes) -> int | None:
+    """Index of a line with a tag, or else with the probe's name; None if the file has neither."""
+    if _MARK.encode() in data:
+        for index, line in enumerate(data.splitlines(keepends=True)):
+            if tag_of(line):
+                return index
+    match = _NAME_IN_USE.search(data)
+    return data[: match.start()].count(b"\n") if match else None
+
+
+# Injected lines in patches
+
+
+def tagged_additions(patch: str, begin: int, end: int) -> Iterator[tuple[int, int]]:
+    """Begin and end of each tagged line that the patch adds between `begin` and `end`, without its `+`."""
+    for line in _TAGGED_ADDITION.finditer(patch, begin, end):
+        yield line.start() + 1, line.end()
+
+
+def adds_fault(hunk: str) -> bool:
+    """Whether a hunk adds a line that belongs to a fault."""
+    return _FAULT_ADDITION.search(hunk) is not None
+
+
+def settings(patch: str, begin: int, end: int) -> Iterator[tuple[int, int, str]]:
+    """Begin, end and name of everything that differs from probe to probe, in the patch that adds one."""
+    for match in _SETTING.finditer(patch, begin, _end_of_settings(patch, begin, end)):
+        name = match.lastgroup or ""
+        yield *match.span(name), name
+
+
+def _end_of_settings(patch: str, begin: int, end: int) -> int:
+    """The end of the trigger's condition: the rest is long, and the same in every probe."""
+    condition = patch.find("\n+def _condition(", begin, end)
+    line = patch.find("\n+    return ", condition, end) if condition >= 0 else -1
+    return end if line < 0 else patch.find("\n", line + 1, end) + 1 or end
+
+
+# A probe at work
+
+
+def truth(t: float, d_rel: float, v_ego: float, v_lead: float) -> Truth:
+    """The values of a condition's variables: those observed, time headway (s) and closing speed (m/s)."""
+    return (t, d_rel, v_ego, v_lead, d_rel / v_ego if v_ego > 0.0 else math.inf, v_ego - v_lead)
+
+
+def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
+    """The time (s) from which a probe is armed, and its condition, to be called with a `truth`.
+
+    A fault is first active where the probe is armed and the condition holds. Calling `observe` for every
+    value instead takes almost four times as long.
+    """
+    module: dict[str, Any] = {"__name__": PROBE_NAME}
+    exec(probe, module)
+    return module["ARMED_AFTER_S"] - module["_TINY"], module["_condition"]
+
+
+def state_after(observed: int, t: float | None) -> tuple[str, dict[str, object]]:
+    """The object in which a probe keeps its observations, and its attributes after `observed` of them.
+
+    The last one was made at time `t` (s). A probe that takes the place of another is given these.
+    """
+    return "_run", {"observed": observed, "t": t} if observed else {}
+
+
+# What a probe reports
+
+
+def silent_report(mutant: str | None) -> dict[str, Any]:
+    """The report of a mutant whose trigger never holds, as far as it is read."""
+    return {"mutant": mutant, "triggered": None, "injections": {}}
+
+
+def mutant_of(report: Mapping[str, Any] | None) -> str | None:
+    """The id of the mutant whose probe wrote the report."""
+    return report.get("mutant") if report else None
+
+
+def was_triggered(report: Mapping[str, Any] | None) -> bool:
+    """Whether the trigger held in the reported run."""
+    return bool(report and report["triggered"])
+
+
+def activation_of(report: Mapping[str, Any]) -> Activation | None:
+    """All injections together: first and last execution, and their number; None if nothing was executed."""
+    injections = report.get("injections")
+    ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
+    if not ran:
+        return None
+    return Activation(
+        first=min(i["first"] for i in ran),
+        last=max(i["last"] for i in ran),
+        count=sum(i["count"] for i in ran),
+    )

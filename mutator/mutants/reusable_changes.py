@@ -1,0 +1,99 @@
+"""Reusable changes: a changed file without its inserted lines, to be filled with those of other mutants.
+
+Splicing, comparing and compiling a file of some hundred lines takes milliseconds, and the mutants of a
+campaign differ in little: many insert the same lines at the same places, but for numbers and ids. The first
+of them is spliced and leaves a reusable change; the others fill it with their own lines, and get the bytes
+that splicing would give. How many there are depends on the library, not on the number of mutants.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.normalized_source import compiles, normalized
+from mutator.mutants.probe import tag_of
+from mutator.mutants.splicing import Edit, in_order
+from mutator.targets.source_tree import SourceTree
+
+ReuseKey = tuple[tuple[int, int, int, bytes, str], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A changed file: its new content, and the patch that makes it (not UTF-8: surrogate escapes)."""
+
+    data: bytes
+    patch: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReusableChange:
+    """A change without its inserted lines: the parts before, between and after them."""
+
+    data: tuple[bytes, ...]
+    patch: tuple[str, ...]
+
+    @classmethod
+    def of(cls, change: Change) -> "ReusableChange":
+        """The change without its tagged lines: these are the inserted ones, since no target has tags."""
+        patch = change.patch.encode("utf-8", "surrogateescape")
+        return cls(
+            data=tuple(_parts(change.data, b"")), patch=tuple(_text(part) for part in _parts(patch, b"+"))
+        )
+
+    def filled(self, lines: Sequence[bytes]) -> Change:
+        """The change with these lines (without their line ends) inserted."""
+        data: list[bytes] = [b""] * (2 * len(lines) + 1)
+        patch = [""] * len(data)
+        data[::2], data[1::2] = self.data, lines
+        patch[::2], patch[1::2] = self.patch, map(_text, lines)
+        return Change(data=b"".join(data), patch="".join(patch))
+
+
+def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange]:
+    """The reusable changes of a file so far; kept with the tree, for callers to add to."""
+    return tree.derived(path, _none_yet)
+
+
+def _none_yet(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChange]:
+    return {}
+
+
+def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ReuseKey:
+    """What edits of a file must have in common to share a reusable change; `ids` are those in their lines."""
+    return tuple(
+        (e.index, e.rank, e.reindent, e.unit, normalized(b"".join(e.lines).decode(file.encoding), ids))
+        for e in in_order(edits)
+    )
+
+
+def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
+    """The inserted lines from the top of the file to its end, without their line ends."""
+    return [line.rstrip(b"\r\n") for line in chain.from_iterable(e.lines for e in in_order(edits))]
+
+
+def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
+    """Whether the change compiles with all lines of this key: it does if it compiles with normalized ones.
+
+    It then un-splices too, since that depends on the tags alone, which are part of the key.
+    """
+    lines = "".join(text for *_, text in key).encode(file.encoding).splitlines()
+    return compiles(change.filled(lines).data)
+
+
+def _parts(data: bytes, sign: bytes) -> list[bytes]:
+    """What is around the tagged lines, with their `sign` and line ends."""
+    parts = [b""]
+    for line in data.splitlines(keepends=True):
+        if tag_of(line):
+            parts[-1] += sign
+            parts.append(line[len(line.rstrip(b"\r\n")) :])
+        else:
+            parts[-1] += line
+    return parts
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "surrogateescape")

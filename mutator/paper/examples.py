@@ -1,0 +1,110 @@
+"""Figures of single experiments: found by a query over the results, confirmed on their traces, drawn."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+
+from mutator.errors import MutatorError
+from mutator.execution.traces import Traces
+from mutator.figures.figures import Drawing
+from mutator.figures.run_plot import marks_of
+from mutator.model import fault_label
+from mutator.paper.actions import WANTED, Pair, Wanted
+from mutator.paper.run_pair import draw
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+QUERY = "Query over results.csv"
+LOOKED_AT = 5  # candidates of each figure: each may have to be driven again
+
+
+def example_drawings(
+    folder: RunFolder,
+    frame: pd.DataFrame,
+    workspace: Workspace | None,
+    wanted: Sequence[Wanted] = WANTED,
+) -> tuple[Drawing, ...]:
+    """A drawing of each that is wanted; one without a figure says why there is none.
+
+    `frame` is of `statistics.frame.load`. Without a workspace there are no traces.
+    Experiments without a kept trace are driven again, which takes as long as a run of the target; their
+    traces are kept in the run folder.
+    """
+    made = []
+    for one in wanted:
+        try:
+            made.append(_drawing(folder, frame, workspace, one))
+        except MutatorError as err:
+            made.append(_none(one, f"the traces it needs cannot be had: {err.got}"))
+    return tuple(made)
+
+
+def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
+    """The rows that the query finds, in the order they are looked at; none where the target has no such
+    hazard or channel."""
+    numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
+    try:
+        found = numbers.query(wanted.query, engine="python")
+    except pd.errors.UndefinedVariableError:
+        return numbers.iloc[:0]
+    if wanted.order not in numbers:
+        return numbers.iloc[:0]
+    return found.sort_values([wanted.order, "experiment_id"], ascending=[False, True])
+
+
+def _drawing(folder: RunFolder, frame: pd.DataFrame, workspace: Workspace | None, wanted: Wanted) -> Drawing:
+    found = candidates(frame, wanted)
+    if found.empty:
+        return _none(wanted, "no experiment of this run fits the query")
+    if workspace is None:
+        return _none(wanted, "no fault library was found here to drive an experiment again with")
+    traces = Traces(workspace, folder)
+    manifest = traces.manifest
+    recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
+    if missing := [name for name in wanted.actions if name not in recorded]:
+        return _none(wanted, f"the target records no {missing[0]}")
+    looked_at = found.head(LOOKED_AT).to_dict("records")
+    for number, row in enumerate(looked_at, start=1):
+        record = traces.record(row["experiment_id"])
+        golden, faulty = traces.of(record.experiment_id)
+        pair = Pair.of(golden, faulty, record, manifest.time_channel, manifest.step_s, wanted.hazard)
+        steps = wanted.look(pair)
+        if steps is not None:
+            return Drawing(
+                name=wanted.name,
+                title=wanted.title,
+                note=_note(wanted, row, number, len(found)),
+                figure=draw(pair, steps, wanted, marks_of(record), manifest),
+                codes=(
+                    (QUERY, wanted.query),
+                    (
+                        "All of it, DIR being this run folder",
+                        f"mutator show {record.experiment_id} --run DIR",
+                    ),
+                ),
+            )
+    return _none(
+        wanted, f"it is not to be seen in the first {len(looked_at)} of the {len(found)} that the query finds"
+    )
+
+
+def _none(wanted: Wanted, why: str) -> Drawing:
+    return Drawing(
+        name=wanted.name,
+        title=wanted.title,
+        note=f"No figure: {why}.",
+        figure=None,
+        codes=((QUERY, wanted.query),),
+    )
+
+
+def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
+    """What is shown, how it was found, and what the traces say."""
+    fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
+    return (
+        f"{fault} in {row['scenario']}, {row['method']}, trigger "
+        f"{row['trigger']}: experiment {row['experiment_id']}. It is number {number} of the {of} that the "
+        f"query finds, largest {wanted.order} first: the first (of at most {LOOKED_AT} that are looked at) "
+        f"whose traces show that {wanted.confirmed}."
+    )

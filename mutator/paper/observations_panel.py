@@ -1,0 +1,86 @@
+"""The published observations in the report of a run: judged on its results, written, shown."""
+
+from collections.abc import Iterator
+
+from mutator._common.files import write_atomic
+from mutator.paper import observations, observations_page
+from mutator.paper.published import has_paper, load_paper
+from mutator.report.panel import Panel, rendered
+from mutator.report.panels.tables import write_csv
+from mutator.report.studies import ReportedRun
+
+FILE = "observations.md"
+_HTML = """\
+<h2>The paper's observations</h2>
+<p>{{ coverage }}</p>
+{% for one in observations %}
+<h3>{{ one.number }}. {{ one.title }} <span class="verdict">{{ one.verdict.value }}</span></h3>
+{{ table(one).as_html() }}
+<details><summary>Queries</summary>
+<pre>{{ session }}
+
+{% for claim in one.claims %}
+# {{ claim.number }} {{ claim.claim.says }}
+{% for answer in claim.answers %}
+{{ answer.query }}
+{% else %}
+# {{ claim.why }}
+{% endfor %}
+{% endfor %}
+</pre></details>
+{% endfor %}
+<p>{{ rules }}</p>
+"""
+
+
+def observations_panel(run: ReportedRun) -> Panel | None:
+    """The observations that the library cites, with observations.md and tables/observations.csv.
+
+    None when the library cites none, or when the run has none of the published fault types.
+    """
+    if run.workspace is None:
+        return None
+    references = run.workspace.library / "references"
+    file = references / observations.FILE
+    if not (file.is_file() and has_paper(references)):
+        return None
+    kinds = list(dict.fromkeys(kind for _, kind in load_paper(references).coverage))
+    missing = sorted(set(kinds) - set(run.frame["kind"]))
+    if len(missing) == len(kinds):
+        return None
+    ends = run.ends() or {}
+    frame = run.frame.assign(t_end=run.frame["scenario"].map(ends))
+    judged = observations.judge(file, frame, list(_lacks(run, missing)))
+    coverage = _coverage(run, len(kinds), missing)
+    shown_ends = tuple(sorted(ends.items()))
+    write_atomic(run.out / FILE, observations_page.markdown(judged, shown_ends, coverage).encode())
+    write_csv(observations_page.sheet(judged), run.out)
+    parts = [
+        "## The paper's observations",
+        coverage,
+        observations_page.verdicts(judged),
+        f"Their claims, rules, numbers and queries are in [{FILE}]({FILE}).",
+    ]
+    html = rendered(
+        _HTML,
+        coverage=coverage,
+        observations=judged,
+        table=observations_page.table,
+        session=observations_page.session(shown_ends),
+        rules=observations_page.rules(),
+    )
+    return Panel(anchor="observations", link="Observations", markdown="\n\n".join(parts), html=html)
+
+
+def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
+    """Why the run is not the paper's mixture of faults. A shard is only a part of its plan, too."""
+    if missing:
+        yield f"{len(missing)} of the paper's fault types are missing"
+    if run.done < (planned := int(run.folder.head["experiments"])):
+        yield f"only {run.done} of the {planned} experiments of the plan have been run"
+
+
+def _coverage(run: ReportedRun, kinds: int, missing: list[str]) -> str:
+    text = f"From {len(run.frame)} of {run.folder.planned} experiments, which have {kinds - len(missing)} "
+    text += f"of the paper's {kinds} fault types."
+    return text + (f" Missing: {', '.join(missing)}." if missing else "")

@@ -1,0 +1,82 @@
+"""How the experiments of a run were run, and what their equivalence check found."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mutator._common.tables import Table
+from mutator.engines.jobs import RunMode
+from mutator.errors import CheckFailed
+from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence as proof
+
+LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
+_WORDS = {
+    RunMode.FORK: "a fork of the golden run, taken right before the fault is first active",
+    RunMode.GOLDEN: "no run: the trigger never holds, so what came of the golden run comes of it",
+    RunMode.WARM: "a fork of the loaded program, from the run's beginning",
+    RunMode.REFERENCE: "a fresh interpreter (reference engine)",
+    None: "no run: there is no mutant",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EngineSummary:
+    """How many experiments were run how, and the equivalence check as a sentence and in few words.
+
+    `failed`: an experiment came out differently on the reference engine.
+    """
+
+    table: Table
+    proof: str
+    state: str
+    failed: bool
+
+
+def engine_summary(folder: RunFolder) -> EngineSummary | None:
+    """What the timings and `proof/` of a run folder say; None if neither names an engine."""
+    ways = _ways(folder)
+    if not ways and not (folder.path / proof.FOLDER).is_dir():
+        return None
+    sentence, state, failed = _proof(folder)
+    table = Table(heads=("how", "experiments"), rows=list(_lines(ways)), right=(1,))
+    return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
+
+
+def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
+    """RunMode many experiments were run how, and why not as was asked; the newest line of each counts."""
+    newest: dict[str, tuple[str | None, str]] = {}
+    for path in sorted((folder.path / "timings").glob("*.jsonl")):
+        for line in read_lines(path, TIMINGS_SCHEMA):
+            if "engine" in line:  # not in runs of before there were several
+                newest[line["experiment_id"]] = (line["engine"], line["why"])
+    return Counter(newest.values())
+
+
+def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
+    for how, words in _WORDS.items():
+        reasons = {why: count for (name, why), count in ways.items() if name == how}
+        if count := reasons.pop("", 0):
+            yield [words, str(count)]
+        by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
+        for why, count in by_count[:LISTED]:
+            yield [f"{words}, as it cannot be forked: {why}", str(count)]
+        if rest := sum(count for _, count in by_count[LISTED:]):
+            yield [f"{words}, for other reasons, which are in timings/", str(rest)]
+
+
+def _proof(folder: RunFolder) -> tuple[str, str, bool]:
+    """What is said of the proof, the same in few words, and whether it failed."""
+    try:
+        found = proof.judge(folder, read_records(folder.path))
+    except CheckFailed as err:
+        said = f"The proof failed, so nothing here is to be trusted: {err.got}."
+        return said, f"FAILED: {err.got}", True
+    if found is None:
+        return "All were run on the reference engine, so there is nothing to prove.", "none needed", False
+    same = f"{found.same} of {found.sampled} same"
+    if not found.whole:
+        said = f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run."
+        return said, f"not finished: {same}", False
+    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.", same, False

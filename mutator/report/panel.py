@@ -1,0 +1,33 @@
+"""Panels: the parts that a report consists of, each said once in Markdown and once in HTML."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+FOLDER = "report"  # of a run folder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One part of a report with its headings: `##` in Markdown, `<h2>` in HTML.
+
+    `anchor` is its id in the page, `link` its name in the page's bar.
+    """
+
+    anchor: str
+    link: str
+    markdown: str
+    html: "Markup"
+
+
+def rendered(template: str, **values: Any) -> "Markup":
+    """HTML of a Jinja template; every value that is not Markup is escaped."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return Markup(environment.from_string(template).render(**values))

@@ -1,0 +1,43 @@
+"""The figures of a run, written as files that both forms of the report show."""
+
+import base64
+from pathlib import Path
+
+from mutator.figures.figures import drawings, write_drawings
+from mutator.report.panel import Panel, rendered
+from mutator.report.studies import ReportedRun
+
+_HTML = """\
+<h2>Figures</h2>
+{% for drawing in drawings %}
+<h3>{{ drawing.title }}</h3>
+<p>{{ drawing.note }}
+{% for what, code in drawing.codes %}
+<br>{{ what }}: <code>{{ code }}</code>
+{% endfor %}</p>
+{% if drawing.figure %}
+<figure class="drawing"><img src="{{ picture(drawing) }}" alt="{{ drawing.title }}" decoding="async"></figure>
+{% endif %}
+{% endfor %}
+"""
+
+
+def figures_panel(run: ReportedRun) -> Panel | None:
+    """Figures of all results, then those that the study adds; None where there are none."""
+    made = drawings(run.frame) + (run.study.drawings(run) if run.study else ())
+    write_drawings(made, run.out)
+    if not made:
+        return None
+    parts = ["## Figures"]
+    for drawing in made:
+        parts += [f"### {drawing.title}", drawing.note]
+        parts += [f"{what}: `{code}`" for what, code in drawing.codes]
+        if drawing.figure is not None:
+            parts.append(f"![{drawing.title}]({drawing.link('svg')})")
+    html = rendered(_HTML, drawings=made, picture=lambda drawing: _embedded(run.out / drawing.link("svg")))
+    return Panel(anchor="figures", link="Figures", markdown="\n\n".join(parts), html=html)
+
+
+def _embedded(path: Path) -> str:
+    """The figure itself as an address, so that the page needs no file beside it."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(path.read_bytes()).decode()}"

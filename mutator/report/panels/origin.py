@@ -1,0 +1,64 @@
+"""Where results come from: how the experiments were run, and what they could be made again with."""
+
+from mutator._common.tables import Table
+from mutator.report.panel import Panel, rendered
+from mutator.report.studies import ReportedRun
+from mutator.review import gate
+
+PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
+_HTML = """\
+{% if engines %}
+<h2>How the experiments were run</h2>
+<p>{{ engines.proof }}</p>
+{{ engines.table.as_html("plain") }}
+{% endif %}
+<h2>Where this comes from</h2>
+<div class="scroll"><table class="plain facts"><tbody>
+{% for name, value in facts %}
+<tr><th scope="row">{{ name }}</th><td>{{ value }}</td></tr>
+{% endfor %}
+</tbody></table></div>
+"""
+
+
+def origin_panel(run: ReportedRun) -> Panel:
+    """Engines and equivalence check, plan, choices, sources, versions."""
+    engines, facts = run.engines, _facts(run)
+    parts = []
+    if engines:
+        parts += ["## How the experiments were run", engines.proof, engines.table.as_markdown()]
+    parts += ["## Where this comes from", Table(heads=("what", "value"), rows=facts).as_markdown()]
+    html = rendered(_HTML, engines=engines, facts=facts)
+    return Panel(anchor="origin", link="Origin", markdown="\n\n".join(parts), html=html)
+
+
+def _facts(run: ReportedRun) -> list[tuple[str, str]]:
+    folder = run.folder
+    reviewed = gate.approval_summary(folder.path)
+    head, versions = folder.head, folder.provenance
+    facts = {
+        "experiments": f"{len(run.rows)} of {folder.planned} planned",
+        **({"proof": run.engines.state} if run.engines else {}),
+        **({"reviewed": reviewed} if reviewed else {}),
+        "campaign": head["campaign"],
+        **_study(run),
+        "plan": head["plan"],
+        "seed": head["seed"],
+        "reading": head["reading"],
+        **{f"chosen: {name}": value for name, value in head["choices"].items() if value is not None},
+        **{f"digest of {name}": value for name, value in head["sources"].items()},
+        **{name: versions[name] for name in ("mutator", "python", "machine")},
+        **{name: versions["packages"][name] for name in PACKAGES if name in versions["packages"]},
+    }
+    return [(name, str(value)) for name, value in facts.items()]
+
+
+def _study(run: ReportedRun) -> dict[str, str]:
+    """The study that the campaign asks for, and why this report has nothing of it, if so."""
+    name = run.folder.head.get("study")
+    if not name:
+        return {}
+    if run.study:
+        return {"study": f"{name} ({run.study.about})"}
+    why = "cannot be loaded here" if run.workspace else "needs a fault library, of which there is none here"
+    return {"study": f"{name}, which {why}"}

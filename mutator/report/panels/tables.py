@@ -1,0 +1,87 @@
+"""Counts and statistics of a run as tables; the statistics are files of their own, too."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from mutator._common.files import write_atomic
+from mutator._common.tables import Table
+from mutator.outcomes.rows import (
+    by_fault_type,
+    by_method,
+    by_scenario,
+    count_table,
+    counts_by,
+    hazard_names,
+)
+from mutator.report.panel import Panel, rendered
+from mutator.report.studies import ReportedRun
+from mutator.statistics.sheet import Sheet
+from mutator.statistics.sheets import run_sheets
+from mutator.store.records import read_records
+
+FOLDER = "tables"  # of the report
+NOTES = (
+    "*Injected* counts the experiments that say something about their fault; a harness error, or a mutant "
+    "that could not be made, is counted apart. *Activated*: an injected statement ran while triggered. "
+    "*Manifested*: an actuator output then differed from the fault-free run. *Hazard, no alert*: no counted "
+    "alert at all."
+)
+_GROUPS = (
+    ("By fault type", "fault type", by_fault_type),
+    ("By scenario", "scenario", by_scenario),
+    ("By method", "method", by_method),
+)
+_HTML = """\
+<h2>Tables</h2>
+{% for title, table in counts %}
+<h3>{{ title }}</h3>
+{{ table.as_html("counts") }}
+{% endfor %}
+{% for sheet in sheets %}
+<h3>{{ sheet.title }}</h3>
+<p>{{ sheet.note }}</p>
+{{ sheet.table().as_html() }}
+{% endfor %}
+"""
+
+
+def tables_panel(run: ReportedRun) -> Panel:
+    """Counts by fault type, scenario and method, then what statistics say of them."""
+    counts = list(_counts(run))
+    sheets = _sheets(run)
+    write_sheets(sheets, run.out)
+    parts = [NOTES]
+    for title, table in counts:
+        parts += [f"## {title}", table.as_markdown()]
+    parts += [sheet.markdown().rstrip() for sheet in sheets]
+    html = rendered(_HTML, counts=counts, sheets=sheets)
+    return Panel(anchor="tables", link="Tables", markdown="\n\n".join(parts), html=html)
+
+
+def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
+    hazards = hazard_names(run.rows)
+    made = []
+    for title, head, key in _GROUPS:
+        heads, lines = count_table(counts_by(run.rows, key), head, hazards)
+        made.append((title, Table(heads=heads, rows=lines, right=range(1, len(heads)))))
+    return made
+
+
+def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
+    """The statistics of a run, beside published counts if its study has some of its fault types."""
+    published = run.study.published(run) if run.study else None
+    alerts = {name: record.alerts for name, record in read_records(run.folder.path).items()}
+    return run_sheets(run.frame, published, alerts, run.ends())
+
+
+def write_sheets(sheets: Sequence[Sheet], out: Path) -> None:
+    """Write each table into `out`/tables as <name>.csv and <name>.md."""
+    for sheet in sheets:
+        write_csv(sheet, out)
+        write_atomic(out / FOLDER / f"{sheet.name}.md", sheet.markdown().encode())
+
+
+def write_csv(sheet: Sheet, out: Path) -> None:
+    """Write a table into `out`/tables as <name>.csv."""
+    (out / FOLDER).mkdir(parents=True, exist_ok=True)
+    write_atomic(out / FOLDER / f"{sheet.name}.csv", sheet.csv().encode())

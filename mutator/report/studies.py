@@ -1,0 +1,102 @@
+"""What a study adds to the report of a campaign that asks for it."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from mutator.campaigns.studies import find_study
+from mutator.errors import MutatorError
+from mutator.figures.figures import Drawing
+from mutator.model import Status
+from mutator.outcomes.golden import load_trace
+from mutator.outcomes.reader import Results
+from mutator.outcomes.rows import Row
+from mutator.report.engines import EngineSummary, engine_summary
+from mutator.report.panel import FOLDER, Panel
+from mutator.statistics.frame import load
+from mutator.statistics.published import Published
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportedRun:
+    """What a report is made from.
+
+    `rows` are all experiments of results.csv, `frame` the usable ones. Without a workspace nothing can be
+    driven again, and no study can be asked. `study` is None if the campaign asks for none or if it is not
+    installed here.
+    """
+
+    folder: RunFolder
+    workspace: Workspace | None
+    rows: tuple[Row, ...]
+    frame: "DataFrame"
+    engines: EngineSummary | None
+    study: "Study | None"
+
+    @classmethod
+    def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
+        """A run folder whose results.csv is up to date."""
+        return cls(
+            folder=folder,
+            workspace=workspace,
+            rows=Results.of_run(folder.path).rows(),
+            frame=load(folder.path / "results.csv"),
+            engines=engine_summary(folder),
+            study=_study(folder) if workspace else None,
+        )
+
+    @property
+    def out(self) -> Path:
+        """The folder of the report."""
+        return self.folder.path / FOLDER
+
+    @property
+    def done(self) -> int:
+        """Experiments of the plan that ran."""
+        return sum(row.status is not Status.HARNESS_ERROR for row in self.rows)
+
+    def ends(self) -> dict[str, float] | None:
+        """When the golden runs of each scenario end, s of simulation; None if they cannot be read."""
+        if self.workspace is None:
+            return None
+        ends: dict[str, float] = {}
+        try:
+            manifest = self.workspace.manifest(self.folder.head["target"])
+            for scenario, changes in self.folder.head["goldens"]:
+                trace = load_trace(manifest, self.folder.golden(scenario, changes), [])
+                end = float(trace[manifest.time_channel][-1])
+                ends[scenario] = max(end, ends.get(scenario, end))
+        except (MutatorError, KeyError):
+            return None
+        return ends
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study:
+    """Published work, as its entry point in `mutator.studies` provides it; `about` cites it.
+
+    `check` finds problems of its data in a fault library. `published` gives the counts that stand beside a
+    run's in the tables, None where they do not fit the run. Each of `panels` may add a part to the report
+    and write files beside it; `drawings` adds figures.
+    """
+
+    about: str
+    check: Callable[[Workspace], Iterable[MutatorError]]
+    published: Callable[[ReportedRun], Published | None]
+    panels: tuple[Callable[[ReportedRun], Panel | None], ...]
+    drawings: Callable[[ReportedRun], tuple[Drawing, ...]]
+
+
+def _study(folder: RunFolder) -> Study | None:
+    """The study that a run's campaign asks for. A report can be written without it."""
+    name = folder.head.get("study")  # no key in older runs
+    try:
+        return cast(Study, find_study(name)) if name else None
+    except MutatorError:
+        return None

@@ -1,0 +1,46 @@
+"""Groups for readers, on the terminal and the page: a table of their values, their triggers in words."""
+
+import re
+from collections.abc import Sequence
+
+from mutator.model import Trigger
+from mutator.review.catalogue import Group
+from mutator.review.groups import Shape
+
+_TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
+_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # ids mean nothing to a reader
+
+
+def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows: what fills the holes, but for ids, a row for each fault."""
+    faults = {fault.id: fault for fault in group.faults}
+    names = list(dict.fromkeys(name for shape in group.shapes for name in _shown_holes(shape)))
+    rows = []
+    for shape in group.shapes:
+        for member, filled in zip(shape.members, shape.values, strict=True):
+            fault = faults.get(member)
+            if fault is not None:
+                found = dict(zip(shape.holes, filled, strict=True))
+                rows.append([fault.label, fault.reading, *(found.get(name, "") for name in names)])
+    return ["fault", "reading", *names], rows
+
+
+def _shown_holes(shape: Shape) -> list[str]:
+    return [name for name in shape.holes if not _ID_HOLE.match(name)]
+
+
+def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
+    """Each condition once, with the names of its triggers; random times as one range."""
+    named: dict[str, list[str]] = {}
+    times: list[float] = []
+    for trigger in triggers:
+        if time := _TIME.match(trigger.condition):
+            times.append(float(time[1]))
+        else:
+            named.setdefault(trigger.condition, []).append(trigger.name)
+    lines = [f"{condition}  ({', '.join(dict.fromkeys(names))})" for condition, names in named.items()]
+    if len(times) == 1:
+        lines.append("from a time on")
+    elif times:
+        lines.append(f"from a time on, {len(set(times))} of them from {min(times)} s to {max(times)} s")
+    return lines

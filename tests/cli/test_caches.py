@@ -1,0 +1,74 @@
+"""`mutator cache`."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common import caches
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+pytestmark = pytest.mark.usefixtures("nowhere")
+
+
+@pytest.fixture
+def filled() -> Path:
+    """A cache of three files of a target, 12 kB each on any disk."""
+    place = caches.of_target("car")
+    place.mkdir(parents=True)
+    for name in "abc":
+        (place / name).write_bytes(b"1" * 12_288)
+    return place
+
+
+def test_the_cache_is_listed(cli: Cli, filled: Path) -> None:
+    """What, how many, how much, and where; the same as JSON; a library is not needed."""
+    answer = cli("cache")
+    assert answer.code == 0, answer.err
+    assert [line.split() for line in answer.out.splitlines()[:3]] == [
+        ["what", "entries", "size"],
+        ["target", "car", "3", "36.9", "kB"],
+        ["total", "3", "36.9", "kB"],
+    ]
+    data = cli("cache", "--json").json
+    assert data["path"] == str(caches.folder())
+    assert [(e["what"], e["path"], e["bytes"]) for e in data["kept"]] == [
+        ("target car", str(filled / name), 12_288) for name in "abc"
+    ]
+
+
+def test_the_path_alone(cli: Cli) -> None:
+    """--path prints the folder, also one that is not there, for use in other commands."""
+    assert cli("cache", "--path").out == f"{caches.folder()}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "left"),
+    [(("--max", "25kB"), 2), (("--max", "0"), 0), (("--max", "2 GB"), 3), (("--clear",), 0)],
+)
+def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, ...], left: int) -> None:
+    """--max deletes down to a size, --clear everything, and both say how much that was."""
+    answer = cli("cache", *words, "--json")
+    assert (answer.code, len(answer.json["kept"]), len(answer.json["deleted"])) == (0, left, 3 - left)
+    assert len(list(filled.iterdir())) == left
+    assert "deleted 0 entries, 0.0 kB" in cli("cache", *words).out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--max", "much"), "size 'much'\n  expected: a number of B, kB, MB, GB or TB"),
+        (("--max", "-1"), "size '-1'"),
+        (("--max", "1GB", "--clear"), "expected: one of them"),
+        (("--path", "--clear"), "expected: one of them"),
+    ],
+)
+def test_what_makes_no_sense_deletes_nothing(
+    cli: Cli, filled: Path, words: tuple[str, ...], said: str
+) -> None:
+    """A size that is none, and two wishes at once, are wrong input."""
+    answer = cli("cache", *words)
+    assert answer.code == 2 and said in answer.err
+    assert len(list(filled.iterdir())) == 3

@@ -1,0 +1,166 @@
+"""Run folders of earlier versions: they open, compare, export, report and show; they are not run on.
+
+tests/fixtures/ has one folder for each schema of run folders, with the library and target it was made of.
+"""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from mutator import load_run
+from mutator.cli.main import main
+from mutator.execution import session
+from mutator.exports import Format
+from mutator.store import plan_file
+from mutator.store.records import read_records
+from mutator.store.run_folder import SCHEMA, RunFolder
+from mutator.workspace import Workspace
+
+FIXTURES = sorted((Path(__file__).parents[1] / "fixtures").glob("run-*"))
+EXPERIMENTS = 12
+KEPT = "07bbcc0632ee6107"  # whose trace is in every fixture
+
+Cli = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module", params=FIXTURES, ids=lambda path: path.name)
+def fixture(request: pytest.FixtureRequest) -> Path:
+    """A fixture, which no test may write to."""
+    path: Path = request.param
+    return path
+
+
+@pytest.fixture(scope="module")
+def place(fixture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of a fixture: `toy/` and the run folder `small/`, which tests may add to."""
+    return shutil.copytree(fixture, tmp_path_factory.mktemp("old") / fixture.name)
+
+
+@pytest.fixture(scope="module")
+def fresh(place: Path) -> Path:
+    """The same campaign of the same library, run by the code of today."""
+    workspace = Workspace.find(root=place / "toy")
+    out = place / "fresh"
+    assert session.run(workspace, "small", out, engine="reference", workers=2).exit_code == 0
+    return out
+
+
+@pytest.fixture
+def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
+    """Runs `mutator WORDS...` where the fixture's library is; gives exit code, output and errors."""
+    monkeypatch.chdir(place)
+    monkeypatch.setenv("MUTATOR_ROOT", str(place / "toy"))
+
+    def run(*words: object) -> tuple[int, str, str]:
+        capfd.readouterr()
+        code = main([str(word) for word in words])
+        return (code, *capfd.readouterr())
+
+    return run
+
+
+def test_there_is_one_for_each_schema() -> None:
+    """A run folder's schema never rises without a fixture of the new one beside those of the old."""
+    schemas = [RunFolder.open(path / "small").head["schema"] for path in FIXTURES]
+    assert [path.name.replace("-", "/") for path in FIXTURES] == schemas
+    assert schemas == [f"run/{number}" for number in range(1, len(schemas) + 1)] and schemas[-1] == SCHEMA
+
+
+def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
+    """Plan, records, results and patches are read; each id follows from its content as it did then."""
+    run = load_run(place / "small", root=place / "toy")
+    assert [*run.experiments] == [*plan_file.ids(run.path)]
+    assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
+    assert len(run.frame) == EXPERIMENTS == len(run.experiments)
+    assert {*run.frame.index} == {*read_records(run.path)} == {*read_records(run.path, "proof")}
+    assert all("# fi:" in run.patch(name) for name in run.experiments)
+    assert len(run.golden("A")) == len(run.trace(KEPT)) > 100
+
+
+def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
+    """Today's code gives the same plan, ids, result rows and trace digests."""
+    old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
+    assert new.head["plan"] == old.head["plan"]
+    assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
+    assert (fresh / "results.csv").read_bytes() == (old.path / "results.csv").read_bytes()
+    assert {name: record.trace_digest for name, record in read_records(new.path).items()} == {
+        name: record.trace_digest for name, record in read_records(old.path).items()
+    }
+
+
+def test_it_compares(cli: Cli, fresh: Path) -> None:
+    """Compared with itself and with a fresh run, whichever comes first, nothing changed."""
+    for one, other in (("small", "small"), ("small", "fresh"), ("fresh", "small")):
+        code, out, err = cli("compare", one, other, "--fail-on", "worse,new-hazard,unmatched")
+        assert code == 0, err
+        assert f"In both runs: {EXPERIMENTS} experiments" in out and "None of them changed" in out
+
+
+@pytest.mark.parametrize("format", list(Format))
+def test_it_exports(cli: Cli, place: Path, format: Format) -> None:
+    """Every format is written, with every experiment in it."""
+    file = place / f"export-{format.value}"
+    code, _, err = cli("export", "small", "--format", format.value, "--out", file)
+    assert code == 0, err
+    if format is Format.CSV:
+        assert file.read_bytes() == (place / "small" / "results.csv").read_bytes()
+    elif format is Format.PARQUET:
+        assert len(pd.read_parquet(file)) == EXPERIMENTS
+    elif format is Format.JUNIT:
+        assert file.read_text().count("<testcase ") == EXPERIMENTS
+    else:
+        mutants = json.loads(file.read_text())["files"]["toycar/sensing.py"]["mutants"]
+        assert {mutant["status"] for mutant in mutants} >= {"Killed", "Survived"}
+
+
+def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
+    """The report is written anew; the results are made again from the records, to the same bytes."""
+    shutil.copytree(place / "small", copy := place / "reported")
+    for derived in ("results.csv", "results.parquet", "timings.parquet"):
+        (copy / derived).unlink()
+    shutil.rmtree(copy / "report")
+    code, out, err = cli("report", copy)
+    assert code == 0, err
+    assert "hazard 3" in out and (copy / "report" / "index.html").is_file()
+    assert (copy / "results.csv").read_bytes() == (fixture / "small" / "results.csv").read_bytes()
+
+
+def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
+    """Its diff, verdict and plot are those that were kept: nothing is driven."""
+    code, out, err = cli("show", KEPT, "--run", "small", "--json")
+    assert code == 0, err
+    shown = json.loads(out)
+    assert shown["status"] == "ok" and shown["patch"].count("# fi:") > 2
+    assert Path(shown["plot"]).is_file() and not (place / "small" / "work").exists()
+
+
+def test_its_approvals_are_read(cli: Cli, place: Path) -> None:
+    """The decisions of then still approve what is injected, and the report says who made them."""
+    code, out, err = cli("review", "list", "--campaign", "small", "--json")
+    assert code == 0, err
+    approved = json.loads((place / "small" / "reviewed.json").read_text())["groups"]
+    assert out.count('"approved"') == len(approved) == 7
+
+
+def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another version of mutator, and other sources, are refused by name, and nothing is written."""
+    shutil.copytree(place / "small", copy := place / "resumed")
+    shutil.copytree(place / "toy", library := place / "changed")
+    before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
+    monkeypatch.setattr("mutator.campaigns.provenance.__version__", "99.0")
+    for words in (("run",), ("plan",)):
+        code, _, err = cli(*words, "small", "--out", copy)
+        assert code == 2 and "was planned by mutator 0.1.0 (run/1)" in err and "can still be read" in err
+    monkeypatch.undo()
+    with (library / "tree" / "toycar" / "driver.py").open("a") as file:
+        file.write("\n")
+    with (library / "fault_library" / "targets" / "toycar.yaml").open("a") as file:
+        file.write("\n")
+    code, _, err = cli("run", "small", "--out", copy, "--root", library)
+    assert code == 2 and "changed since this run was planned: target, manifest" in err
+    after = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
+    assert [entry for entry in after if entry[0].name != "workers"] == before

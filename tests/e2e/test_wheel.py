@@ -1,0 +1,161 @@
+"""sdist and wheel, built by the standard front end, installed and used where there is no clone."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import make_plan
+from mutator.workspace import Workspace
+
+pytestmark = pytest.mark.slow
+
+CLONE = Path(__file__).parents[2]
+SHIPPED = ("target", "fault_library", "templates")
+CHAFF = ("radar/chaff", "--scenario", "S1", "--trigger", "C2", "--value", "40")
+
+
+def call(*words: object, here: Path) -> str:
+    """Run a command in a folder and give its output; what it says goes into a failure's message."""
+    settings = ("MUTATOR_", "PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
+    done = subprocess.run(
+        [str(word) for word in words],
+        cwd=here,
+        env=kept | {"XDG_CACHE_HOME": str(here / "cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"{words}: {done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the clone, for a build leaves files in it."""
+    copy = tmp_path_factory.mktemp("copy") / "clone"
+    strangers = shutil.ignore_patterns(".*", "build", "dist", "runs", "*.egg-info")
+    return Path(shutil.copytree(CLONE, copy, ignore=strangers))
+
+
+def files(wheel: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.fixture(scope="module")
+def built(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sdist of the clone, and the wheel that was made from it."""
+    out = tmp_path_factory.mktemp("built")
+    call(sys.executable, "-m", "build", "--outdir", out, clone, here=out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def wheel(built: Path) -> Path:
+    return next(built.glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The interpreter of a fresh environment with the wheel and what it requires."""
+    home = tmp_path_factory.mktemp("environment")
+    call(sys.executable, "-m", "venv", home, here=home)
+    python = home / "bin" / "python"
+    call(python, "-m", "pip", "install", "-c", CLONE / "constraints.txt", wheel, here=home)
+    return python
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path) -> Path:
+    """An empty folder that no clone is above."""
+    assert not any((folder / "fault_library").exists() for folder in tmp_path.parents)
+    return tmp_path
+
+
+def test_a_wheel_from_the_clone_is_the_one_from_the_sdist(
+    clone: Path, built: Path, wheel: Path, tmp_path: Path
+) -> None:
+    """The sdist has all that a wheel needs, and nothing that an earlier build left gets into one."""
+    stale = clone / "build" / "lib" / "mutator" / "stale.py"
+    stale.parent.mkdir(parents=True, exist_ok=True)
+    stale.touch()
+    call(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path, clone, here=tmp_path)
+    assert files(next(tmp_path.glob("*.whl"))) == files(wheel)
+    with tarfile.open(next(built.glob("*.tar.gz"))) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {
+        "LICENSE",
+        "CHANGELOG.md",
+        "constraints.txt",
+        "tests/e2e/test_wheel.py",
+        "docs/README.md",
+    } <= names
+
+
+def test_a_wheel_holds_the_harness_and_what_ships_with_it(wheel: Path) -> None:
+    """The package, its data and the archive; no test, no bytecode, nothing of the controller to import."""
+    found = files(wheel)
+    tops = {name.partition("/")[0] for name in found}
+    assert tops == {"mutator", *(top for top in tops if top.endswith(".dist-info"))}
+    data = {name for name in found if name.startswith("mutator/") and not name.endswith(".py")}
+    sources = {p.relative_to(CLONE).as_posix() for p in (CLONE / "mutator").rglob("*") if p.is_file()}
+    assert {n for n in sources if not n.endswith((".py", ".pyc"))} == data - {"mutator/_common/shipped.zip"}
+    assert {n for n in sources if n.endswith(".py")} == {n for n in found if n.endswith(".py")}
+    with zipfile.ZipFile(BytesIO(found["mutator/_common/shipped.zip"])) as archive:
+        shipped = {name: archive.read(name) for name in archive.namelist()}
+    ours = {p for folder in SHIPPED for p in (CLONE / folder).rglob("*") if p.is_file()}
+    assert {p.relative_to(CLONE).as_posix() for p in ours if p.suffix != ".pyc"} == {*shipped}
+    assert all((CLONE / name).read_bytes() == data for name, data in shipped.items())
+
+
+def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhere: Path) -> None:
+    """`import selfdrive` fails in an environment with the wheel; after a use there is no bytecode of it."""
+    code = "import importlib.util; print(importlib.util.find_spec('selfdrive'))"
+    assert call(python, "-c", code, here=elsewhere) == "None\n"
+    mutator = python.with_name("mutator")
+    call(mutator, "try", *CHAFF, "--out", elsewhere / "tried", here=elsewhere)
+    assert not list((python.parents[1] / "lib").rglob("selfdrive*"))
+    [unpacked] = (elsewhere / "cache" / "mutator" / "shipped").iterdir()
+    assert (unpacked / "target" / "selfdrive" / "__init__.py").is_file()
+    assert not [*unpacked.rglob("*.pyc"), *unpacked.rglob("__pycache__")]
+
+
+def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
+    """The library is listed, one fault is tried, a campaign is run: the same experiments as in the clone."""
+    mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
+    listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
+    assert [spec["name"] for spec in listed["specs"]] == [spec.name for spec in workspace.specs()]
+    tried = call(mutator, "try", *CHAFF, here=elsewhere)
+    assert "d_rel = d_rel + 40.0" in tried
+    assert "experiment     0ef69fca1dbb8f42" in tried
+    assert "verdict: hazard" in tried
+    ran = call(mutator, "run", "quickstart", "--out", "runs/q", "-n", 2, here=elsewhere)
+    assert "60 of 60 experiments done" in ran
+    head = json.loads((elsewhere / "runs/q/run.json").read_text())
+    plan = make_plan(workspace, "quickstart")
+    assert head["plan"] == plan.digest
+    assert head["sources"]["target"] == workspace.manifest("openpilot").tree.digest
+    assert "60 experiments" in (elsewhere / "runs/q/report/REPORT.md").read_text()
+
+
+def test_what_is_edited_in_a_new_library_is_what_runs(python: Path, elsewhere: Path) -> None:
+    """`mutator init`, an edit of a template and of a spec, and `mutator try` there shows and drives both."""
+    mutator = python.with_name("mutator")
+    call(mutator, "init", "mine", here=elsewhere)
+    mine = elsewhere / "mine"
+    template = mine / "templates" / "offset.py.j2"
+    template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.5", 1))
+    spec = mine / "fault_library" / "faults" / "radar" / "chaff.yaml"
+    spec.write_text(spec.read_text().replace("after_assign: d_rel", "after_assign: v_rel"))
+    tried = call(mutator, "try", *CHAFF, here=mine)
+    assert "v_rel = v_rel + 40.0 * 1.5" in tried
+    assert "verdict: " in tried

@@ -1,0 +1,93 @@
+"""Where caches lie, what is in them, and what is deleted first."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from mutator._common import caches
+
+
+@pytest.fixture
+def filled() -> Path:
+    """A cache with passed checks of two files, used last, and three files of a target, used one by one."""
+    checks = caches.of_checks() / "ab12" / "golden" / "A"
+    checks.mkdir(parents=True)
+    (checks / "trace.npz").write_bytes(b"1" * 5000)
+    (checks.parents[1] / "checks.json").write_bytes(b"2")
+    compiled = caches.of_target("car") / "compiled"
+    compiled.mkdir(parents=True)
+    for used, path in enumerate((compiled / "hog.so", compiled.parent / "b.npy", compiled.parent / "a.npy")):
+        path.write_bytes(b"3" * 9000)
+        os.utime(path, (1000 + used, 1000 + used))
+    return caches.folder()
+
+
+@pytest.mark.parametrize("named", ["", "relative/folder"])
+def test_the_home_has_the_cache_unless_a_folder_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str
+) -> None:
+    """XDG_CACHE_HOME is obeyed where it is a whole path, as its specification says; else ~/.cache."""
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert caches.folder() == tmp_path / "mutator"
+    monkeypatch.setenv("XDG_CACHE_HOME", named)
+    assert caches.folder() == tmp_path / "home" / ".cache" / "mutator"
+
+
+def test_without_a_home_nothing_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nobody knows the home folder the cache is one that cannot be made, and so empty."""
+
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", no_home)
+    with pytest.raises(OSError):
+        caches.of_target("car").mkdir(parents=True)
+    assert (caches.entries(), caches.prune(0), caches.clear()) == ([], [], [])
+
+
+@pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain"])
+def test_any_name_of_a_target_is_one_folder(name: str) -> None:
+    """No target's folder lies outside the cache or inside another one's."""
+    place = caches.of_target(name)
+    assert place.resolve().parent == (caches.folder() / "targets").resolve()
+
+
+def test_entries_are_checks_and_the_files_of_targets(filled: Path) -> None:
+    """Checks are kept as a whole, a target's files one by one; sizes are what they take on the disk."""
+    found = [(entry.what, entry.path.relative_to(filled).as_posix()) for entry in caches.entries()]
+    files = ["targets/car/a.npy", "targets/car/b.npy", "targets/car/compiled/hog.so"]
+    assert found == [("checks", "checks/ab12"), *(("target car", file) for file in files)]
+    assert all(entry.size >= 5000 for entry in caches.entries())
+
+
+def test_a_table_with_holes_counts_as_what_it_takes() -> None:
+    """A file of 800 MB that holds nothing yet does not have the rest of the cache deleted."""
+    place = caches.of_target("car")
+    place.mkdir(parents=True)
+    with (place / "table").open("wb") as file:
+        file.truncate(800_000_000)
+    [entry] = caches.entries()
+    assert entry.size < 1_000_000
+
+
+def test_the_least_recently_used_go_first(filled: Path) -> None:
+    """Pruning deletes from the oldest on until the rest is small enough, and no more."""
+    sizes = {entry.path.name: entry.size for entry in caches.entries()}
+    kept = sizes["ab12"] + sizes["a.npy"]
+    assert [entry.path.name for entry in caches.prune(kept)] == ["hog.so", "b.npy"]
+    assert [entry.path.name for entry in caches.entries()] == ["ab12", "a.npy"]
+    assert caches.prune(kept) == []
+
+
+def test_clearing_leaves_no_file(filled: Path) -> None:
+    """All is deleted, and only what is in the cache: a link goes, what it leads to stays."""
+    outside = filled.parent / "outside"
+    outside.mkdir()
+    (outside / "kept").write_text("kept")
+    (filled / "targets" / "car" / "link").symlink_to(outside)
+    assert len(caches.clear()) == 5
+    assert [path for path in filled.rglob("*") if path.is_file()] == []
+    assert (outside / "kept").exists()

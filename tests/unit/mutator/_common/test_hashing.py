@@ -1,0 +1,98 @@
+"""Ids that outlive new fields."""
+
+from dataclasses import dataclass, replace
+
+from mutator import model
+from mutator._common.hashing import added, added_values, content_id, digest, plain
+from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Method
+
+LOCATION = FaultLocation(
+    path="pkg/radar.py", function="measure", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="d_rel")
+)
+PARAMS = (("by", 40.0), ("target", "d_rel"))
+CONDITION = "hwt <= 2.0"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Injection(model.Injection):
+    """An injection of a later version."""
+
+    every: int = added(1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trigger(model.Trigger):
+    """A trigger of a later version."""
+
+    fade: Hold | None = added(None)
+
+
+@dataclass(frozen=True)
+class Fault(model.Fault):
+    """A fault of a later version."""
+
+    tags: tuple[str, ...] = added(())
+
+
+@dataclass(frozen=True)
+class Experiment(model.Experiment):
+    """An experiment of a later version."""
+
+    repeat: int = added(0)
+
+
+def fault(kind: type[model.Fault], injection: type[model.Injection], **more: object) -> model.Fault:
+    """A chaff of 40 m, of these classes."""
+    injections = (injection(location=LOCATION, model="offset", params=PARAMS),)
+    return kind("radar/chaff/d", "radar", "chaff", "as_described", 40.0, "m", "H1", injections, **more)
+
+
+def experiment(
+    kind: type[model.Experiment], trigger: type[model.Trigger], of: model.Fault, **more: object
+) -> model.Experiment:
+    """That fault in S1 under C1, of these classes."""
+    return kind(of, "S1", "d" * 64, Method.GUIDED, trigger(name="C1", condition=CONDITION), 7, **more)
+
+
+OLD_FAULT = fault(model.Fault, model.Injection)
+OLD = experiment(model.Experiment, model.Trigger, OLD_FAULT)
+
+
+def test_ids_are_those_of_the_first_release() -> None:
+    """These ids stand in results that were cited: they are the same in every version."""
+    assert (OLD_FAULT.id, OLD.id) == ("a128796d71e1fdf8", "876900fefe457b38")
+    assert content_id([OLD_FAULT.injections[0], OLD.trigger]) == "f51174baeee5206c"
+
+
+def test_an_added_field_changes_no_id_while_it_holds_its_default() -> None:
+    """Records with fields of a later version have the ids and plan lines of those without."""
+    new_fault = fault(Fault, Injection)
+    new = experiment(Experiment, Trigger, new_fault)
+    assert (new_fault.id, new.id) == (OLD_FAULT.id, OLD.id)
+    assert plain(new_fault) == plain(OLD_FAULT) and plain(new.trigger) == plain(OLD.trigger)
+    assert (added_values(new), added_values(OLD)) == ({}, {})
+
+
+def test_an_added_field_that_says_something_changes_the_id() -> None:
+    """Any other value than the default makes another fault and another experiment, wherever it stands."""
+    tagged = fault(Fault, Injection, tags=("wet",))
+    injection = Injection(location=LOCATION, model="offset", params=PARAMS, every=2)
+    rarer = replace(fault(Fault, Injection), injections=(injection,))
+    assert len({OLD_FAULT.id, tagged.id, rarer.id}) == 3
+    new = experiment(Experiment, Trigger, OLD_FAULT)
+    of_tagged = experiment(Experiment, Trigger, tagged)
+    fading = replace(new, trigger=Trigger(name="C1", condition=CONDITION, fade=Hold.FOR))
+    assert len({OLD.id, replace(new, repeat=1).id, fading.id, of_tagged.id}) == 4
+    assert plain(fading.trigger)["fade"] == "for"
+    assert added_values(replace(new, repeat=1)) == {"repeat": 1}
+
+
+def test_a_field_that_is_not_added_counts_also_with_its_default() -> None:
+    """The first release hashed every field; what it hashed stays in."""
+    assert plain(Anchor(kind=AnchorKind.ENTRY)) == {"kind": "entry", "name": "", "nth": None}
+
+
+def test_digests_tell_kinds_of_values_apart() -> None:
+    """A number, its text, its truth value, and lists of these have digests of their own."""
+    values = [1.0, 1, True, "1", None, [1], [[1]], {"a": 1}, b"1 "]
+    assert len({digest(value) for value in values}) == len(values)

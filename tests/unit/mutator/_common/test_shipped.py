@@ -1,0 +1,176 @@
+"""What ships with the harness: the clone's folders, or an archive that is unpacked and kept as it is."""
+
+from collections.abc import Callable
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from mutator._common import shipped
+from mutator._common.shipped import refuse_shipped, shipped_folder, write_library
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.mutants.building import build
+from mutator.triggers.conditions import always
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[4]
+FILES = {"target/selfdrive/a.py": b"A = 1\n", "fault_library/b.yaml": b"b: 1\n", "templates/c.j2": b"c\n"}
+
+
+@pytest.fixture
+def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An installation that came as a wheel, as far as what ships with it goes, and an empty cache."""
+    path = tmp_path / "shipped.zip"
+    with ZipFile(path, "w") as file:
+        for name, data in FILES.items():
+            file.writestr(name, data)
+    monkeypatch.setattr(shipped, "ARCHIVE", path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return path
+
+
+def as_in_a_new_process() -> Path:
+    shipped._unpacked.cache_clear()
+    return shipped_folder()
+
+
+def test_a_clone_ships_its_own_folders() -> None:
+    """Without an archive, as in a clone or an editable install, the folders beside the package are meant."""
+    assert shipped_folder() == CLONE
+
+
+def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
+    """Its files, and nothing else, come to lie below the user's cache, and stay for the next process."""
+    folder = shipped_folder()
+    assert folder.is_relative_to(tmp_path / "cache" / "mutator")
+    found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    assert found == FILES
+    before = (folder / "templates/c.j2").stat()
+    assert as_in_a_new_process() == folder
+    after = (folder / "templates/c.j2").stat()
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+    assert [p.name for p in folder.parent.iterdir()] == [folder.name]
+
+
+def test_another_archive_has_another_folder(archive: Path) -> None:
+    """Two versions of the harness do not disturb each other."""
+    folder = shipped_folder()
+    with ZipFile(archive, "a") as file:
+        file.writestr("target/selfdrive/new.py", b"")
+    assert as_in_a_new_process() != folder
+    assert (folder / "target/selfdrive/a.py").exists()
+
+
+def edit(folder: Path) -> None:
+    (folder / "target/selfdrive/a.py").write_bytes(b"A = 2\n")  # of the same size
+
+
+def add(folder: Path) -> None:
+    (folder / "target/selfdrive/extra.py").touch()
+
+
+def delete(folder: Path) -> None:
+    (folder / "templates/c.j2").unlink()
+
+
+@pytest.mark.parametrize(
+    ("change", "named"), [(edit, "selfdrive/a.py"), (add, "selfdrive/extra.py"), (delete, "templates/c.j2")]
+)
+def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None], named: str) -> None:
+    """What was edited in the cache never runs as what ships: the file is named, and the way out."""
+    change(shipped_folder())
+    with pytest.raises(
+        MutatorError, match=rf"no longer as it ships: .*{named}.*delete this folder.*mutator init"
+    ):
+        as_in_a_new_process()
+
+
+def test_bytecode_in_the_cache_is_no_change(archive: Path) -> None:
+    """Bytecode is never part of a tree, so what somebody left there by an import does no harm."""
+    folder = shipped_folder()
+    (folder / "target/selfdrive/__pycache__").mkdir()
+    (folder / "target/selfdrive/__pycache__/a.cpython-311.pyc").touch()
+    assert as_in_a_new_process() == folder
+
+
+def test_a_cache_that_cannot_be_written(
+    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The error says which folder it is and how to choose another."""
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(MutatorError, match=r"file/mutator/shipped.*cannot unpack.*set XDG_CACHE_HOME"):
+        shipped_folder()
+
+
+def test_a_faster_process_wins(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """When another process has unpacked it meanwhile, its folder is taken, and nothing is left over."""
+    folder = shipped_folder()
+    monkeypatch.setattr(Path, "is_dir", lambda path, **_: path.exists() and not _first(seen, path))
+    seen: set[Path] = set()
+    assert as_in_a_new_process() == folder
+    assert folder in seen
+    assert [p.name for p in folder.parent.iterdir()] == [folder.name]
+
+
+def _first(seen: set[Path], path: Path) -> bool:
+    """True the first time: the folder is not there yet when it is looked for."""
+    new = path not in seen
+    seen.add(path)
+    return new
+
+
+def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
+    """Files of the unpacked library are refused for writing, others are not."""
+    refuse_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
+    with pytest.raises(MutatorError, match=r"ships with mutator.*mutator init DIR"):
+        refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
+
+
+def test_a_new_library_is_a_copy_that_finds_the_controller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only the manifest's `root` is not as it ships, and the folder works wherever it is moved."""
+    write_library(tmp_path / "new")
+    (tmp_path / "deep").mkdir()
+    moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")
+    for name in ("fault_library", "templates"):
+        for path in (CLONE / name).rglob("*.*"):
+            copy = moved / path.relative_to(CLONE)
+            if path.parent.name != "targets":
+                assert copy.read_bytes() == path.read_bytes()
+    monkeypatch.chdir(moved / "fault_library")
+    found, ours = Workspace.find(), Workspace.find(CLONE)
+    assert (found.library, found.templates) == (moved / "fault_library", moved / "templates")
+    manifest = found.manifest("openpilot")
+    assert (manifest.root, manifest.tree.digest) == (CLONE / "target", ours.manifest("openpilot").tree.digest)
+    assert manifest.path.read_text().splitlines()[3] == "root: shipped:target"
+
+
+def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
+    """An edited template and an edited spec show in the mutant's diff."""
+    write_library(tmp_path / "new")
+    template = tmp_path / "new/templates/offset.py.j2"
+    template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))
+    spec = tmp_path / "new/fault_library/faults/radar/chaff.yaml"
+    spec.write_text(spec.read_text().replace("after_assign: d_rel", "after_assign: v_rel"))
+    workspace = Workspace.find(tmp_path / "new")
+    manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
+    fault = expand(workspace.spec("radar/chaff"), 0, "as_described", models=models, manifest=manifest)[0]
+    patch = build(manifest, models, fault, always(armed_after_s=1.5)).patch
+    assert f"v_rel = v_rel + {fault.value}.0 * 1.0" in patch
+
+
+@pytest.mark.parametrize("kind", ["file", "full", "below a file"])
+def test_only_an_empty_folder_becomes_a_library(tmp_path: Path, kind: str) -> None:
+    """Nothing of the user's is mixed with a new library, let alone overwritten."""
+    place = tmp_path / "place"
+    if kind == "full":
+        place.mkdir()
+        (place / "thesis.tex").write_text("mine")
+    else:
+        place.write_text("mine")
+    with pytest.raises(MutatorError, match="expected a new or empty folder"):
+        write_library(place / "below" if kind == "below a file" else place)
+    assert [p.read_text() for p in (tmp_path.rglob("*")) if p.is_file()] == ["mine"]

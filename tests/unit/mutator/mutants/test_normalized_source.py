@@ -1,0 +1,74 @@
+"""Sources with the same normalized source compile together."""
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from mutator.mutants.normalized_source import compiles, normalized
+
+NUMBERS = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False).map(lambda x: repr(abs(x))), st.integers(0).map(str)
+)
+AROUND = ["x = {}", "x{} = 1", "x = '{}'", "x = -{}", "x = {}.5", "x = 1{}", "x = 0x{}", "x = {}j", "x[{}]"]
+AROUND += ["x = '\\{}'", "x = f'{{{}}}'", "x = {} if {} else 0", "é{} = 1", "x = {}_0", "x = {}.real"]
+IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("x + 35.0", "x + 0.0"),
+        ("x - 1e-09", "x - 0.0"),
+        ("min(7, 1.5e+300)", "min(0, 0.0)"),
+        ("x5 = a[12]", "x5 = a[0]"),
+        ("float('nan')", "float('nan')"),
+        ("007", "007"),
+        ("123456789012345678901", "123456789012345678901"),
+        ("5. + .5 + 5j + 0x5 + 5_0", "5. + .5 + 5j + 0x5 + 5_0"),
+        ("'\\1'", "'\\1'"),
+        ("é5 = 5", "é5 = 0"),
+    ],
+)
+def test_what_counts_as_a_number(text: str, kept: str) -> None:
+    """Whole decimal literals of a usual length become a zero of their kind; nothing else changes."""
+    assert normalized(text, ()) == kept
+
+
+def test_ids_stay_apart() -> None:
+    """Equal ids stay equal and different ones different, whatever they are."""
+    ids = ("00000001", "deadbeef")
+    text = "a('00000001'); b('deadbeef', '00000001')"
+    assert normalized(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
+    assert normalized(text, ids) != normalized("a('00000001'); b('00000001', 'deadbeef')", ids)
+
+
+def test_where_the_value_matters() -> None:
+    """Where the compiler cares which id or number it is, the normalized source does not compile."""
+    assert compiles(b"x = 12345678")
+    assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
+    assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
+    assert not compiles(normalized(r"x = '\U0000abcd'", ["0000abcd"]).encode())
+
+
+@pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
+@settings(deadline=None)
+@given(st.sampled_from(AROUND), NUMBERS)
+@example("x = {}", "07")
+def test_numbers(around: str, number: str) -> None:
+    """If the normalized source compiles, so does the source."""
+    text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
+    if compiles(normalized(text, ()).encode()):
+        compile(text, "x", "exec")
+
+
+@pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
+@settings(deadline=None)
+@given(st.sampled_from(AROUND), IDS)
+@example("x = {}", "12345678")
+@example("x = {}", "abcdefab")
+@example("x = 1{}", "00000000")
+def test_ids(around: str, name: str) -> None:
+    """The same for ids: this one in a place, or any other."""
+    text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
+    if compiles(normalized(text, [name]).encode()):
+        compile(text, "x", "exec")

@@ -1,0 +1,120 @@
+"""Reusable changes give what splicing gives, in files of every form."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Value
+from mutator.mutants import splicing
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.building import InvalidMutant, build, build_directly
+from mutator.mutants.patches import changed_file
+from mutator.mutants.reusable_changes import (
+    Change,
+    ReusableChange,
+    always_compiles,
+    inserted_lines,
+    known_changes,
+    reuse_key,
+)
+from mutator.triggers.kinds import always
+from mutator.workspace import Workspace
+
+TEXTS = [
+    "def f():\n    x = 1\n    return x\n",
+    "def f():\r\n    x = 1\r\n    return x\r\n",
+    "def f():\n    x = 1",
+    "def f():\r\n    x = 1",
+    "def f():\n\tx = (\n\t  1)\n\treturn x\n",
+    "# coding: latin-1\ndef f():\n    x = '\xe9'\n",
+]
+SENSOR = "toycar/sensor.py"
+
+
+def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange, Change, list[bytes], bool]:
+    """The reusable change, the spliced one, its inserted lines, and whether all of its kind compile."""
+    file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
+    kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
+    site = file.resolve(FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name="x")))
+    make = splicing.guard if guard else splicing.insertion
+    edits = [make(file, site, [code], name), splicing.probe_import(file, "pack")]
+    pieces = splicing.apply_edits(file, edits)
+    made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
+    reusable = ReusableChange.of(made)
+    compiles = always_compiles(file, reusable, reuse_key(file, edits, [name]))
+    return reusable, made, inserted_lines(edits), compiles
+
+
+@pytest.mark.parametrize("guard", [False, True])
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
+    """The reusable change of one mutant, filled with the lines of another of its kind, equals the other's."""
+    code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
+    reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
+    other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
+    assert compiles
+    assert reusable == other
+    assert reusable.filled(lines) == made
+
+
+def test_a_change_that_compiles_only_with_some_values() -> None:
+    """A change that compiles with these values, but not with all, is not said to compile always."""
+    assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
+
+
+def fault(value: Value, **location: object) -> Fault:
+    """`gap = value` in the toy's sensor, or somewhere."""
+    anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
+    place = FaultLocation(**{"path": SENSOR, "function": "Sensor.measure", "anchor": anchor, **location})
+    injection = Injection(location=place, model="stuck", params=(("target", "gap"), ("value", value)))
+    return Fault(
+        spec="s",
+        module="m",
+        fault_type="f",
+        reading="r",
+        value=None,
+        unit="-",
+        aim="H1",
+        injections=(injection,),
+    )
+
+
+def test_a_change_is_spliced_once(toy: Workspace) -> None:
+    """Another number reuses the change; a sign, another type or a value that is not finite does not."""
+    manifest, models = toy.manifest("toy"), toy.fault_models()
+    known = known_changes(manifest.tree, SENSOR)
+    counts = []
+    for value in (1.0, 2.5, 1e-9, -1.0, float("nan"), 3, None):
+        assert build(manifest, models, fault(value), always()) == build_directly(
+            manifest, models, fault(value), always()
+        )
+        counts.append(len(known))
+    assert counts == [1, 1, 1, 2, 3, 4, 5]
+
+
+def test_errors_are_those_of_splicing(toy: Workspace, tmp_path: Path) -> None:
+    """A mutant that cannot be built gets the same error, even if one of its kind was built before."""
+    templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
+    (templates / "stuck.py.j2").write_text(
+        "match {{ target }}:\n    case {1: a, {{ value }}: b}:\n        {{ target }} = a\n"
+    )
+    manifest = toy.manifest("toy")
+    models = Workspace(library=toy.library, templates=templates).fault_models()
+    build(manifest, models, fault(2), always())
+    for wrong in (
+        fault(1),
+        fault(2, function="Sensor.mesure"),
+        fault(True),
+        fault("gap"),
+        fault(2, path="../x"),
+    ):
+        said = []
+        for way in (build, build_directly):
+            with pytest.raises(MutatorError) as caught:
+                way(manifest, models, wrong, always())
+            said.append((type(caught.value), str(caught.value)))
+        assert said[0] == said[1]
+    with pytest.raises(InvalidMutant, match="does not compile"):
+        build(manifest, models, fault(1), always())

@@ -1,0 +1,102 @@
+"""What an unsafe control action looks like in two traces."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mutator.model import Record
+from mutator.paper.actions import Look, Pair, at_a_wrong_time, both_unavailable, brake_too_short
+
+T = np.arange(0, 10, 0.1)
+NONE = np.zeros_like(T)
+
+
+def during(begin: float, end: float) -> np.ndarray:
+    """Half of full gas or brake from `begin` until before `end`, s."""
+    return np.where((begin - 0.01 < T) & (end - 0.01 > T), 0.5, 0.0)
+
+
+def pair(golden: dict[str, np.ndarray], faulty: dict[str, np.ndarray]) -> Pair:
+    """A fault active at 2 s, an alert at 4 s, and what follows until 8 s."""
+    none = {"gas": NONE, "brake": NONE}
+    return Pair(t=T, golden=none | golden, faulty=none | faulty, step_s=0.1, start=2.0, end=8.0, alert=4.0)
+
+
+def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
+    """First and last time of the steps that show it."""
+    steps = look(given)
+    return None if steps is None else (round(T[steps][0], 1), round(T[steps][-1], 1))
+
+
+@pytest.mark.parametrize(
+    ("end", "shown"),
+    [
+        (2.0, None),  # no braking worth the name after the activation
+        (3.0, (3.0, 5.9)),  # 1 s of 4 s
+        (4.5, None),  # 2.5 s of 4 s
+        (6.0, None),  # as long as it should be
+    ],
+)
+def test_braking_is_too_short_when_it_lasts_half_as_long_at_most(
+    end: float, shown: tuple[float, float] | None
+) -> None:
+    """Braking time counts from the activation on; what came before is not the fault's."""
+    given = pair({"brake": during(1, 6)}, {"brake": during(1, end)})
+    assert stretch(brake_too_short, given) == shown
+
+
+def test_braking_that_nobody_needs_is_not_too_short() -> None:
+    """Where the fault-free run does not brake either, nothing is too short."""
+    assert brake_too_short(pair({}, {})) is None
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "shown"),
+    [
+        (5.0, 7.0, (5.0, 6.9)),
+        (5.0, 5.4, None),  # a flicker
+        (0.5, 1.9, None),  # before the activation
+        (8.1, 9.9, None),  # after the hazard
+        (3.0, 4.0, None),  # golden does the same
+    ],
+)
+def test_gas_is_at_a_wrong_time_where_golden_gives_none(
+    begin: float, end: float, shown: tuple[float, float] | None
+) -> None:
+    """Between activation and hazard, and for half a second at least."""
+    given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
+    assert stretch(at_a_wrong_time("gas"), given) == shown
+    assert at_a_wrong_time("brake")(given) is None
+
+
+BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
+
+
+@pytest.mark.parametrize(
+    ("golden", "last", "shown"),
+    [
+        (BOTH, 4.5, (4.5, 9.9)),
+        (BOTH, 5.5, None),  # more than 1 s after the alert
+        ({"brake": during(1, 6)}, 4.5, None),  # golden has no use for gas
+    ],
+)
+def test_both_are_unavailable_when_they_are_gone_soon_after_the_alert(
+    golden: dict[str, np.ndarray], last: float, shown: tuple[float, float] | None
+) -> None:
+    """From the last gas or brake to the end of the run."""
+    given = pair(golden, {"brake": during(1, last)})
+    assert stretch(both_unavailable, given) == shown
+    assert both_unavailable(replace(given, alert=None)) is None
+
+
+def test_a_pair_is_cut_to_the_steps_both_runs_have(record: Callable[..., Record]) -> None:
+    """The shorter run bounds it; hazard, activation and first alert are those of the record."""
+    found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
+    long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
+    for golden, faulty in ((long, short), (short, long)):
+        whole = Pair.of(golden, faulty, found, "t", 0.1, None)
+        assert {len(whole.t), len(whole.golden["gas"]), len(whole.faulty["gas"])} == {70}
+        assert (whole.start, whole.end, whole.alert) == (2.0, T[69], 3.5)
+        assert Pair.of(golden, faulty, found, "t", 0.1, "H1").end == 5.0

@@ -1,0 +1,160 @@
+"""Figures of single experiments, on the toy car: found by query, confirmed on traces, drawn."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mutator.campaigns.plans import Choices
+from mutator.execution.running import run_campaign
+from mutator.figures.figures import Drawing, write_drawings
+from mutator.paper.actions import WANTED, Pair, Wanted
+from mutator.paper.examples import candidates, example_drawings
+from mutator.statistics.frame import load
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from ..statistics.results_frame import results
+
+BRAKE = Wanted(
+    name="brake",
+    title="Brake",
+    query='module == "sensor" and t_h3 > t_activation',
+    order="max_dev_wheel",
+    confirmed="it is so",
+    look=lambda pair: pair.t > pair.start,
+    actions=("brake",),
+    panels=(("brake", "brake"), ("gap", "distance"), ("d_rel", "not recorded here")),
+    hazard="H3",
+)
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+    """A toy car's place with a run of shifted lanes, of which one was driven again for its trace."""
+    place = tmp_path_factory.mktemp("driven")
+    only = Choices(only='fault_type == "lane"')
+    assert run_campaign(copy_toycar(place), "small", place / "run", choices=only).exit_code == 0
+    assert not (place / "run" / "traces").exists()
+    drawn(place, BRAKE)
+    return place
+
+
+@pytest.fixture
+def place(driven: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    shutil.copytree(driven, tmp_path / "place")
+    return tmp_path / "place"
+
+
+def drawn(place: Path, wanted: Wanted) -> Drawing:
+    """The figure of the run in `place`, with the toy car that is there."""
+    toy = place / "toy"
+    workspace = Workspace(library=toy / "fault_library", templates=toy / "templates")
+    run = place / "run"
+    [drawing] = example_drawings(RunFolder.open(run), load(run / "results.csv"), workspace, [wanted])
+    return drawing
+
+
+def edit_target(place: Path) -> None:
+    with (place / "toy" / "tree" / "toycar" / "sensing.py").open("a") as file:
+        file.write("\n# edited\n")
+
+
+def test_an_experiment_is_found_driven_again_and_drawn(driven: Path) -> None:
+    """The figure has a panel per recorded channel with its unit, the marks, both lines and the shade; its
+    note tells the experiment, and its codes the query and how to see more."""
+    drawing = drawn(driven, BRAKE)
+    [name] = [path.name for path in (driven / "run" / "traces").iterdir()]
+    assert name in drawing.note
+    assert [code for _, code in drawing.codes] == [BRAKE.query, f"mutator show {name} --run DIR"]
+    assert drawing.figure is not None
+    brake, gap = drawing.figure.axes
+    assert (brake.get_ylabel(), gap.get_ylabel()) == ("brake [-]", "distance [m]")
+    assert {line.get_linestyle() for line in brake.lines[:2]} == {"-", "--"}
+    assert any("activated" in text.get_text() for text in brake.texts)
+    assert any(text.get_text().startswith("H3 ") for text in brake.texts)
+    assert (len(brake.patches), len(gap.patches)) == (1, 0)
+
+
+def test_a_kept_trace_is_enough(place: Path, tmp_path: Path) -> None:
+    """Drawn again after the target was edited, from the kept trace, it is the same file."""
+    contents = []
+    for _ in range(2):
+        write_drawings([drawn(place, BRAKE)], tmp_path)
+        contents.append([(tmp_path / "figures" / f"brake.{kind}").read_bytes() for kind in ("svg", "png")])
+        edit_target(place)
+    assert contents[0] == contents[1]
+
+
+def test_what_cannot_be_driven_again_is_said(place: Path, tmp_path: Path) -> None:
+    """An edited target, one that is gone, no library at all: a sentence each, and no picture is left over."""
+    for kind in ("svg", "png"):
+        (tmp_path / "figures").mkdir(exist_ok=True)
+        (tmp_path / "figures" / f"brake.{kind}").touch()
+    shutil.rmtree(place / "run" / "traces")
+    edit_target(place)
+    edited = drawn(place, BRAKE)
+    assert "changed since this run was planned: target" in edited.note
+    write_drawings([edited], tmp_path)
+    assert list((tmp_path / "figures").iterdir()) == []
+    shutil.rmtree(place / "toy" / "tree")
+    assert drawn(place, BRAKE).note.startswith("No figure: ")
+    run = place / "run"
+    [nowhere] = example_drawings(RunFolder.open(run), load(run / "results.csv"), None, [BRAKE])
+    assert "no fault library" in nowhere.note
+
+
+def test_a_trace_of_another_run_is_not_drawn(place: Path) -> None:
+    """A kept trace that is not of the campaign's run is made anew."""
+    [trace] = (place / "run" / "traces").glob("*/faulty/log.npz")
+    right = trace.read_bytes()
+    trace.write_bytes(right[:-1])
+    assert drawn(place, BRAKE).figure is not None
+    assert trace.read_bytes() == right
+
+
+def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
+    """Those that the query finds are tried in order; when none shows it the report says of how many."""
+    looked_at: list[float] = []
+
+    def second(pair: Pair) -> np.ndarray | None:
+        looked_at.append(pair.start)
+        return pair.t > pair.start if len(looked_at) == 2 else None
+
+    assert "number 2 of the" in drawn(place, replace(BRAKE, look=second)).note
+    none = drawn(place, replace(BRAKE, look=lambda pair: None))
+    assert none.figure is None
+    assert "not to be seen in the first" in none.note
+
+
+def test_a_query_that_finds_nothing_drives_nothing(place: Path) -> None:
+    """The report says so; so it does of a target without the actuator."""
+    assert "no experiment of this run fits" in drawn(place, replace(BRAKE, query='module == "radar"')).note
+    assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
+    assert len(list((place / "run" / "traces").iterdir())) == 1  # the one that was kept
+
+
+def test_candidates_come_largest_first_then_by_id() -> None:
+    """Order is of numbers, not of their texts, and complete."""
+    h1 = {"t_activation": 2, "t_h1": 5, "max_dev_gas": 0}
+    frame: pd.DataFrame = results(
+        h1 | {"max_dev_brake": 9.0},
+        h1 | {"max_dev_brake": 10.0, "experiment_id": "b"},
+        h1 | {"max_dev_brake": 10.0, "experiment_id": "a"},
+        h1 | {"max_dev_brake": 99.0, "module": "vision_input"},
+        h1 | {"max_dev_brake": 99.0, "fault_type": "jamming"},
+        {"t_activation": 2, "max_dev_brake": 99.0, "max_dev_gas": 0},
+    )
+    assert list(candidates(frame, WANTED[0])["experiment_id"]) == ["a", "b", "0"]
+
+
+def test_every_query_can_be_asked() -> None:
+    """All that is wanted finds its experiment in hand-made results."""
+    had = {"t_activation": 2, "t_alert": 3, "t_h1": 5, "t_h2": 5, "max_dev_brake": 1, "max_dev_gas": 1}
+    frame = results(had, had | {"fault_type": "jamming"})
+    assert [list(candidates(frame, one)["experiment_id"]) for one in WANTED] == [["0"], ["0"], ["0"], ["1"]]

@@ -1,0 +1,40 @@
+"""The published observations in a run's report: which of them its experiments can decide."""
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.model import Status
+from mutator.paper.observations_panel import observations_panel
+from mutator.paper.published import load_paper
+from mutator.report.studies import ReportedRun
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from ..statistics.results_frame import results
+
+REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
+
+
+@pytest.mark.parametrize("shard", [None, "1/2"])
+def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, shard: str | None) -> None:
+    """Claims of all faults wait for the last experiment of the plan, of which a shard is but a part."""
+    shutil.copytree(REFERENCES, toycar.library / "references")
+    freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
+    folder = RunFolder.open(tmp_path / "run")
+    (folder.path / "report").mkdir()
+    kinds = [kind.split("/") for _, kind in load_paper(REFERENCES).coverage]
+    frame = results(*({"module": m, "fault_type": kind, "seed": i} for i, (m, kind) in enumerate(kinds)))
+    of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
+    assert of_all
+    for done in (folder.planned - 1, folder.planned):
+        rows: Any = (SimpleNamespace(status=Status.OK),) * done
+        run = ReportedRun(folder=folder, workspace=toycar, rows=rows, frame=frame, engines=None, study=None)
+        assert observations_panel(run) is not None
+        text = (folder.path / "report" / "observations.md").read_text()
+        why = f"cannot be told: only {done} of the 12 experiments of the plan have been run"
+        assert text.count(why) == (0 if done == 12 else of_all)

@@ -1,0 +1,131 @@
+"""The paper's counts, as cited, and tables that show them beside ours."""
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.paper.published import Paper, load_paper
+from mutator.statistics import compare
+from mutator.statistics.compare_tables import kinds_sheet, overall_sheet
+from mutator.statistics.share import share
+from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
+from mutator.statistics.tally import Tally, by_kind, by_scenario, total
+
+from ..statistics.results_frame import results
+
+REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
+HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
+
+
+@pytest.fixture(scope="module")
+def paper() -> Paper:
+    return load_paper(REFERENCES)
+
+
+def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
+    return total(one for (how, _), one in counts.items() if how == method)
+
+
+def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> None:
+    """Scenarios add up to the totals of the text, and fault types add up to the same totals."""
+    assert of(paper.summary, "guided") == Tally(
+        injected=5640,
+        activated=3678,
+        manifested=3656,
+        hazards=1316,
+        alerts=1570,
+        hazards_no_alerts=402,
+        alerts_no_hazards=656,
+    )
+    assert of(paper.summary, "random").hazards == 1634
+    for method in ("guided", "random"):
+        types, scenarios = of(paper.coverage, method), of(paper.summary, method)
+        assert (types.injected, types.hazards) == (scenarios.injected, scenarios.hazards)
+        assert types.activated == scenarios.activated
+
+
+def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
+    """35.8 against 29.0 % of the activated faults, but 23.3 against 29.0 % of the injected ones."""
+    guided, random = of(paper.summary, "guided"), of(paper.summary, "random")
+    rates = [
+        round(100 * share(one.hazards, whole).rate, 1)
+        for one, whole in (
+            (guided, guided.activated),
+            (random, random.activated),
+            (guided, guided.injected),
+            (random, random.injected),
+        )
+    ]
+    assert rates == [35.8, 29.0, 23.3, 29.0]
+
+
+def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
+    """Ours is counted by scenario and beneath the paper's; what the paper does not have is left empty."""
+    frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
+    lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
+    hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
+    assert hazards[0][:3] == ["paper", "35.1 % (215/613; 31.4 to 38.9)", "-"]
+    assert hazards[1][0] == "here"
+    assert [cell.split(";")[0] for cell in hazards[1][1:]] == [
+        "100.0 % (2/2",
+        "0.0 % (0/1",
+        "66.7 % (2/3",
+    ]
+    unwarned = next(line for line in lines if line[:3] == ["hazards without alert", "hazards", "here"])
+    assert unwarned[3].startswith("50.0 % (1/2;")
+
+
+def test_coverage_has_both_denominators(paper: Paper) -> None:
+    """Hazards are divided by the activated and by the injected faults; types follow the paper's order."""
+    frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
+    sheet = coverage_sheet("guided", by_kind(frame), paper.published())
+    kinds = [line[0] for line in sheet.lines]
+    assert kinds == [k for k in ("radar/chaff", "radar/jamming", "radar/zeta", "total") for _ in range(2)]
+    chaff = sheet.table().rows[1]
+    assert [cell.split(";")[0] for cell in chaff[2:]] == ["50.0 % (1/2", "100.0 % (1/1", "50.0 % (1/2"]
+
+
+def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
+    """Count, whole, rate and interval can be computed with; a cell that is not known is empty."""
+    sheet = coverage_sheet("guided", by_kind(results(HIT)), paper.published())
+    lines = list(csv.DictReader(io.StringIO(sheet.csv())))
+    assert lines[0]["hazards/activated: count"] == "154"
+    assert lines[0]["hazards/activated: of"] == "432"
+    assert float(lines[0]["hazards/activated: rate"]) == pytest.approx(154 / 432, abs=1e-6)
+    assert "| radar/chaff | paper |" in sheet.markdown()
+
+
+def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Path) -> None:
+    """More hazards than activated faults in the cited file: file and line."""
+    for file in REFERENCES.glob("paper_*.yaml"):
+        (tmp_path / file.name).write_text(
+            file.read_text().replace("guided_hazards: 154", "guided_hazards: 433")
+        )
+    with pytest.raises(MutatorError, match=r"paper_coverage\.yaml:6: counts that contradict"):
+        load_paper(tmp_path)
+
+
+def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
+    """Held constant over fault types, guided faults are the more hazardous ones per activated fault only."""
+    activated, injected = (
+        compare.mantel_haenszel(compare.strata(paper.coverage, whole)) for whole in compare.WHOLES
+    )
+    assert activated.strata == injected.strata == 17
+    assert injected.high < 1
+    assert injected.p < 1e-6
+    assert activated.low > 1
+
+
+def test_the_sheets_tell_both_wholes_for_paper_and_here(paper: Paper) -> None:
+    """Per activated and per injected fault, the paper's counts are put to the same tests as ours."""
+    frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
+    overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
+    assert [line[:2] for line in overall.lines] == [
+        (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")
+    ]
+    assert str(overall.lines[0][2]).startswith("35.8 % (1316/3678")
+    assert len(kinds.lines) == 2 * (17 + 1)
+    assert all(line[-1] >= line[-2] for line in kinds.lines)  # type: ignore[operator]

@@ -1,0 +1,46 @@
+"""docs/reference/formats.md owns every format: it and the code name the same ones."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+CLONE = Path(__file__).parents[4]
+PAGE = (CLONE / "docs" / "reference" / "formats.md").read_text(encoding="utf-8")
+BEFORE, RESERVED = PAGE.split("\n## Reserved\n")
+SCHEMA = re.compile(r"([a-z][a-z_-]*/[1-9]\d*)")
+IN_CODE = re.compile(rf"""["']{SCHEMA.pattern}["']""")
+IN_PAGE = re.compile(rf"`{SCHEMA.pattern}`")
+
+
+def in_code() -> set[str]:
+    """Every `name/number` that is a text of its own in the harness or the shipped target."""
+    files = [*(CLONE / "mutator").rglob("*.py"), *(CLONE / "target").rglob("*.py")]
+    assert len(files) > 250
+    return {name for file in files for name in IN_CODE.findall(file.read_text(encoding="utf-8"))}
+
+
+def test_every_schema_of_the_code_is_in_the_page() -> None:
+    """A format that is stored or sent has a line that says who writes and reads it."""
+    assert {"run/1", "sim-record/1", "film-events/1"} <= in_code() <= set(IN_PAGE.findall(BEFORE))
+
+
+def test_every_schema_in_the_page_is_in_the_code() -> None:
+    """The page names no format that is gone, and what it reserves is not in use."""
+    assert set(IN_PAGE.findall(BEFORE)) - in_code() == set()
+    reserved = set(re.findall(rf"^\| `{SCHEMA.pattern}` \|", RESERVED, re.MULTILINE))
+    assert {"series/1", "target/2", "chunk/1"} <= reserved
+    assert reserved & in_code() == set()
+
+
+def test_every_module_in_the_page_exists() -> None:
+    """Writers and readers are named by modules that are there."""
+    modules = set(re.findall(r"`((?:mutator|selfdrive)\.[\w.]+)`", PAGE))
+    assert len(modules) > 40
+    assert sorted(name for name in modules if importlib.util.find_spec(name) is None) == []
+
+
+def test_every_file_of_a_library_has_a_line() -> None:
+    """Each YAML file that ships has a schema that the page knows."""
+    files = [*(CLONE / "fault_library").rglob("*.yaml"), *(CLONE / "templates").glob("*.yaml")]
+    heads = {re.search(rf"^schema: {SCHEMA.pattern}$", file.read_text(), re.MULTILINE) for file in files}
+    assert {found and found[1] for found in heads} <= set(IN_PAGE.findall(BEFORE))

@@ -1,0 +1,48 @@
+"""The page of licences has every dependency, with the licence that the package states."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.reference.licences import PAGE, constrained, stated_licence, table_of, write_licences
+
+CLONE = Path(__file__).parents[4]
+TABLE = table_of((CLONE / PAGE).read_text(encoding="utf-8"))
+
+
+def test_every_constrained_package_has_a_licence() -> None:
+    """The table and constraints.txt name the same packages, in the same order."""
+    assert tuple(TABLE) == constrained(CLONE)
+    assert all(licence.strip() for licence in TABLE.values())
+
+
+@pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="the page has the versions for Python 3.11")
+def test_the_licences_are_those_that_the_packages_state() -> None:
+    """No licence on the page differs from that of the package installed here."""
+    stated = {name: stated_licence(name) for name in TABLE}
+    installed = {name: licence for name, licence in stated.items() if licence is not None}
+    assert "numpy" in installed
+    assert {name: TABLE[name] for name in installed} == installed
+
+
+def clone(folder: Path, *packages: str) -> Path:
+    (folder / "docs" / "reference").mkdir(parents=True, exist_ok=True)
+    (folder / "constraints.txt").write_text("".join(f"{name}==1\n" for name in ("# made by", *packages)))
+    (folder / "pyproject.toml").write_text(
+        '[project]\ndependencies = ["pytest>=8"]\noptional-dependencies.test = ["no_such>=1", "pytest"]\n'
+    )
+    return folder
+
+
+def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> None:
+    """Its line is kept; a package that is gone loses its own; a new one that nobody can ask is an error."""
+    page = clone(tmp_path, "pytest", "no_such") / PAGE
+    page.write_text("| gone | others | MIT |\n| no_such | others | BSD |\n")
+    write_licences(tmp_path)
+    assert table_of(page.read_text()) == {"no_such": "BSD", "pytest": "MIT"}
+    assert "| no_such | `test` | BSD |" in page.read_text()
+    assert "| pytest | mutator | MIT |" in page.read_text()
+    with pytest.raises(MutatorError, match="no licence known of another; install another here"):
+        write_licences(clone(tmp_path, "another"))

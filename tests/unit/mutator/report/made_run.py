@@ -1,0 +1,109 @@
+"""Made-up run folders for the tests of reports, and a parser of their pages."""
+
+import csv
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+
+from mutator.outcomes.columns import result_columns
+from mutator.store import plan_file as planfile
+
+COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
+HEAD = {
+    "schema": "run/1",
+    "campaign": "night_<b>drive</b>",
+    "plan": "ab" * 32,
+    "seed": 7,
+    "reading": "as_described",
+    "choices": {"seed": None, "limit": 3},
+    "target": "openpilot",
+    "goldens": [],
+    "experiments": 3,
+    "runs": 2,
+    "sources": {"target": "cd" * 32},
+    "provenance": {
+        "mutator": "0.1.0",
+        "python": "3.11.7",
+        "machine": "Linux",
+        "packages": {"numpy": "2.4.6"},
+    },
+}
+OK = {
+    "module": "radar",
+    "fault_type": "chaff",
+    "variant": "distance",
+    "value": "35",
+    "unit": "m",
+    "scenario": "S1",
+    "method": "guided",
+    "trigger": "C2",
+    "status": "ok",
+    "outcome": "hazard",
+    "t_activation": "7.0",
+    "t_manifest": "7.1",
+    "h1": "1",
+    "t_h1": "18.25",
+    "h2": "0",
+    "h3": "0",
+}
+NONE = {"outcome": "", "h1": "", "t_h1": "", "h2": "", "h3": ""}
+PATCH = """\
+diff --git a/pkg/_fi.py b/pkg/_fi.py
+new file mode 100644
+--- /dev/null
++++ b/pkg/_fi.py
+@@ -0,0 +1,1 @@
++HOLD = "while"
+diff --git a/pkg/radar.py b/pkg/radar.py
+--- a/pkg/radar.py
++++ b/pkg/radar.py
+@@ -1,2 +1,3 @@
+ d_rel = see()
++d_rel = d_rel + 35.0  # fi:0a1b2c3d
+ v_rel = 0
+"""
+BAD = OK | NONE | {"status": "harness_error", "detail": "the disk | is <gone>"}
+CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
+
+
+def make_run(folder: Path, **head: object) -> Path:
+    """A run folder with a hazard, a crash and a harness error; the hazard has its patch and a still.
+
+    `head` is added to its run.json.
+    """
+    (folder / "run.json").write_text(json.dumps(HEAD | head))
+    with (folder / "results.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS, restval="")
+        table.writeheader()
+        for i, line in enumerate((OK, BAD, CRASHED)):
+            table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
+    planfile.write(folder, [], [])
+    (folder / "patches/00").mkdir(parents=True)
+    (folder / "patches/00" / ("0" * 16 + ".patch")).write_text(PATCH)
+    (folder / "plots").mkdir()
+    (folder / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
+    return folder
+
+
+class Page(HTMLParser):
+    """Text and links of a page; fails on tags that are not closed in order."""
+
+    VOID = ("meta", "link", "br", "img", "input")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.texts: list[str] = []
+        self.links: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.links += [value or "" for name, value in attrs if name in ("href", "src")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data.strip())

@@ -1,0 +1,59 @@
+"""The tables of a run in its report and as files."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mutator.report.panels.tables import tables_panel
+from mutator.report.studies import ReportedRun
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+HERE = Workspace.find(Path(__file__).parents[5])
+HEADER = (
+    "experiment_id,fault_id,module,fault_type,variant,value,unit,scenario,method,trigger,seed,status,outcome,"
+    "t_activation,t_manifest,h1,t_h1,alerts,t_alert,reaction_time,detail"
+)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> RunFolder:
+    """A run folder with a guided chaff run, its random partner, and the golden run of 30 s."""
+    head = {"schema": "run/1", "target": "openpilot", "goldens": [["S1", []]]}
+    (tmp_path / "run.json").write_text(json.dumps(head))
+    line = "{0},a,radar,chaff,distance,35,m,S1,{0},C2,1,ok,hazard,5,6,1,9,fcw,8,1,"
+    (tmp_path / "results.csv").write_text("\n".join([HEADER, *map(line.format, ("guided", "random")), ""]))
+    (tmp_path / "golden" / "S1").mkdir(parents=True)
+    np.savez(tmp_path / "golden" / "S1" / "trace.npz", t=np.arange(3000) / 100)
+    return RunFolder.open(tmp_path)
+
+
+def names(run: RunFolder, suffix: str) -> set[str]:
+    return {file.stem for file in (run.path / "report" / "tables").glob(f"*.{suffix}")}
+
+
+def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
+    """CSV for computing, Markdown for reading, each with the title that the report has."""
+    markdown = tables_panel(ReportedRun.open(run, HERE)).markdown
+    assert "alert_to_hazard" in names(run, "md") == names(run, "csv")
+    for file in (run.path / "report" / "tables").glob("*.md"):
+        assert file.read_text().rstrip() in markdown
+
+
+def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
+    """When a run ends stands in its golden run, which only the target's manifest can read."""
+    tables_panel(ReportedRun.open(run, None))
+    assert "propagation" in names(run, "csv")
+    assert "alert_to_hazard" not in names(run, "csv")
+
+
+def test_files_are_the_same_each_time(run: RunFolder) -> None:
+    """CSV and Markdown of each table, the same bytes when written again."""
+    contents = []
+    for _ in range(2):
+        tables_panel(ReportedRun.open(run, HERE))
+        files = (run.path / "report" / "tables").iterdir()
+        contents.append({file.name: file.read_bytes() for file in files})
+    assert contents[0] == contents[1]

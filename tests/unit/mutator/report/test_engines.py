@@ -1,0 +1,180 @@
+"""What a report says of how experiments were run, and of their proof."""
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.model import Experiment, Outcome, Record, Status
+from mutator.outcomes.results import build
+from mutator.report import building as report
+from mutator.report import engines
+from mutator.report import stamp as report_stamp
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+WAYS = (("fork", ""), ("golden", ""), ("reference", "its golden run has <two> threads"), (None, ""))
+
+
+def record(experiment: Experiment) -> Record:
+    return Record(
+        experiment_id=experiment.id,
+        status=Status.OK,
+        outcome=Outcome.MASKED,
+        detail="",
+        tree="",
+        activation=None,
+        t_manifest=None,
+        max_dev=(),
+        hazards=(),
+        alerts=(),
+        trace_digest="",
+    )
+
+
+Finish = Callable[..., Path]
+
+
+@pytest.fixture
+def finish(toycar: Workspace, tmp_path: Path) -> Finish:
+    """Makes a finished run of four experiments; `proven` of their records are in its proof, too, after
+    `change` (None: it has no proof)."""
+
+    def made(
+        proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
+    ) -> Path:
+        run = tmp_path / "run"
+        plan = make_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
+        freeze(plan, run, toycar)
+        records = [record(experiment) for experiment in plan.experiments]
+        write(run / "records/0001-main.jsonl", SCHEMA, [asdict(r) for r in records])
+        if proven is not None:
+            again = [asdict(change(r)) for r in records[:proven]]
+            write(run / "proof/0001-main.jsonl", SCHEMA, again)
+        lines = [timing(r.experiment_id) for r in records]
+        if ways is WAYS:
+            pairs = zip(lines, WAYS, strict=True)
+            lines = [line | {"engine": engine, "why": why} for line, (engine, why) in pairs]
+        write(run / "timings/0001-main.jsonl", TIMINGS_SCHEMA, lines)
+        return run
+
+    return made
+
+
+def timing(name: str) -> dict[str, object]:
+    return {"experiment_id": name, "cpu_s": 0.1, "wall_s": 0.1, "host": "here", "worker": "0001-main"}
+
+
+def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
+    writer = LineWriter(path, {"schema": schema})
+    for line in lines:
+        writer.append(line)
+    writer.close()
+
+
+def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
+    """There is a line for each way, and one for each reason why an experiment was not forked."""
+    told = engines.engine_summary(RunFolder.open(finish(4)))
+    assert told is not None
+    ways = dict(told.table.rows)
+    assert list(ways.values()) == ["1"] * 4
+    assert "a fork of the golden run, taken right before the fault is first active" in ways
+    assert any("cannot be forked: its golden run has <two> threads" in way for way in ways)
+
+
+def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
+    """A report stays short however many reasons there are, and counts every experiment."""
+    run = finish(None)
+    more = [timing(f"{i}") | {"engine": "reference", "why": f"crash {i:02}"} for i in range(30)]
+    write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
+    told = engines.engine_summary(RunFolder.open(run))
+    assert told is not None
+    assert len(told.table.rows) == 3 + engines.LISTED + 1
+    assert sum(int(count) for _, count in told.table.rows) == 34
+
+
+def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
+    """The newest of several timings is what the report tells."""
+    run = finish(4)
+    again = timing(record_ids(run)[0]) | {"engine": "reference", "why": "it leaves threads behind"}
+    write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
+    told = engines.engine_summary(RunFolder.open(run))
+    assert told is not None
+    assert sum(int(count) for _, count in told.table.rows) == 4
+    assert not any("fork of the golden run" in way for way, _ in told.table.rows)
+
+
+def record_ids(run: Path) -> list[str]:
+    return [line.split(",")[0] for line in (run / "plan.csv").read_text().splitlines()[1:]]
+
+
+@pytest.mark.parametrize(
+    ("proven", "said", "state"),
+    [
+        (4, "4 of 4 experiments came out the same on the reference engine, byte for byte.", "4 of 4 same"),
+        (
+            3,
+            "3 of 4 experiments came out the same on the reference engine, byte for byte. The rest",
+            "not finished: 3 of 4 same",
+        ),
+        (None, "so there is nothing to prove.", "none needed"),
+    ],
+)
+def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
+    """A whole proof, one with something left, and none."""
+    told = engines.engine_summary(RunFolder.open(finish(proven)))
+    assert told is not None
+    assert said in told.proof
+    assert told.proof.endswith(said) == (proven != 3)
+    assert told.state == state
+    assert not told.failed
+
+
+def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
+    """Whoever reads the report of a run with a wrong record learns it first, in both forms, and again among
+    the facts; how experiments were run is told further down, escaped."""
+    run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
+    build(run)
+    written = report.write(run, None)
+    for text in (written.markdown.read_text(), written.page.read_text()):
+        assert text.index("The proof failed") < text.index("experiments are planned")
+        assert f"FAILED: experiment {record_ids(run)[0]} is another one" in text
+        assert "How the experiments were run" in text
+    assert "its golden run has &lt;two&gt; threads" in written.page.read_text()
+
+
+def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
+    """Results that have not changed are not all: more of its proof makes the report out of date."""
+    run = finish(3)
+    build(run)
+    before = report_stamp.made_from(RunFolder.open(run), None)
+    assert before == report_stamp.made_from(RunFolder.open(run), None)
+    write(run / "proof/0002-main.jsonl", SCHEMA, [])
+    assert before != report_stamp.made_from(RunFolder.open(run), None)
+
+
+def test_a_report_is_made_from_its_records(finish: Finish) -> None:
+    """A trace digest, which the proof compares, is in no result; another one makes the report out of date."""
+    run = finish(4)
+    build(run)
+    results, before = (run / "results.csv").read_bytes(), report_stamp.made_from(RunFolder.open(run), None)
+    path = run / "records/0001-main.jsonl"
+    path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
+    build(run)
+    assert (run / "results.csv").read_bytes() == results
+    assert before != report_stamp.made_from(RunFolder.open(run), None)
+
+
+def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:
+    """A failed proof is no secret of a run whose timings say nothing of engines."""
+    told = engines.engine_summary(RunFolder.open(finish(4, lambda r: replace(r, tree="x"), ways=())))
+    assert told is not None
+    assert told.failed
+
+
+def test_runs_of_before_there_were_engines_say_nothing_of_them(finish: Finish) -> None:
+    """Their timings do not say what ran an experiment, and neither does the report."""
+    assert engines.engine_summary(RunFolder.open(finish(None, ways=()))) is None

@@ -1,0 +1,54 @@
+"""Summaries by scenario and fault type, and the frame that they are made from."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.statistics.frame import load
+from mutator.statistics.share import share
+from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
+from mutator.statistics.tally import Tally, by_kind, by_scenario
+
+from .results_frame import results
+
+HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
+
+
+def test_wilson_interval_of_a_published_example() -> None:
+    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3); none of 20 begins at zero."""
+    assert str(share(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
+    assert share(0, 20).low == 0
+    assert str(share(0, 0)) == "- (0/0)"
+
+
+def test_a_table_without_published_counts_has_only_ours() -> None:
+    """Where nothing is published there are no empty lines, and no word of a publication."""
+    coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
+    assert [line[1] for line in coverage.lines] == ["here", "here"]
+    summary = summary_sheet("guided", by_scenario(results(HIT)), None)
+    assert {line[2] for line in summary.lines} == {"here"}
+    assert "paper" not in coverage.markdown() + summary.markdown()
+
+
+def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
+    """What says nothing about its fault is left out; a crash does not count as activated by itself."""
+    frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
+    assert by_scenario(frame)["guided", "S1"] == Tally(
+        injected=2,
+        activated=1,
+        manifested=1,
+        hazards=1,
+        alerts=0,
+        hazards_no_alerts=1,
+        alerts_no_hazards=0,
+    )
+
+
+def test_a_file_that_is_no_results_table_is_told(tmp_path: Path) -> None:
+    """A missing file and a missing column are the user's error, with the file's name."""
+    with pytest.raises(MutatorError, match=r"results\.csv"):
+        load(tmp_path / "results.csv")
+    (tmp_path / "results.csv").write_text("experiment_id,fault_id\n1,2\n")
+    with pytest.raises(MutatorError, match="no column 'module'"):
+        load(tmp_path / "results.csv")

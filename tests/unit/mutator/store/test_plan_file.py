@@ -1,0 +1,50 @@
+"""The frozen plan on disk, and plans that other versions wrote."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Hold
+from mutator.store import plan_file
+
+Make = Callable[..., Experiment]
+
+
+def lines(run: Path, name: str) -> list[dict[str, object]]:
+    return [json.loads(line) for line in (run / "plan" / name).read_text().splitlines()]
+
+
+def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
+    """A plan comes back equal, with its ids, whole or chunk by chunk."""
+    plan = tuple(experiment(value, changes=("no_lead",)) for value in (1.0, 2.5, 3.0))
+    chunks = plan_file.write(tmp_path, plan, (2, 1))
+    faults = plan_file.read_faults(tmp_path)
+    assert plan_file.read_all(tmp_path) == plan
+    assert plan_file.read_chunk(tmp_path, chunks[1], faults) == plan[2:]
+    assert [*plan_file.ids(tmp_path)] == [e.id for e in plan]
+
+
+def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
+    """A line without a field that has a default since is read as if it held that default."""
+    planned = experiment()
+    line = plan_file.to_plain(planned)
+    del line["trigger"]["armed_after_s"], line["trigger"]["hold_s"]
+    read = plan_file.experiment_from(line, {planned.fault.id: planned.fault})
+    assert (read.trigger.armed_after_s, read.trigger.hold_s, read.trigger.hold) == (0.0, None, Hold.WHILE)
+
+
+@pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
+def test_a_plan_of_a_newer_version_is_refused(experiment: Make, tmp_path: Path, where: str) -> None:
+    """A field that this version does not know could mean another experiment: it is an error that names it."""
+    plan_file.write(tmp_path, [experiment()], [1])
+    [fault], [line] = lines(tmp_path, "faults.jsonl"), lines(tmp_path, "experiments.jsonl")
+    injection = fault["injections"][0]  # type: ignore[index]
+    places = {"experiment": line, "trigger": line["trigger"], "fault": fault, "injection": injection}
+    places["anchor"] = injection["location"]["anchor"]
+    places[where]["repeat"] = 2  # type: ignore[index]
+    with pytest.raises(MutatorError, match=f"{where} has 'repeat', .* does not know"):
+        known = plan_file.fault_from(fault)
+        plan_file.experiment_from(line, {line["fault"]: known})  # type: ignore[dict-item]
