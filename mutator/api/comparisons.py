@@ -14,6 +14,7 @@ from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Finding, Gate
 from mutator.comparison.pairs import Pair
+from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,6 +70,9 @@ class RunComparison:
 
     def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
         """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "new-crash")`."""
+        known = [gate.value for gate in Gate]
+        if strangers := [gate for gate in gates if gate not in known]:
+            raise MutatorError(f"gate '{strangers[0]}'", expected=f"one of {', '.join(known)}")
         return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
 
     def write(self, out: str | Path | None = None) -> pages.Written:

@@ -203,6 +203,8 @@ class Run:
 
         `failures` are the endings that JUnit shows as failures.
         """
+        if format not in (known := [f.value for f in Format]):
+            raise MutatorError(f"format '{format}'", expected=f"one of {', '.join(known)}")
         wanted = Format(format)
         workspace = self.workspace if wanted is Format.MUTATION_ELEMENTS else None
         place = None if out is None else Path(out)
