@@ -20,7 +20,7 @@ from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes import results
 from mutator.statistics.frame import load
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -87,10 +87,10 @@ def working(size: int, out: Path) -> dict[str, float]:
     manifest, models = workspace.manifest(folder.head["target"]), workspace.fault_models()
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]})
     began = process_time()
-    faults = planfile.read_faults(out)
+    faults = plan_file.read_faults(out)
     number = 0
     for chunk in folder.head["chunks"]:
-        for experiment in planfile.read_chunk(out, chunk, faults):
+        for experiment in plan_file.read_chunk(out, chunk, faults):
             build(manifest, models, experiment.fault, experiment.trigger)
             lines.append(asdict(record(experiment, number)))
             number += 1

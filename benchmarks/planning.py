@@ -23,8 +23,7 @@ from mutator.execution.running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.store.records import SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder, golden_key
-from mutator.verification import preflight as checks
-from mutator.verification import preflight_cache as check_cache
+from mutator.verification import preflight, preflight_cache
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -67,17 +66,17 @@ def masked(experiment: Experiment) -> Record:
 
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     """Have the cache believe that the checks of this plan passed."""
-    looked_at = checks._Checks(workspace, folder)
+    looked_at = preflight._Checks(workspace, folder)
     goldens = {}
     for key in looked_at.keys:
         out = folder.golden(*key)
         out.mkdir(parents=True)
         for name in (looked_at.manifest.trace_file, looked_at.manifest.record_file):
             (out / name).write_bytes(bytes(500_000))
-        goldens[golden_key(*key)] = checks._digest_of(looked_at.manifest, out)
-    said = {"schema": checks.SCHEMA, "digest": looked_at.digest, "results": []}
-    write_json(folder.path / checks.FILE, said | {"goldens": goldens, "run_cpu_s": 1.0})
-    check_cache.store(check_cache.entry(looked_at.digest), folder.path, checks.FILE)
+        goldens[golden_key(*key)] = preflight._digest_of(looked_at.manifest, out)
+    said = {"schema": preflight.SCHEMA, "digest": looked_at.digest, "results": []}
+    write_json(folder.path / preflight.FILE, said | {"goldens": goldens, "run_cpu_s": 1.0})
+    preflight_cache.store(preflight_cache.entry(looked_at.digest), folder.path, preflight.FILE)
 
 
 def until_the_first_run(workspace: Workspace, out: Path) -> float:

@@ -95,7 +95,7 @@ def made_series(workspace: Workspace, records: Sequence[Record]) -> Iterator[Mar
             golden[name] = draw.normal(size=3000).cumsum().cumsum()
             change = draw.normal(size=2000).cumsum().cumsum()  # as long as the fault is active
             faulty[name] = golden[name] + np.concatenate((np.zeros(1000), change))
-        data = report_series.series(manifest, golden, faulty, one)
+        data = report_series.packed_series(manifest, golden, faulty, one)
         yield Markup(embedded(data, f"series-{one.experiment_id}"))
 
 
@@ -133,7 +133,7 @@ def write(size: int, out: Path) -> dict[str, float]:
         panels=(),
         browse=browse,
     )
-    page = report_page.page(content)
+    page = report_page.page_html(content)
     (out / "index.html").write_text(page)
     sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "series_kb": "".join(series)}
     return {"table_s": table_s} | {name: len(text.encode()) / 1000 for name, text in sizes.items()}

@@ -29,7 +29,7 @@ from mutator.outcomes.reader import Results
 from mutator.report import building as reports
 from mutator.report import series as report_series
 from mutator.report.film import Shot, film_experiment
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
@@ -123,12 +123,12 @@ class Run:
     @cached_property
     def faults(self) -> dict[str, Fault]:
         """The planned faults by id: value, aim, and what is injected where."""
-        return planfile.read_faults(self.path)
+        return plan_file.read_faults(self.path)
 
     @cached_property
     def experiments(self) -> dict[str, Experiment]:
         """The planned experiments by id, in the plan's order."""
-        return {e.id: e for e in planfile.read_all(self.path)}
+        return {e.id: e for e in plan_file.read_all(self.path)}
 
     @cached_property
     def records(self) -> Mapping[str, Record]:

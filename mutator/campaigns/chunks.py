@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from mutator.model import Experiment, Record, Status
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
 
@@ -41,7 +41,7 @@ def pending(folder: RunFolder, records: dict[str, Record]) -> tuple[Pending, ...
     """Every chunk of the folder's share that has experiments without a record, or with a harness error,
     which is tried again."""
     done = {name for name, record in records.items() if record.status is not Status.HARNESS_ERROR}
-    names = planfile.ids(folder.path) if done else None
+    names = plan_file.ids(folder.path) if done else None
     shard = folder.shard
     left: list[Pending] = []
     for index, (_, _, count) in enumerate(folder.head["chunks"]):

@@ -24,7 +24,7 @@ from mutator.errors import MutatorError
 from mutator.faults.readings import Readings
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
 from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
 from mutator.store.shards import Shard
@@ -261,7 +261,7 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
         return folder
     write_atomic(out / "campaign.yaml", plan.campaign.source)
     write_atomic(out / "plan.csv", _csv(plan))
-    chunks = planfile.write(out, plan.experiments, plan.chunks)
+    chunks = plan_file.write(out, plan.experiments, plan.chunks)
     write_json(out / HEAD, _head(plan, workspace, chunks))
     return RunFolder.open(out)
 
@@ -271,9 +271,9 @@ def _sources(plan: Plan, workspace: Workspace) -> dict[str, str]:
     return sources(workspace, workspace.manifest(plan.campaign.target), scenarios)
 
 
-def _head(plan: Plan, workspace: Workspace, chunks: list[planfile.Chunk]) -> dict[str, Any]:
+def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> dict[str, Any]:
     manifest = workspace.manifest(plan.campaign.target)
-    canary = planfile.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
+    canary = plan_file.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
     return {
         "schema": SCHEMA,
         "plan": plan.digest,
@@ -311,15 +311,15 @@ def load_plan(out: Path) -> Plan:
     folder = RunFolder.open(out)
     head = folder.head
     canary = dict(head["canary"])
-    fault = planfile.fault_from(canary["fault"])
+    fault = plan_file.fault_from(canary["fault"])
     return Plan(
         campaign=load_campaign(folder.path / "campaign.yaml"),
         choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
         seed=head["seed"],
         reading=head["reading"],
-        experiments=planfile.read_all(folder.path),
+        experiments=plan_file.read_all(folder.path),
         chunks=tuple(count for _, _, count in head["chunks"]),
-        canary=planfile.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
+        canary=plan_file.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
         runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),

@@ -12,7 +12,7 @@ from mutator.model import Outcome, Status
 from mutator.outcomes.rows import Row, by_fault_type
 from mutator.statistics.compare import holm
 from mutator.statistics.paired import mcnemar, rate_difference, times
-from mutator.statistics.share import share
+from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, P, Sheet
 
 FLAGS = {"activated": "t_activation", "manifested": "t_manifest", "alert": "t_alert", "hazard": "t_hazard"}

@@ -9,10 +9,10 @@ from mutator.model import Experiment, Value
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.outcomes.reader import row_of
 from mutator.outcomes.rows import Row
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 
 
 class Key(NamedTuple):
@@ -49,9 +49,9 @@ def read_side(run: Path, only: str | None = None) -> Side:
     """
     folder = RunFolder.open(run)
     records = read_records(folder.path)
-    proof.judge(folder, records)
+    equivalence.judge(folder, records)
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
-    experiments = tuple(e for e in planfile.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
+    experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
     hazards = folder.head["hazards"]
     rows = {e.id: row_of(e, records[e.id], hazards) for e in experiments if e.id in records}
     return Side(folder=folder, experiments=experiments, rows=rows)

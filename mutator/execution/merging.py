@@ -13,12 +13,12 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.review.gate import FILE as REVIEWED
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 
 _SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
 _REMEDY = "give the folder of each shard of one plan, once"
@@ -115,8 +115,8 @@ def _check_complete(folder: RunFolder) -> None:
             expected="a finished shard",
             remedy="run it to its end with the command it was begun with",
         )
-    proof.judge(folder, records)
-    if left := sum(len(piece.ids) for piece in proof.left(folder)):
+    equivalence.judge(folder, records)
+    if left := sum(len(piece.ids) for piece in equivalence.left(folder)):
         raise MutatorError(
             f"unfinished: of its proof {counted(left, 'experiment')} left to run",
             where=folder.path,
@@ -132,7 +132,7 @@ def _counts(record: Record) -> bool:
 def _share(folder: RunFolder) -> set[str]:
     shard = folder.shard
     assert shard is not None
-    names = planfile.ids(folder.path)
+    names = plan_file.ids(folder.path)
     share: set[str] = set()
     for index, (_, _, count) in enumerate(folder.head["chunks"]):
         chunk = [next(names) for _ in range(count)]
@@ -169,7 +169,7 @@ def _copy(folders: Sequence[RunFolder], out: Path) -> None:
     for folder in folders:
         assert folder.shard is not None
         shutil.copytree(folder.path / "patches", out / "patches", dirs_exist_ok=True)
-        for name in ("records", "timings", proof.FOLDER):
+        for name in ("records", "timings", equivalence.FOLDER):
             if (folder.path / name).is_dir():
                 (out / name).mkdir(exist_ok=True)
             for path in (folder.path / name).glob("*.jsonl"):

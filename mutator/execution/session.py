@@ -27,7 +27,7 @@ from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.store.records import Progress, label, read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
@@ -48,7 +48,7 @@ class Summary:
     problem: str  # empty, or why the session ended early (disk full, a worker died)
     interrupted: bool
     results: Path | None  # results.csv; None when there was no room for it
-    proof: proof.Proof | None  # None: nothing that the reference engine has not run
+    proof: equivalence.Proof | None  # None: nothing that the reference engine has not run
     elapsed_s: float
 
     @property
@@ -71,7 +71,7 @@ class Session:
         self.workers = workers
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
-        self.proof: tuple[proof.Sample, ...] = ()
+        self.proof: tuple[equivalence.Sample, ...] = ()
         self._manifest = workspace.manifest(folder.head["target"])
         self.engine = choose_engine(engine, self._manifest, folder.planned)
         self.problem = ""
@@ -86,8 +86,8 @@ class Session:
         self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
-            proof.begin(self.folder.path)
-        self.proof = proof.left(self.folder)
+            equivalence.begin(self.folder.path)
+        self.proof = equivalence.left(self.folder)
         if left or self.proof:
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             prepare_base(self._manifest, self.folder.base)
@@ -123,7 +123,7 @@ class Session:
             built = results.ensure(self.folder.path)
         except DiskFull as err:  # the records are there, the table can be made any time
             self.problem = self.problem or str(err)
-        proven = proof.judge(self.folder, records)
+        proven = equivalence.judge(self.folder, records)
         return Summary(
             planned=self.folder.planned,
             done=done,

@@ -14,7 +14,7 @@ from mutator.errors import CheckFailed
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.building import Mutant
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -74,7 +74,7 @@ def rerun(
     folder = RunFolder.open(run)
     manifest = manifest_of(workspace, folder)
     wanted = folder.find(experiment_id)
-    experiment = next(e for e in planfile.read_all(folder.path) if e.id == wanted)
+    experiment = next(e for e in plan_file.read_all(folder.path) if e.id == wanted)
     golden = folder.golden(experiment.scenario, experiment.changes)
     single = run_single(
         workspace,

@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden import Trace, load_trace, trace_digest
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -33,7 +33,7 @@ class Traces:
 
     @cached_property
     def _experiments(self) -> Mapping[str, Experiment]:
-        return {experiment.id: experiment for experiment in planfile.read_all(self.folder.path)}
+        return {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
 
     def record(self, experiment_id: str) -> Record:
         """What the campaign found out of an experiment; MutatorError when only its results are there."""

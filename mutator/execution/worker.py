@@ -17,10 +17,10 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Status
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
 
@@ -55,7 +55,7 @@ class Worker:
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
         self._planned: tuple[Experiment, ...] = ()
-        self._faults = planfile.read_faults(self.folder.path)
+        self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
         self._head = {"schema": SCHEMA, "plan": plan}
         self._records = LineWriter(self._file("records"), self._head)
@@ -63,7 +63,7 @@ class Worker:
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
         """Run what is left of a chunk; returns (experiment id, detail) of its harness errors."""
-        experiments = planfile.read_chunk(
+        experiments = plan_file.read_chunk(
             self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
         )
         errors = []
@@ -80,8 +80,8 @@ class Worker:
         """
         if self._prover is None or self._proofs is None:
             self._prover = self._make_runner(self._independent_engine())
-            self._proofs = LineWriter(self._file(proof.FOLDER), self._head)
-            self._planned = planfile.read_all(self.folder.path)
+            self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)
+            self._planned = plan_file.read_all(self.folder.path)
         wanted = [experiment for experiment in self._planned if experiment.id in sample.ids]
         errors = []
         for finished in chain.from_iterable(self._prover.run([experiment]) for experiment in wanted):

@@ -11,14 +11,14 @@ from typing import Any
 
 from mutator._common.text import counted
 from mutator._common.version import VERSION
-from mutator.execution import single_run as single
+from mutator.execution import single_run
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, Site, parsed
 from mutator.mutants.building import injection_edit
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import Edit
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -29,7 +29,7 @@ SCHEMA_VERSION = "2.0"
 
 def content(folder: RunFolder, workspace: Workspace) -> bytes:
     """The report as JSON, the same bytes each time."""
-    manifest = single.manifest_of(workspace, folder)
+    manifest = single_run.manifest_of(workspace, folder)
     return (
         json.dumps(report(folder, manifest, workspace.fault_models()), ensure_ascii=False) + "\n"
     ).encode()
@@ -39,7 +39,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
     """The report as plain data."""
     records = read_records(folder.path)
     drives: dict[str, list[Experiment]] = {}
-    for experiment in planfile.read_all(folder.path):
+    for experiment in plan_file.read_all(folder.path):
         drives.setdefault(experiment.fault.id, []).append(experiment)
     files: dict[str, dict[str, Any]] = {}
     for experiments in drives.values():

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from mutator._common import hashing as ids
+from mutator._common import hashing
 from mutator._common.text import suggestion
 from mutator.config import units
 from mutator.config.locations import PROBE_NAME
@@ -149,7 +149,7 @@ def load_fault_models(folder: Path) -> FaultModels:
         raise MutatorError("no fault model", where=folder, expected="<model>.yaml beside <model>.py.j2")
     probe = _text(folder / PROBE_TEMPLATE)
     texts = {name: model.template for name, model in models.items()}
-    return FaultModels(folder=folder, models=models, probe=probe, digest=ids.digest([texts, probe]))
+    return FaultModels(folder=folder, models=models, probe=probe, digest=hashing.digest([texts, probe]))
 
 
 def _load(path: Path) -> FaultModel:

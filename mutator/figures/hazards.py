@@ -8,8 +8,8 @@ import pandas as pd
 from mutator.figures import style
 from mutator.model import Method
 from mutator.statistics.frame import hazard_names
-from mutator.statistics.share import share
-from mutator.statistics.tally import Tally, by_kind
+from mutator.statistics.shares import share
+from mutator.statistics.tallies import Tally, by_kind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.statistics.tally import tally
+from mutator.statistics.tallies import tally
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from mutator.outcomes.columns import (
     result_columns,
 )
 from mutator.outcomes.verdicts import reaction_time
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
 from mutator.store.run_folder import RunFolder
 
@@ -76,7 +76,7 @@ def build(run: Path) -> Path:
     records."""
     folder = RunFolder.open(run)
     records = read_records(folder.path)
-    experiments = sorted(planfile.read_all(folder.path), key=lambda e: e.id)
+    experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     head = folder.head
     columns = result_columns(head["hazards"], head["compared"])
     rows = [row(e, records[e.id], head["hazards"]) for e in experiments if e.id in records]

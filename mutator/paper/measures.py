@@ -16,9 +16,9 @@ from pathlib import Path
 import pandas as pd
 
 from mutator.statistics import compare, times
-from mutator.statistics.share import CONFIDENCE, Share
-from mutator.statistics.share import share as wilson
-from mutator.statistics.tally import by_kind
+from mutator.statistics.shares import CONFIDENCE, Share
+from mutator.statistics.shares import share as wilson
+from mutator.statistics.tallies import by_kind
 
 __all__ = [
     "Path",

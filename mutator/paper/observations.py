@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.paper.measures import MEASURES, Estimate, of_difference, of_share
-from mutator.statistics.share import share
+from mutator.statistics.shares import share
 
 FILE = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.statistics.published import Published
-from mutator.statistics.tally import Tally
+from mutator.statistics.tallies import Tally
 
 FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 

@@ -8,7 +8,7 @@ from typing import Any
 from mutator.config.yaml_files import Source, load
 from mutator.errors import MutatorError
 from mutator.paper.published import FILES, Paper, load_paper
-from mutator.statistics.tally import Tally, total
+from mutator.statistics.tallies import Tally, total
 from mutator.workspace import Workspace
 
 _METHODS = ("guided", "random")

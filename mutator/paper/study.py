@@ -2,7 +2,7 @@
 
 from mutator.figures.figures import Drawing
 from mutator.paper.examples import example_drawings
-from mutator.paper.observations_panel import observations_panel
+from mutator.paper.panels import observations_panel
 from mutator.paper.published import has_paper, load_paper
 from mutator.paper.published_checks import check_paper
 from mutator.report.studies import ReportedRun, Study

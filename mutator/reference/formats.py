@@ -3,14 +3,13 @@
 from collections.abc import Iterator
 
 from mutator._common.tables import Table
-from mutator.campaigns import campaign_files as campaign
+from mutator.campaigns import campaign_files
 from mutator.config import units
-from mutator.faults import specs as spec
+from mutator.faults import specs
 from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
 from mutator.reference.tables import generated, sections
-from mutator.stpa import analysis as stpa_analysis
-from mutator.stpa import context_tables as stpa
+from mutator.stpa import analysis, context_tables
 from mutator.targets import manifest
 from mutator.workspace import Workspace
 
@@ -37,10 +36,10 @@ def fault_spec(workspace: Workspace) -> str:
         "takes one from "
         "anywhere.\n",
         STRICT,
-        f"The first key is `schema: {spec.SCHEMA}`. A file of a newer schema is refused.\n"
+        f"The first key is `schema: {specs.SCHEMA}`. A file of a newer schema is refused.\n"
         "[An editor can check it](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        *sections("fault-spec.md", spec.spec_model(workspace.readings())),
+        *sections("fault-spec.md", specs.spec_model(workspace.readings())),
         *_readings(),
         "## Units\n",
         *_units(),
@@ -58,12 +57,12 @@ def campaigns(workspace: Workspace) -> str:
         "Which faults, in which scenarios, under which triggers, within which limits. The library keeps a "
         "campaign at\n`fault_library/campaigns/<name>.yaml`; `mutator run FILE --out DIR` takes one from "
         "anywhere.\n",
-        f"The first key is `schema: {campaign.SCHEMA}`. {_SAME}\n",
+        f"The first key is `schema: {campaign_files.SCHEMA}`. {_SAME}\n",
         f"```yaml\n{example.rstrip()}\n```\n",
         "Its experiments are all combinations of the selected faults, scenarios, methods and "
         "contexts, of which a "
         "`sample` takes some.\nThe same file and options make the same plan everywhere.\n",
-        *sections("campaign.md", campaign.CampaignModel),
+        *sections("campaign.md", campaign_files.CampaignModel),
     )
 
 
@@ -89,15 +88,16 @@ def hazard_analysis(workspace: Workspace) -> str:
         "they mean together,\n[Change the hazard analysis](../how-to/change-the-hazard-analysis.md) "
         "how to write "
         "them; `mutator stpa` prints and checks them.\n",
-        f"{_SAME} The first key of each is `schema`, with the file's kind: `{stpa.HAZARDS_SCHEMA}`, "
-        f"`{stpa.CONTEXT_SCHEMA}`,\n`control_structure/1`, `unsafe_control_actions/1`, `causal_factors/1`.\n",
+        f"{_SAME} The first key of each is `schema`, with the file's kind: "
+        f"`{context_tables.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
+        "`unsafe_control_actions/1`, `causal_factors/1`.\n",
         *sections(
             "hazard-analysis.md",
-            stpa.HazardsModel,
-            stpa.TableModel,
-            stpa_analysis.StructureModel,
-            stpa_analysis.UnsafeActionsModel,
-            stpa_analysis.FactorsModel,
+            context_tables.HazardsModel,
+            context_tables.TableModel,
+            analysis.StructureModel,
+            analysis.UnsafeActionsModel,
+            analysis.FactorsModel,
         ),
     )
 

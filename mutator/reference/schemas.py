@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.campaigns import campaign_files as campaign
+from mutator.campaigns import campaign_files
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
 from mutator.faults import fault_models, readings
@@ -16,8 +16,7 @@ from mutator.faults import specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS
 from mutator.faults.readings import Readings
-from mutator.stpa import analysis as stpa_analysis
-from mutator.stpa import context_tables as stpa
+from mutator.stpa import analysis, context_tables
 from mutator.targets import manifest
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors know best
@@ -51,13 +50,13 @@ class Format:
 
 _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
-    (campaign.CampaignModel, campaign.SCHEMA, "campaigns/*.yaml"),
+    (campaign_files.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest.ManifestModel, manifest.SCHEMA, "targets/*.yaml"),
-    (stpa.HazardsModel, stpa.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
-    (stpa.TableModel, stpa.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
-    (stpa_analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
-    (stpa_analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
-    (stpa_analysis.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
+    (context_tables.HazardsModel, context_tables.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
+    (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
+    (analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
+    (analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
+    (analysis.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
 )
 
 

@@ -25,7 +25,7 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report import series as report_series
 from mutator.review.groups import Shape, shapes
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.web import embedded
 
@@ -48,7 +48,7 @@ class Browse:
     carried_kb: int
 
 
-def browse(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "Workspace | None") -> Browse:
+def browse_data(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "Workspace | None") -> Browse:
     """Of a run folder and the rows of its results.csv; the page will be in the folder `out`."""
     names = report_series.chosen(rows)
     carried = {}
@@ -80,7 +80,7 @@ def tables_of(folder: RunFolder, rows: Sequence[Row]) -> tuple[dict[str, Any], d
     lines = list(Results.of_run(folder.path).lines())
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
     rows, lines = [rows[i] for i in order], [lines[i] for i in order]
-    experiments = {e.id: e for e in planfile.read_all(folder.path)}
+    experiments = {e.id: e for e in plan_file.read_all(folder.path)}
     planned = [experiments.get(row.experiment_id) for row in rows]
     return table(rows, lines), details(planned, shapes(_patches(folder, rows)), rows)
 

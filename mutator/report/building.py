@@ -8,8 +8,8 @@ from pathlib import Path
 
 from mutator._common.files import write_atomic
 from mutator.outcomes.rows import outcome_counts
-from mutator.report.browse import browse
-from mutator.report.page import Content, markdown, page
+from mutator.report.browse import browse_data
+from mutator.report.page import Content, markdown, page_html
 from mutator.report.panel import FOLDER
 from mutator.report.panels import PANELS
 from mutator.report.panels.tables import NOTES
@@ -53,7 +53,7 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     content = _content(reported)
     text, hypertext = _files(out)
     write_atomic(text, markdown(content).encode())
-    write_atomic(hypertext, page(content).encode())
+    write_atomic(hypertext, page_html(content).encode())
     write_stamp(out, sources, len(reported.rows))
     return Report(markdown=text, page=hypertext, rows=len(reported.rows))
 
@@ -72,7 +72,7 @@ def _content(run: ReportedRun) -> Content:
         planned=_planned(run.folder),
         notes=NOTES.replace("*", ""),
         panels=panels,
-        browse=browse(run.folder, run.rows, run.out, run.workspace),
+        browse=browse_data(run.folder, run.rows, run.out, run.workspace),
     )
 
 

@@ -9,7 +9,7 @@ from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 
 LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
 _WORDS = {
@@ -37,7 +37,7 @@ class EngineSummary:
 def engine_summary(folder: RunFolder) -> EngineSummary | None:
     """What the timings and `proof/` of a run folder say; None if neither names an engine."""
     ways = _ways(folder)
-    if not ways and not (folder.path / proof.FOLDER).is_dir():
+    if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder)
     table = Table(heads=("how", "experiments"), rows=list(_lines(ways)), right=(1,))
@@ -69,7 +69,7 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
 def _proof(folder: RunFolder) -> tuple[str, str, bool]:
     """What is said of the proof, the same in few words, and whether it failed."""
     try:
-        found = proof.judge(folder, read_records(folder.path))
+        found = equivalence.judge(folder, read_records(folder.path))
     except CheckFailed as err:
         said = f"The proof failed, so nothing here is to be trusted: {err.got}."
         return said, f"FAILED: {err.got}", True

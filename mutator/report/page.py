@@ -57,7 +57,7 @@ def markdown(content: Content) -> str:
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
-def page(content: Content) -> str:
+def page_html(content: Content) -> str:
     """The report as one HTML page that needs no other file; every text in it is escaped."""
     from markupsafe import Markup
 

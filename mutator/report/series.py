@@ -62,7 +62,7 @@ def carried(folder: RunFolder, workspace: "Workspace", names: Iterable[str]) -> 
     for name in names:
         with suppress(MutatorError, KeyError):  # sources have changed, say, or a plan lacks what results have
             golden, faulty = traces.of(name)
-            made[name] = series(traces.manifest, golden, faulty, traces.record(name))
+            made[name] = packed_series(traces.manifest, golden, faulty, traces.record(name))
     return made
 
 
@@ -82,7 +82,7 @@ def keep(folder: RunFolder, manifest: TargetManifest, golden: Trace, faulty: Tra
     """Write the series of one experiment to where the page looks for it."""
     path = series_path(folder, record.experiment_id)
     path.parent.mkdir(parents=True, exist_ok=True)
-    data = packed(series(manifest, golden, faulty, record))
+    data = packed(packed_series(manifest, golden, faulty, record))
     write_atomic(path, f'Series.loaded("{record.experiment_id}", "{data}");\n'.encode())
     return path
 
@@ -97,7 +97,7 @@ def kept(out: Path) -> list[str]:
     return sorted(path.stem for path in (out / FOLDER).glob("[0-9a-f]*.js"))
 
 
-def series(manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> dict[str, Any]:
+def packed_series(manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> dict[str, Any]:
     """Every channel of the manifest that both runs have, compared ones first; marks and time active."""
     time = manifest.time_channel
     wanted = (*manifest.compared, *manifest.plotted)

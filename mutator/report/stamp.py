@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.outcomes.reader import Results
 from mutator.review import gate
 from mutator.store.run_folder import HEAD, RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
 SCHEMA = "report/1"
@@ -27,7 +27,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
     results = [digest((run / HEAD).read_bytes()), digest(Results.of_run(run).csv())]
     # The records, too: what the proof compares is more of them than the results have.
-    engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", proof.FOLDER)]
+    engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
     reviewed = _files(run, gate.FILE)
     return digest([SCHEMA, own, results, engine, plots, references, reviewed])
 

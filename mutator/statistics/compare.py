@@ -15,8 +15,8 @@ import pandas as pd
 
 from mutator.statistics.paired import Matched
 from mutator.statistics.paired import mcnemar as exact_mcnemar
-from mutator.statistics.share import CONFIDENCE
-from mutator.statistics.tally import Tally
+from mutator.statistics.shares import CONFIDENCE
+from mutator.statistics.tallies import Tally
 
 Whole = Literal["activated", "injected"]
 WHOLES: tuple[Whole, ...] = ("activated", "injected")

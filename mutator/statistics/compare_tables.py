@@ -6,9 +6,9 @@ from mutator.statistics import compare
 from mutator.statistics.compare import WHOLES, Whole
 from mutator.statistics.paired import Matched
 from mutator.statistics.published import OURS, Published, by_source
-from mutator.statistics.share import share
+from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, P, Sheet
-from mutator.statistics.tally import by_kind
+from mutator.statistics.tallies import by_kind
 
 
 def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mutator.statistics.share import CONFIDENCE
+from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 9999
 _SEED = 1  # of the resampling: the same results give the same interval

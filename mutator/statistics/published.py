@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mutator.statistics.tally import Tally
+from mutator.statistics.tallies import Tally
 
 OURS = "here"  # what the rows of a run are called where others stand beside them
 Counts = Mapping[tuple[str, str], Tally]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mutator._common.tables import Table
-from mutator.statistics.share import Share
+from mutator.statistics.shares import Share
 
 _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
 

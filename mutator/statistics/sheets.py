@@ -8,7 +8,7 @@ from mutator.statistics import compare_tables, summary_tables, time_tables
 from mutator.statistics.compare import GUIDED, RANDOM
 from mutator.statistics.published import Published
 from mutator.statistics.sheet import Sheet
-from mutator.statistics.tally import by_kind, by_scenario
+from mutator.statistics.tallies import by_kind, by_scenario
 from mutator.statistics.times import Alerts
 
 _DRIVER_S = 1.8  # a driver's reaction to a warning that is seen, where nothing published says another

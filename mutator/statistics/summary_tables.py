@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 
 from mutator.statistics.published import OURS, Counts, Published
-from mutator.statistics.share import Share, share
+from mutator.statistics.shares import Share, share
 from mutator.statistics.sheet import Cell, Sheet
-from mutator.statistics.tally import Tally, total
+from mutator.statistics.tallies import Tally, total
 
 _MEASURES = (
     ("activated", "injected"),

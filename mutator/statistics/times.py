@@ -13,7 +13,7 @@ from itertools import pairwise
 import pandas as pd
 
 from mutator.statistics.frame import hazard_names
-from mutator.statistics.share import CONFIDENCE, Share, share
+from mutator.statistics.shares import CONFIDENCE, Share, share
 
 Alerts = Mapping[str, tuple[tuple[str, float], ...]]
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
-from mutator.stpa.coverage import Coverage, coverage
+from mutator.stpa.coverage import Coverage, measure_coverage
 from mutator.triggers.conditions import VARIABLES, check_condition
 
 CONTEXT_SCHEMA = "context_table/1"
@@ -174,7 +174,7 @@ def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:
 
 
 def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
-    found = coverage({row.id: row.condition for row in rows})
+    found = measure_coverage({row.id: row.condition for row in rows})
     if found.place is None:
         return found
     if not found.rows:

@@ -43,7 +43,7 @@ class _BeyondError(Exception):
     """A comparison that is not of one variable with a constant."""
 
 
-def coverage(conditions: Mapping[str, str]) -> Coverage:
+def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
     """Test the checked conditions of a table, row id -> condition, in every cell."""
     try:
         cuts = _cuts(conditions.values())

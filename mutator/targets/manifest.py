@@ -11,7 +11,7 @@ from mutator._common import caches
 from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
-from mutator.targets.observation import Observation, ObservationModel, observation
+from mutator.targets.observation import Observation, ObservationModel, read_observation
 from mutator.targets.source_tree import SourceTree, matches, read_tree
 
 SCHEMA = "target/1"
@@ -265,7 +265,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         compared=_channels(model.compare),
         plotted=_channels(model.plot),
         record_file=model.record_file,
-        observation=observation(model.observation, source, folder),
+        observation=read_observation(model.observation, source, folder),
         hazards=tuple(model.hazards),
         alerts=tuple(model.alerts),
         source=source,

@@ -38,7 +38,7 @@ class ObservationModel(StrictModel, title="The observation"):
     v_lead: str = Field(description="Speed of the vehicle ahead in m/s.")
 
 
-def observation(model: ObservationModel, source: Source, root: Path) -> Observation:
+def read_observation(model: ObservationModel, source: Source, root: Path) -> Observation:
     """The observation of a manifest; errors point into `source`."""
     location = model.at.location(source, ("observation", "at"))
     try:

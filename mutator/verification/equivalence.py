@@ -14,7 +14,7 @@ from mutator._common.hashing import digest
 from mutator.campaigns.sampling import pick
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 
@@ -83,7 +83,7 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
 
 def _sampled(folder: RunFolder) -> list[str]:
     """Ids of the sample that are of this folder's share, in the plan's order."""
-    experiments = planfile.read_all(folder.path)
+    experiments = plan_file.read_all(folder.path)
     wanted = {experiment.id for experiment in sample(experiments, folder.head["seed"])}
     shard, place, ids = folder.shard, 0, []
     for index, (_, _, count) in enumerate(folder.head["chunks"]):

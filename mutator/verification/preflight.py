@@ -19,13 +19,13 @@ from mutator.mutants.building import InvalidMutant, build
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.records import Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
-from mutator.verification import preflight_cache as check_cache
+from mutator.verification import preflight_cache
 from mutator.verification.preflight_rules import CheckRun, judge_golden, judge_null, judge_same
 from mutator.workspace import Workspace
 
@@ -57,7 +57,7 @@ def run_checks(
             where=folder.path / FILE,
             remedy="mend target, templates or canary; the campaign does not start before all pass",
         )
-    check_cache.store(check_cache.entry(checks.digest), folder.path, FILE)
+    preflight_cache.store(preflight_cache.entry(checks.digest), folder.path, FILE)
     return results
 
 
@@ -72,13 +72,13 @@ class _Checks:
         self.models = workspace.fault_models()
         self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
         self.seed: int = head["seed"]
-        fault = planfile.fault_from(head["canary"]["fault"])
-        self.canary: Experiment = planfile.experiment_from(
+        fault = plan_file.fault_from(head["canary"]["fault"])
+        self.canary: Experiment = plan_file.experiment_from(
             head["canary"] | {"fault": fault.id}, {fault.id: fault}
         )
         self.hazard: str = head["canary_hazard"]
         now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
-        self.variants = {fault.spec: fault for fault in planfile.read_faults(folder.path).values()}
+        self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
         content = [now, versions(), head["goldens"], self.seed, self.canary.id, self.hazard, head["limits"]]
         self.digest = digest([*content, places])
@@ -88,7 +88,7 @@ class _Checks:
         as they were; they are then here."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
-        place = check_cache.entry(self.digest)
+        place = preflight_cache.entry(self.digest)
         try:
             found = read_json(place / FILE, SCHEMA)
             results = self._passed(found, place)
@@ -98,7 +98,7 @@ class _Checks:
             self._check_same_as_before(found["goldens"])
             try:
                 with raising_disk_full(self.folder.path):
-                    check_cache.copy(place, self.folder.path, FILE)
+                    preflight_cache.copy(place, self.folder.path, FILE)
             except OSError:
                 return None  # it was deleted meanwhile
         return results

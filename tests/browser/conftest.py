@@ -17,8 +17,7 @@ from mutator.campaigns.plans import freeze, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes import results
-from mutator.report import building as report
-from mutator.report import series as report_series
+from mutator.report import building, series
 from mutator.report.panels import figures
 from mutator.store.records import SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder
@@ -91,10 +90,10 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     names = ("gas", "brake", "wheel_turn", "gap", "speed")
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}
     faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
-    report_series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7))
+    series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7))
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures, "drawings", lambda frame: ())
-        report.write(out.path, None)
+        building.write(out.path, None)
     return out.path
 
 

@@ -19,7 +19,7 @@ from mutator.execution.running import run_campaign
 from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import Progress
 from mutator.workspace import Workspace
 
@@ -141,14 +141,14 @@ def test_rerun_gives_the_same_record_and_a_trace(toy: Workspace, finished: Path)
 
 def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
     """An experiment can be run with nothing but a workspace; golden is run too."""
-    experiment = planfile.read_all(finished)[0]
+    experiment = plan_file.read_all(finished)[0]
     single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
     assert single.record.status is Status.OK
     assert (single.golden / "log.npz").is_file()
     assert (tmp_path / "alone" / "mutant.patch").is_file()
     hostile = Choices(only='fault_type == "unsound"')
     run_campaign(toy, "hostile", tmp_path / "hostile", choices=hostile)
-    unsound = planfile.read_all(tmp_path / "hostile")[0]
+    unsound = plan_file.read_all(tmp_path / "hostile")[0]
     refused = run_single(toy, toy.manifest("toycar"), unsound, tmp_path / "alone")
     assert (refused.mutant, refused.record.status) == (None, Status.INVALID_MUTANT)
     (toy.library.parent / "tree" / "toycar" / "go.py").write_text("raise SystemExit(1)")

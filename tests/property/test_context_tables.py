@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.stpa.coverage import coverage
+from mutator.stpa.coverage import measure_coverage
 from mutator.triggers.conditions import check_condition, evaluate
 
 NUMBERS = st.sampled_from([-1.0, 0.0, 0.5, 2.0])
@@ -37,8 +37,8 @@ def test_what_is_proved_holds_everywhere(
     """Where a table is proved no observation, infinite ones included, is in no context or in two."""
     texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
     right = {row: check_condition(text) for row, text in texts.items()}
-    assert coverage(right).place is None
+    assert measure_coverage(right).place is None
     assert len(contexts_at(right, hwt, rs, v_ego)) == 1
     loose = {"A": check_condition(first), "B": check_condition(second)}
     if len(contexts_at(loose, hwt, rs, v_ego)) != 1:
-        assert coverage(loose).place is not None
+        assert measure_coverage(loose).place is not None

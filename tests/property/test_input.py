@@ -7,7 +7,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mutator.config import yaml_files as yamlio
+from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.readings import UNDECLARED
 from mutator.faults.specs import load_spec
@@ -34,7 +34,7 @@ def test_any_bytes(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "x.yaml"
     path.write_bytes(data)
     try:
-        yamlio.load(path)
+        yaml_files.load(path)
     except MutatorError as error:
         assert str(error).startswith(str(path))
 
@@ -48,7 +48,7 @@ def test_plain_data_survives(tmp_path: Path, value: object) -> None:
     text = path.read_text(encoding="utf-8")
     if "!!" in text or "\x85" in text or "\u2028" in text or "\u2029" in text:
         return
-    source = yamlio.load(path)
+    source = yaml_files.load(path)
     assert source.data == value
     assert source.lines[()] == 1
 

@@ -126,7 +126,9 @@ def test_faults_to_iterate_over(toycar: Workspace) -> None:
     }
     assert toycar.faults(toycar.library / "faults" / "sensor" / "distance.yaml") == whole
     assert {fault.reading for fault in toycar.faults("*/lane/*", reading="as_coded")} == {"as_coded"}
-    with pytest.raises(MutatorError, match=r"no fault is named like 'sensor/lan'.*did you mean 'sensor/lane'"):
+    with pytest.raises(
+        MutatorError, match=r"no fault is named like 'sensor/lan'.*did you mean 'sensor/lane'"
+    ):
         toycar.faults("sensor/lan")
 
 

@@ -15,7 +15,7 @@ from mutator.api.runs import Run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.model import Experiment, Outcome, Status
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 from mutator.store.records import SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -76,7 +76,7 @@ def test_it_says_what_it_is(run: Run) -> None:
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "packages", "choices"} <= set(run.provenance)
     assert set(run.results["fault_id"]) == set(run.faults)
-    assert list(run.experiments) == list(planfile.ids(run.path))
+    assert list(run.experiments) == list(plan_file.ids(run.path))
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def driven(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) ->
     folder = RunFolder.open(
         write_run(toycar, tmp_path / "runs" / "first", lambda e: None, campaign="small", only=LANE, limit=1)
     )
-    [experiment] = planfile.read_all(folder.path)
+    [experiment] = plan_file.read_all(folder.path)
     single = run_single(toycar, toycar.manifest("toycar"), experiment, tmp_path / "single")
     golden = folder.golden(experiment.scenario, experiment.changes)
     golden.parent.mkdir()

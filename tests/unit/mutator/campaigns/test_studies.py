@@ -9,7 +9,7 @@ import pytest
 from mutator.campaigns import studies
 from mutator.campaigns.studies import find_study, study_names
 from mutator.errors import MutatorError
-from mutator.report import building as report
+from mutator.report import building
 from mutator.workspace import Workspace
 
 from ..report.made_run import make_run
@@ -44,7 +44,7 @@ def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path
     """The example of the how-to page works as it stands: its panel is in both forms, with its source."""
     run = tmp_path / "run"
     run.mkdir()
-    written = report.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
+    written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "Crashed runs: 1 here, 12 in the published tests." in text
         assert "crash_tests (A. Author: Crash tests, 2026)" in text

@@ -5,18 +5,18 @@ from pathlib import Path
 import pytest
 from pydantic import Field
 
-from mutator.config import yaml_files as yamlio
+from mutator.config import yaml_files
 from mutator.errors import MutatorError
 
 
-class Wheel(yamlio.StrictModel):
+class Wheel(yaml_files.StrictModel):
     """A part of the file."""
 
     radius: float
     spokes: int = 5
 
 
-class Car(yamlio.StrictModel):
+class Car(yaml_files.StrictModel):
     """A whole file."""
 
     name: str
@@ -28,7 +28,7 @@ class Car(yamlio.StrictModel):
 def read(tmp_path: Path, text: str | bytes) -> Car:
     path = tmp_path / "car.yaml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return yamlio.read(path, Car, "car/2")[0]
+    return yaml_files.read(path, Car, "car/2")[0]
 
 
 def test_a_good_file_is_read(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_file_made_to_hurt(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     """A missing file is an error of the user, not a traceback."""
     with pytest.raises(MutatorError, match="cannot be read"):
-        yamlio.load(tmp_path / "none.yaml")
+        yaml_files.load(tmp_path / "none.yaml")
 
 
 def test_several_mistakes_are_counted(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes import results
 from mutator.outcomes.columns import result_columns
 from mutator.outcomes.reader import Results
-from mutator.report import building as report
+from mutator.report import building
 from mutator.statistics.frame import load
 from mutator.store import plan_file
 from mutator.workspace import Workspace
@@ -121,7 +121,7 @@ def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> No
     assert "hazard CRUSHED [s]" in export(run, Format.JUNIT).read_text()
     elements = export(run, Format.MUTATION_ELEMENTS, workspace=crane).read_text()
     assert "CRUSHED, DROPPED in" in elements
-    text = report.write(run, crane).markdown.read_text()
+    text = building.write(run, crane).markdown.read_text()
     assert "CRUSHED" in text
     assert "H1" not in text
 

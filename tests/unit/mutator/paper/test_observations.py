@@ -14,8 +14,8 @@ from mutator.paper import observations, observations_page
 from mutator.paper.measures import Estimate, median_time, of_difference, of_share
 from mutator.paper.observations import JudgedClaim, JudgedObservation, Rule, Verdict, judge, together
 from mutator.paper.published import load_paper
-from mutator.statistics.share import share
-from mutator.statistics.tally import Tally
+from mutator.statistics.shares import share
+from mutator.statistics.tallies import Tally
 
 from ..statistics.results_frame import results
 

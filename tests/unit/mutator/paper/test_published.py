@@ -10,9 +10,9 @@ from mutator.errors import MutatorError
 from mutator.paper.published import Paper, load_paper
 from mutator.statistics import compare
 from mutator.statistics.compare_tables import kinds_sheet, overall_sheet
-from mutator.statistics.share import share
+from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
-from mutator.statistics.tally import Tally, by_kind, by_scenario, total
+from mutator.statistics.tallies import Tally, by_kind, by_scenario, total
 
 from ..statistics.results_frame import results
 

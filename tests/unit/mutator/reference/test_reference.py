@@ -11,7 +11,7 @@ from typer.main import get_command
 
 from mutator._common import shipped
 from mutator.cli.main import GROUPS, app
-from mutator.config import yaml_files as yamlio
+from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.specs import spec_model
 from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, generated_files, write
@@ -98,7 +98,7 @@ def test_library_files_follow_their_schema(kind: Format) -> None:
     assert files
     check = validator(kind.name)
     for file in files:
-        data = yamlio.load(file).data
+        data = yaml_files.load(file).data
         assert data["schema"] == kind.schema, file
         assert not [f"{file}: {error.message}" for error in check.iter_errors(data)]
 
@@ -118,7 +118,7 @@ def test_library_files_follow_their_schema(kind: Format) -> None:
 )
 def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...], value: Any) -> None:
     """A misspelt key or parameter, a wrong word, a number out of range: the editor marks it."""
-    data = yamlio.load(CHAFF).data
+    data = yaml_files.load(CHAFF).data
     check = validator("fault_spec")
     assert check.is_valid(data)
     inner = data
@@ -130,7 +130,7 @@ def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...]
 
 def test_a_schema_takes_a_model_of_ones_own() -> None:
     """A model that is not among the templates is no mistake to an editor: it may be the user's own."""
-    data = yamlio.load(CHAFF).data
+    data = yaml_files.load(CHAFF).data
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
     assert validator("fault_spec").is_valid(data)

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from mutator.outcomes.columns import result_columns
-from mutator.store import plan_file as planfile
+from mutator.store import plan_file
 
 COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
 HEAD = {
@@ -77,7 +77,7 @@ def make_run(folder: Path, **head: object) -> Path:
         table.writeheader()
         for i, line in enumerate((OK, BAD, CRASHED)):
             table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
-    planfile.write(folder, [], [])
+    plan_file.write(folder, [], [])
     (folder / "patches/00").mkdir(parents=True)
     (folder / "patches/00" / ("0" * 16 + ".patch")).write_text(PATCH)
     (folder / "plots").mkdir()

@@ -8,7 +8,7 @@ import pytest
 from mutator._common.files import write_json
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.rows import Row
-from mutator.report import browse as report_browse
+from mutator.report import browse
 from mutator.report.browse import column, details, media
 from mutator.review.groups import shapes
 from mutator.store.run_folder import RunFolder
@@ -104,4 +104,4 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 def test_rows_are_read_in_one_order() -> None:
     """By fault, scenario, method, trigger, then id: the page is the same whatever order results come in."""
     rows = [row("b"), row("a")]
-    assert sorted(rows, key=report_browse.reading_order) == [rows[1], rows[0]]
+    assert sorted(rows, key=browse.reading_order) == [rows[1], rows[0]]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.report import building as report
+from mutator.report import building
 from mutator.report.panels import failed
 from mutator.review import gate
 from mutator.workspace import Workspace
@@ -29,7 +29,7 @@ def run(tmp_path: Path) -> Path:
 
 def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     """It is listed first among the runs that ended badly, and is in no count of faults."""
-    text = report.write(run, None).markdown.read_text()
+    text = building.write(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not end well")[1]
     assert failed.index("harness_error") < failed.index("crashed")
@@ -41,7 +41,7 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
 
 def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
     """Every tag is closed, and text from specs and runs cannot become markup."""
-    page = Page(report.write(run, None).page.read_text())
+    page = Page(building.write(run, None).page.read_text())
     assert page.open == []
     assert "night_<b>drive</b>" in page.texts
     assert "the disk | is <gone>" in page.texts
@@ -55,7 +55,7 @@ def carried(page: Path, name: str) -> Any:
 
 def test_the_page_needs_no_other_file(run: Path) -> None:
     """Whatever it shows is in it: its links lead into itself, and nothing comes from elsewhere."""
-    written = report.write(run, None)
+    written = building.write(run, None)
     page = Page(written.page.read_text())
     assert page.links
     assert all(link.startswith(("#", "data:")) for link in page.links)
@@ -64,7 +64,7 @@ def test_the_page_needs_no_other_file(run: Path) -> None:
 
 def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> None:
     """All columns of the results, the diff without the probe, and the picture itself."""
-    page = report.write(run, None).page
+    page = building.write(run, None).page
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}
     assert table["count"] == 3
@@ -83,14 +83,14 @@ def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> 
 def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A page of 100,000 crashes does not list each; the rest is one filter away."""
     monkeypatch.setattr(failed, "PAGE_LISTED", 1)
-    text = report.write(run, None).page.read_text()
+    text = building.write(run, None).page.read_text()
     assert "1 more: " in text
     assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
 
 
 def test_the_report_says_what_it_comes_from(run: Path) -> None:
     """Plan, seed, reading, choices, sources and versions are in both forms."""
-    written = report.write(run, None)
+    written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
             assert fact in text
@@ -98,27 +98,27 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 
 def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
     """Approvals that a run kept are told in both forms, and one that has none says nothing of them."""
-    assert "reviewed" not in report.write(run, None).markdown.read_text()
+    assert "reviewed" not in building.write(run, None).markdown.read_text()
     gate.write_approvals(
         run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
     )
-    written = report.ensure(run, None)
+    written = building.ensure(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "all of 2 groups approved, by Jane (1), Joe (1)" in text
 
 
 def test_the_report_is_the_same_each_time(run: Path) -> None:
     """Written again from the same results, it is the same file."""
-    written = report.write(run, None)
+    written = building.write(run, None)
     before = written.page.read_bytes(), written.markdown.read_bytes()
-    again = report.write(run, None)
+    again = building.write(run, None)
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
 
 
 def test_no_report_without_a_run(tmp_path: Path) -> None:
     """A folder that is no run folder is the user's error."""
     with pytest.raises(MutatorError, match="no run folder"):
-        report.write(tmp_path, None)
+        building.write(tmp_path, None)
 
 
 def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
@@ -126,7 +126,7 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
     with (run / "results.csv").open("a", newline="") as file:
         other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
         csv.DictWriter(file, COLUMNS, restval="").writerow(other)
-    written = report.write(run, None)
+    written = building.write(run, None)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
     assert sorted(base64.b64decode(link.partition(",")[2]) for link in shown) == sorted(
@@ -139,17 +139,17 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
 def test_experiments_and_runs_are_told_apart(run: Path) -> None:
     """Both numbers are there, and why they differ; a plan of before runs were shared has none of runs."""
     assert (
-        "3 experiments are planned; all of them take 2 runs" in report.write(run, None).markdown.read_text()
+        "3 experiments are planned; all of them take 2 runs" in building.write(run, None).markdown.read_text()
     )
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
-    assert "3 experiments are planned.\n" in report.write(run, None).markdown.read_text()
+    assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
 
 
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:
     """Whether `ensure` writes the report instead of leaving it."""
     page = run / "report" / "index.html"
     before = page.stat().st_mtime_ns if page.exists() else None
-    report.ensure(run, workspace)
+    building.ensure(run, workspace)
     return page.stat().st_mtime_ns != before
 
 
@@ -171,7 +171,7 @@ def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
 @pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
 def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
     """A page or the note of what it was made from may be missing or cut short."""
-    report.write(run, None)
+    building.write(run, None)
     (run / "report" / damage).unlink()
     assert drawn_again(run, None)
     (run / "report" / "made_from.json").write_text("{")
@@ -183,7 +183,7 @@ def test_a_campaign_without_a_study_is_reported_without_its_words(
     run: Path, workspace: Workspace | None
 ) -> None:
     """Published fault types alone bring no published numbers into a report, whatever the library cites."""
-    written = report.write(run, workspace)
+    written = building.write(run, workspace)
     page = re.sub(r"(?s)<(style|script).*?</\1>", "", written.page.read_text())
     shown = written.markdown.read_text() + page
     assert not {"paper", "observation", "study"} & set(re.findall(r"[a-z]+", shown.lower()))
@@ -196,6 +196,6 @@ def test_a_study_that_cannot_be_asked_is_said_and_left_out(
     tmp_path: Path, workspace: Workspace | None
 ) -> None:
     """The package may be missing here, or the library: the report is written, and its origin says why."""
-    text = report.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
+    text = building.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
     assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
     assert ("moon_landing, which needs a fault library" in text) == (workspace is None)

@@ -9,9 +9,7 @@ import pytest
 from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.results import build
-from mutator.report import building as report
-from mutator.report import engines
-from mutator.report import stamp as report_stamp
+from mutator.report import building, engines, stamp
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -138,7 +136,7 @@ def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
     the facts; how experiments were run is told further down, escaped."""
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build(run)
-    written = report.write(run, None)
+    written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert text.index("The proof failed") < text.index("experiments are planned")
         assert f"FAILED: experiment {record_ids(run)[0]} is another one" in text
@@ -150,22 +148,22 @@ def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
     """Results that have not changed are not all: more of its proof makes the report out of date."""
     run = finish(3)
     build(run)
-    before = report_stamp.made_from(RunFolder.open(run), None)
-    assert before == report_stamp.made_from(RunFolder.open(run), None)
+    before = stamp.made_from(RunFolder.open(run), None)
+    assert before == stamp.made_from(RunFolder.open(run), None)
     write(run / "proof/0002-main.jsonl", SCHEMA, [])
-    assert before != report_stamp.made_from(RunFolder.open(run), None)
+    assert before != stamp.made_from(RunFolder.open(run), None)
 
 
 def test_a_report_is_made_from_its_records(finish: Finish) -> None:
     """A trace digest, which the proof compares, is in no result; another one makes the report out of date."""
     run = finish(4)
     build(run)
-    results, before = (run / "results.csv").read_bytes(), report_stamp.made_from(RunFolder.open(run), None)
+    results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
     path = run / "records/0001-main.jsonl"
     path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
     build(run)
     assert (run / "results.csv").read_bytes() == results
-    assert before != report_stamp.made_from(RunFolder.open(run), None)
+    assert before != stamp.made_from(RunFolder.open(run), None)
 
 
 def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:

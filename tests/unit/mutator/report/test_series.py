@@ -11,7 +11,7 @@ import pytest
 from mutator._common.files import write_json
 from mutator.model import Outcome, Record, Status
 from mutator.report import series as report_series
-from mutator.report.series import BUCKETS, chosen, keep, series, thinned
+from mutator.report.series import BUCKETS, chosen, keep, packed_series, thinned
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -43,7 +43,7 @@ def made(toycar: Workspace, record: Callable[..., Record]) -> dict[str, Any]:
     t = np.arange(0.0, 6.0, 0.05)
     golden = {"time": t, "gas": np.ones_like(t), "speed": np.full_like(t, np.inf)}
     faulty = {"time": t[:80], "gas": np.where(t < 2.0, 1.0, 1.5)[:80], "speed": golden["speed"][:80]}
-    return series(toycar.manifest("toycar"), golden, faulty, record(t_manifest=2.0))
+    return packed_series(toycar.manifest("toycar"), golden, faulty, record(t_manifest=2.0))
 
 
 def test_a_series_says_where_the_runs_differ(made: dict[str, Any]) -> None:

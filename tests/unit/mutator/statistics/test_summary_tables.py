@@ -6,9 +6,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.statistics.frame import load
-from mutator.statistics.share import share
+from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
-from mutator.statistics.tally import Tally, by_kind, by_scenario
+from mutator.statistics.tallies import Tally, by_kind, by_scenario
 
 from .results_frame import results
 

@@ -10,7 +10,7 @@ import pytest
 from mutator._common import locks
 from mutator.campaigns.plans import freeze, make_plan
 from mutator.errors import MutatorError
-from mutator.store import run_folder as runfolder
+from mutator.store import run_folder
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -65,7 +65,7 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
 def test_no_run_folder(tmp_path: Path) -> None:
     """A folder without run.json is told as such, also to `clean`, which deletes nothing."""
     (tmp_path / "thesis.tex").touch()
-    for ask in (RunFolder.open, runfolder.clean):
+    for ask in (RunFolder.open, run_folder.clean):
         with pytest.raises(MutatorError, match="no run folder"):
             ask(tmp_path)
     assert (tmp_path / "thesis.tex").exists()
@@ -83,7 +83,7 @@ def test_one_owner(folder: RunFolder) -> None:
     """While a command owns the folder another is refused, told who it is; a dead one's lock is gone."""
     process = holder(folder, "owner")
     try:
-        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: runfolder.clean(folder.path)):
+        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: run_folder.clean(folder.path)):
             with pytest.raises(MutatorError, match=f"in use by process {process.pid}"):
                 attempt()
     finally:
@@ -106,7 +106,7 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
 
 def test_clean_deletes_everything(folder: RunFolder) -> None:
     """A run folder that nobody holds is deleted whole."""
-    runfolder.clean(folder.path)
+    run_folder.clean(folder.path)
     assert not folder.path.exists()
 
 

@@ -2,12 +2,12 @@
 
 import pytest
 
-from mutator.stpa.coverage import coverage
+from mutator.stpa.coverage import measure_coverage
 from mutator.triggers.conditions import check_condition
 
 
 def prove(*conditions: str):
-    return coverage({f"C{i}": check_condition(text) for i, text in enumerate(conditions, 1)})
+    return measure_coverage({f"C{i}": check_condition(text) for i, text in enumerate(conditions, 1)})
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from mutator.execution.running import run_campaign
 from mutator.model import Experiment
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence as proof
+from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
 
@@ -22,21 +22,21 @@ def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., 
     """One in a hundred, 20 at least, the same for the same seed, and nothing rare is missing."""
     many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
     rare = experiment(1.0, "S9", spec="vision/rain/rate")
-    sample = proof.sample([*many, rare], 1)
+    sample = equivalence.sample([*many, rare], 1)
     assert 31 <= len(sample) <= 32
     assert rare in sample
     assert {e.scenario for e in sample} == {"S0", "S1", "S2", "S3", "S4", "S9"}
-    assert sample == proof.sample([*many, rare], 1)
-    assert sample != proof.sample([*many, rare], 2)
-    assert len(proof.sample(many[:100], 1)) == 20
-    assert set(proof.sample(many[:7], 1)) == set(many[:7])
+    assert sample == equivalence.sample([*many, rare], 1)
+    assert sample != equivalence.sample([*many, rare], 2)
+    assert len(equivalence.sample(many[:100], 1)) == 20
+    assert set(equivalence.sample(many[:7], 1)) == set(many[:7])
 
 
 @pytest.fixture
 def proven(toycar: Workspace, tmp_path: Path) -> Path:
     """A run folder of two experiments from the fork engine, with its proof."""
     summary = run_campaign(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
-    assert summary.proof == proof.Proof(sampled=2, same=2)
+    assert summary.proof == equivalence.Proof(sampled=2, same=2)
     assert summary.exit_code == 0
     return tmp_path / "run"
 
@@ -58,12 +58,12 @@ def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -
     (path,) = (proven / "proof").iterdir()
     path.write_text(path.read_text().splitlines()[0] + "\n")
     folder = RunFolder.open(proven)
-    assert [len(piece.ids) for piece in proof.left(folder)] == [2]
+    assert [len(piece.ids) for piece in equivalence.left(folder)] == [2]
     records = read_records(proven)
-    assert proof.judge(folder, records) == proof.Proof(sampled=2, same=0)
+    assert equivalence.judge(folder, records) == equivalence.Proof(sampled=2, same=0)
     summary = run_campaign(toycar, "small", proven, engine="reference")
-    assert (summary.proof, summary.ran, summary.exit_code) == (proof.Proof(sampled=2, same=2), 0, 0)
-    assert proof.left(folder) == ()
+    assert (summary.proof, summary.ran, summary.exit_code) == (equivalence.Proof(sampled=2, same=2), 0, 0)
+    assert equivalence.left(folder) == ()
 
 
 @pytest.mark.slow

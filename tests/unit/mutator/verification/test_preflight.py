@@ -11,7 +11,7 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.store.records import SCHEMA, LineWriter, Progress
 from mutator.store.run_folder import RunFolder
-from mutator.verification import preflight as checks
+from mutator.verification import preflight
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
@@ -129,9 +129,9 @@ def test_other_golden_runs_than_before_are_refused(
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA}).close()
-    monkeypatch.setattr(checks, "versions", lambda: {"python": "another"})
+    monkeypatch.setattr(preflight, "versions", lambda: {"python": "another"})
     assert all(result.passed for result in run_checks(toycar, folder))
-    monkeypatch.setattr(checks, "versions", lambda: {"python": "a third"})
+    monkeypatch.setattr(preflight, "versions", lambda: {"python": "a third"})
     original = ReferenceEngine.execute
 
     def other(self: ReferenceEngine, job, folder):  # type: ignore[no-untyped-def]

@@ -9,7 +9,7 @@ import pytest
 from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.store.run_folder import RunFolder
-from mutator.verification import preflight_cache as check_cache
+from mutator.verification import preflight_cache
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
@@ -104,7 +104,7 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
     """What is kept next stands in the place of what was damaged."""
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
-    check_cache.store(cache, checked[1].path, "checks.json")
+    preflight_cache.store(cache, checked[1].path, "checks.json")
     assert (cache / "checks.json").read_bytes() == good
     assert list(cache.parent.iterdir()) == [cache]
 
@@ -112,5 +112,5 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
 def test_no_room_for_a_cache_is_no_error(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     """Where the cache cannot be, nothing is kept and nothing is said."""
     (tmp_path / "file").write_text("")
-    check_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json")
+    preflight_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json")
     assert (tmp_path / "file").read_text() == ""

@@ -9,7 +9,7 @@ import pytest
 
 from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.model import Status
-from mutator.paper.observations_panel import observations_panel
+from mutator.paper.panels import observations_panel
 from mutator.paper.published import load_paper
 from mutator.report.studies import ReportedRun
 from mutator.store.run_folder import RunFolder
