@@ -56,10 +56,10 @@ class Workspace:
     @classmethod
     def find(
         cls,
-        root: Path | None = None,
-        library: Path | None = None,
-        templates: Path | None = None,
-        target: Path | None = None,
+        root: str | Path | None = None,
+        library: str | Path | None = None,
+        templates: str | Path | None = None,
+        target: str | Path | None = None,
     ) -> "Workspace":
         """Each of them from the first place that names or holds it.
 
@@ -67,18 +67,18 @@ class Workspace:
         `root` or MUTATOR_ROOT, which holds both, else the nearest folder from the current one upward that
         holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that is missing.
         """
-        library = library or _environment("MUTATOR_LIBRARY")
-        templates = templates or _environment("MUTATOR_TEMPLATES")
-        target = target or _environment("MUTATOR_TARGET")
-        base = root or _environment("MUTATOR_ROOT")
-        if library is None:
-            library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
-        if templates is None:
-            templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
+        base = _named(root, "MUTATOR_ROOT")
+        its_library = _named(library, "MUTATOR_LIBRARY")
+        its_templates = _named(templates, "MUTATOR_TEMPLATES")
+        its_target = _named(target, "MUTATOR_TARGET")
+        if its_library is None:
+            its_library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
+        if its_templates is None:
+            its_templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
-            library=_folder(library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
-            templates=_folder(templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
-            target=_folder(target, "target", "--target or MUTATOR_TARGET") if target else None,
+            library=_folder(its_library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
+            templates=_folder(its_templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
+            target=_folder(its_target, "target", "--target or MUTATOR_TARGET") if its_target else None,
         )
 
     def manifest(self, name: str) -> TargetManifest:
@@ -230,8 +230,9 @@ def _variants(spec: FaultSpec) -> list[str]:
     return [f"{spec.name}/{variant.name}" for variant in spec]
 
 
-def _environment(name: str) -> Path | None:
-    value = os.environ.get(name)
+def _named(given: str | Path | None, variable: str) -> Path | None:
+    """The folder that is given, or named by the environment."""
+    value = given or os.environ.get(variable)
     return Path(value) if value else None
 
 

@@ -185,9 +185,12 @@ def _tell(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None
     """The end of a run: table, report, and what is left to do."""
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = run.report() if summary.results else None
+    report = (
+        [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []
+    )
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
-        paths = {"run": str(out), "report": str(written.markdown) if written else None}
+        paths = {"run": str(out), "report": str(report[0]) if report else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
         terminal.emit(counts | paths | found)
@@ -200,7 +203,7 @@ def _tell(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None
     if summary.proof:
         terminal.say(f"proof: {summary.proof}")
     if written:
-        terminal.say(f"report: {written.markdown} and {written.page}")
+        terminal.say(f"report: {report[0]} and {report[1]}")
     if summary.harness_errors:
         terminal.say(
             f"{len(summary.harness_errors)} harness errors, in no count; the same command tries them again:"

@@ -47,6 +47,7 @@ def test_options_go_before_the_environment(
     monkeypatch.setenv("MUTATOR_TARGET", str(other))
     assert Workspace.find().target == other
     assert Workspace.find(target=root / "target").target == root / "target"
+    assert Workspace.find(str(root), target=str(root / "target")).target == root / "target"
 
 
 def test_outside_a_clone_there_is_what_ships(elsewhere: Path) -> None:
