@@ -162,7 +162,7 @@ def run(
     chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     try:
         with campaign_progress(terminal) as notify, warnings.catch_warnings():
-            warnings.simplefilter("ignore", IncompleteRun)  # `_tell` says it in full
+            warnings.simplefilter("ignore", IncompleteRun)  # `_print_end` says it in full
             made = run_campaign(
                 campaign,
                 out,
@@ -176,12 +176,12 @@ def run(
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
     assert made.summary is not None  # it has just run
-    _tell(terminal, out, made, made.summary)
+    _print_end(terminal, out, made, made.summary)
     if made.summary.exit_code:
         raise typer.Exit(made.summary.exit_code)
 
 
-def _tell(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None:
+def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None:
     """The end of a run: table, report, and what is left to do."""
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = run.report() if summary.results else None
