@@ -1,6 +1,6 @@
 """`python -m mutator` is `mutator`."""
 
-from mutator.cli.main import main
+from mutator.cli.app import main
 
 if __name__ == "__main__":
     raise SystemExit(main())

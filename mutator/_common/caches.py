@@ -3,6 +3,7 @@
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
       targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
+      shipped/<digest>/    what an installed wheel carries, unpacked (see `shipped`)
 
 Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
 used. An unwritable or damaged cache is ignored, and any entry may be deleted at any time.
@@ -15,15 +16,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-CHECKS, TARGETS = "checks", "targets"
+CHECKS, TARGETS, SHIPPED = "checks", "targets", "shipped"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """Something in the cache that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `target openpilot`. `size` is what it takes on the disk, in bytes, and
-    `used` when it was last read or written, in seconds since the epoch.
+    `what` says whose it is: `checks`, `target openpilot`, `shipped`. `size` is what it takes on the disk, in
+    bytes, and `used` when it was last read or written, in seconds since the epoch.
     """
 
     what: str
@@ -60,9 +61,15 @@ def of_target(name: str) -> Path:
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
 
 
+def of_shipped() -> Path:
+    """Where an installed wheel's controller, library and templates are unpacked."""
+    return folder() / SHIPPED
+
+
 def entries() -> list[Entry]:
-    """All that is cached: each campaign's checks, and each file that a target keeps."""
+    """All that is cached: each campaign's checks, each file that a target keeps, each unpacked archive."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
+    found += [_entry(SHIPPED, path) for path in _children(of_shipped())]
     for target in _children(folder() / TARGETS):
         found += [_entry(f"target {target.name}", path) for path in _files(target)]
     return sorted(found, key=lambda entry: (entry.what, entry.path))

@@ -5,13 +5,13 @@ compiles every .py file that it installs, and no bytecode may lie beside a targe
 make `selfdrive` importable. The archive is unpacked once into the user's cache.
 """
 
-import os
 import shutil
 import tempfile
 from functools import lru_cache
 from pathlib import Path
 from zipfile import ZipFile
 
+from mutator._common import caches
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
@@ -29,12 +29,12 @@ def shipped_folder() -> Path:
     An unpacked archive is compared with the archive, byte for byte, once in each process. MutatorError when
     it was changed or cannot be unpacked.
     """
-    return _unpacked(ARCHIVE, _cache()) if ARCHIVE.exists() else CLONE
+    return _unpacked(ARCHIVE, caches.of_shipped()) if ARCHIVE.exists() else CLONE
 
 
 def refuse_shipped(path: Path) -> None:
     """MutatorError when `path`, which is about to be written, is in the unpacked archive."""
-    if ARCHIVE.exists() and path.absolute().is_relative_to(_cache()):
+    if ARCHIVE.exists() and path.absolute().is_relative_to(caches.of_shipped()):
         raise MutatorError(
             "part of the library that ships with mutator, which stays as it is",
             where=path,
@@ -72,12 +72,6 @@ def _make_empty(folder: Path) -> None:
             expected="a new or empty folder to write a library into",
             remedy="choose another DIR",
         )
-
-
-def _cache() -> Path:
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    base = named if named.is_absolute() else Path("~/.cache").expanduser()
-    return base / "mutator" / "shipped"
 
 
 @lru_cache(maxsize=1)

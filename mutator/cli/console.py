@@ -142,7 +142,7 @@ def show_error(error: MutatorError) -> None:
         terminal.note(f"  to do: {error.remedy}")
 
 
-def told(error: MutatorError) -> str:
+def error_text(error: MutatorError) -> str:
     """An error as one of several: one line, its file as the user would type it."""
     where = short_path(error.where) or None
     return str(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator._common.text import counted
-from mutator.cli.console import Terminal, short_path, told
+from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -86,7 +86,7 @@ def _files(files: Mapping[str, Path], told: str) -> Table:
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
         data = load(path).data
-        about = data.get(told, "") if isinstance(data, dict) else ""
+        about = data.get(error_text, "") if isinstance(data, dict) else ""
         rows.append({"name": name, "file": short_path(path), "about": _line(str(about))})
     return ["name", "file", "about"], rows
 
@@ -158,7 +158,7 @@ def check(
     if as_json:
         terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
     for problem in problems:
-        terminal.say(told(problem), style="red")
+        terminal.say(error_text(problem), style="red")
     if problems:
         terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)

@@ -1,4 +1,7 @@
-"""A run written for other tools: mutation testing viewers, CI servers, spreadsheets, data frames."""
+"""A run written for other tools: mutation testing viewers, CI servers, spreadsheets, data frames.
+
+What people look at in a browser is in `report`, never here.
+"""
 
 from enum import StrEnum
 

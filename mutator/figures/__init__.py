@@ -1,1 +1,4 @@
-"""What the results of a campaign look like: figures drawn from a frame of results."""
+"""What results and runs look like: figures drawn from a frame of results, or from traces.
+
+Nothing here counts, tests, or reads a run folder.
+"""

@@ -8,7 +8,7 @@ import pytest
 from typer.main import get_command
 
 from mutator._common.tables import Table
-from mutator.cli.main import EXIT_CODES, GROUPS, app
+from mutator.cli.app import EXIT_CODES, GROUPS, app
 from mutator.cli.options import PLACE_OPTIONS
 from mutator.execution import pytest_plugin
 from mutator.reference.tables import generated

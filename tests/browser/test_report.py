@@ -274,7 +274,7 @@ def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
 
 @pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
 def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due: str) -> None:
-    """Scrolling or resizing right before printing leaves the first rows on paper, not those last seen."""
+    """A window scrolled or resized right before printing leaves paper the first rows, not those seen."""
     printing = f"""async () => {{
         const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
         {due};
@@ -286,7 +286,7 @@ def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due:
 
 
 def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
-    """Printed right after a scroll, the page has five rows; then the window is back where it was."""
+    """Printed by the browser right after a scroll: five rows are on paper, and the window keeps its place."""
     page = scrolled.page
     page.evaluate("document.querySelector('#grid').hidden = true")
     others = rows_of(page.pdf(tagged=True))

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.cli.main import main
+from mutator.cli.app import main
 from mutator.workspace import Workspace
 
 TOY = Path(__file__).parents[1] / "toy"

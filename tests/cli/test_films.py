@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from mutator.cli.main import main
+from mutator.cli.app import main
 from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json

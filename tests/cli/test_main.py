@@ -11,7 +11,7 @@ import pytest
 
 from mutator import __version__
 from mutator.cli import library
-from mutator.cli.main import GROUPS, app, main
+from mutator.cli.app import GROUPS, app, main
 from mutator.errors import EXIT_CHECK_FAILED, CheckFailed, MutatorError
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
@@ -52,7 +52,7 @@ def test_the_version_is_told(cli: Cli) -> None:
 def test_help_needs_no_heavy_package() -> None:
     """Help and errors of use come at once, since nothing that takes long to import is imported."""
     code = (
-        "import sys, mutator.cli.main as m; m.main(['--help']);"
+        "import sys, mutator.cli.app as m; m.main(['--help']);"
         f"print([x for x in {HEAVY} if x in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -62,7 +62,7 @@ def test_help_needs_no_heavy_package() -> None:
 def test_listing_needs_neither_splicer_nor_plots_nor_tables() -> None:
     """`list` reads YAML and nothing else, so libcst, matplotlib and pandas stay away."""
     code = (
-        "import sys, mutator.cli.main as m; m.main(['list']);"
+        "import sys, mutator.cli.app as m; m.main(['list']);"
         "print([x for x in ('libcst', 'matplotlib', 'pandas', 'pyarrow') if x in sys.modules])"
     )
     clone = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from mutator import load_run
-from mutator.cli.main import main
+from mutator.cli.app import main
 from mutator.execution import session
 from mutator.exports import Format
 from mutator.store import plan_file

@@ -10,7 +10,7 @@ import pytest
 from typer.main import get_command
 
 from mutator._common import shipped
-from mutator.cli.main import GROUPS, app
+from mutator.cli.app import GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.specs import spec_model

@@ -20,11 +20,11 @@ from mutator.cli import (
     experiments,
     exports,
     faults,
+    hazard_analysis,
     library,
     new_library,
     reviews,
     run_folders,
-    stpa,
 )
 from mutator.cli.console import show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
@@ -107,7 +107,7 @@ def start(
 for module in (
     library,
     new_library,
-    stpa,
+    hazard_analysis,
     faults,
     reviews,
     campaigns,

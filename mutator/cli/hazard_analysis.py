@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator._common.text import counted
-from mutator.cli.console import Terminal, short_path, told
+from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -66,7 +66,7 @@ def stpa(
     if svg:
         terminal.say(f"control structure: {short_path(svg)}")
     for problem in problems:
-        terminal.say(told(problem), style="red")
+        terminal.say(error_text(problem), style="red")
     if problems:
         terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
