@@ -35,7 +35,7 @@ MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
 def plan_of(workspace: Workspace, size: int) -> Plan:
     """The paper's campaign, in so many scenarios as are needed, cut to size."""
     text = workspace.campaign("paper").read_text()
-    names = workspace.scenario_names()
+    names = list(workspace.scenarios)
     scenarios = names[: -(-size // 2256)]  # a scenario has 282 faults, 4 contexts and 2 methods
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "paper.yaml"

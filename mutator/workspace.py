@@ -1,15 +1,20 @@
 """Where library, templates and targets are found."""
 
 import os
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.shipped import shipped_folder
-from mutator._common.text import suggestion
+from mutator._common.tables import Table
+from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, load_fault_models
 from mutator.faults.readings import Readings, load_readings
 from mutator.faults.specs import FaultSpec, load_spec
+from mutator.model import Fault
 from mutator.outcomes.columns import check_names
 from mutator.stpa.analysis import Analysis, load_analysis
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
@@ -19,7 +24,7 @@ _LIBRARY = "fault_library"
 _TEMPLATES = "templates"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Workspace:
     """A fault library, a templates folder, and optionally a target root that overrides the manifest's."""
 
@@ -27,13 +32,34 @@ class Workspace:
     templates: Path
     target: Path | None = None
 
+    def __repr__(self) -> str:
+        counts = ", ".join(counted(len(names), what) for what, names in self._contents())
+        return f"<Workspace {self.library}: {counts}>"
+
+    def _repr_html_(self) -> str:
+        rows = [["library", str(self.library)], ["templates", str(self.templates)]]
+        rows += [["target", str(self.target)]] if self.target else []
+        rows += [[counted(len(names), what), ", ".join(names)] for what, names in self._contents()]
+        return str(Table(heads=("workspace", ""), rows=rows).as_html())
+
+    def _contents(self) -> tuple[tuple[str, Collection[str]], ...]:
+        base = self.library / "faults"
+        specs = [path.relative_to(base).with_suffix("").as_posix() for path in self.spec_files()]
+        return (
+            ("fault spec", specs),
+            ("scenario", self.scenarios),
+            ("context table", self.context_tables),
+            ("campaign", self.campaigns),
+            ("target", self.targets),
+        )
+
     @classmethod
     def find(
         cls,
-        root: Path | None = None,
-        library: Path | None = None,
-        templates: Path | None = None,
-        target: Path | None = None,
+        root: str | Path | None = None,
+        library: str | Path | None = None,
+        templates: str | Path | None = None,
+        target: str | Path | None = None,
     ) -> "Workspace":
         """Each of them from the first place that names or holds it.
 
@@ -41,18 +67,18 @@ class Workspace:
         `root` or MUTATOR_ROOT, which holds both, else the nearest folder from the current one upward that
         holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that is missing.
         """
-        library = library or _environment("MUTATOR_LIBRARY")
-        templates = templates or _environment("MUTATOR_TEMPLATES")
-        target = target or _environment("MUTATOR_TARGET")
-        base = root or _environment("MUTATOR_ROOT")
-        if library is None:
-            library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
-        if templates is None:
-            templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
+        base = _named(root, "MUTATOR_ROOT")
+        its_library = _named(library, "MUTATOR_LIBRARY")
+        its_templates = _named(templates, "MUTATOR_TEMPLATES")
+        its_target = _named(target, "MUTATOR_TARGET")
+        if its_library is None:
+            its_library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
+        if its_templates is None:
+            its_templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
-            library=_folder(library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
-            templates=_folder(templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
-            target=_folder(target, "target", "--target or MUTATOR_TARGET") if target else None,
+            library=_folder(its_library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
+            templates=_folder(its_templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
+            target=_folder(its_target, "target", "--target or MUTATOR_TARGET") if its_target else None,
         )
 
     def manifest(self, name: str) -> TargetManifest:
@@ -61,9 +87,10 @@ class Workspace:
         check_names(manifest)
         return manifest
 
-    def target_names(self) -> tuple[str, ...]:
-        """Names of the manifests in the library."""
-        return self._names("targets")
+    @property
+    def targets(self) -> Mapping[str, Path]:
+        """The manifests of the library by name."""
+        return self._files("targets")
 
     def fault_models(self) -> FaultModels:
         """The fault models of the templates folder."""
@@ -96,25 +123,75 @@ class Workspace:
                 )
         return specs
 
-    def scenario_names(self) -> tuple[str, ...]:
-        """Names of the scenarios in the library."""
-        return self._names("scenarios")
+    def faults(
+        self,
+        pattern: str | Path = "*",
+        *,
+        reading: str | None = None,
+        seed: int = 0,
+        target: str | None = None,
+    ) -> tuple[Fault, ...]:
+        """The faults whose spec fits `pattern`, values drawn from `seed`, in the order of the library.
+
+        `pattern` is `<module>/<fault_type>` or `<module>/<fault_type>/<variant>`, with * for any text, or the
+        path of a spec file. `target` names a manifest; default: the library's only one. MutatorError when
+        nothing fits, and for a mistake in a spec.
+        """
+        if str(pattern).endswith((".yaml", ".yml")):
+            specs: tuple[FaultSpec, ...] = (self.spec(pattern),)
+            glob = "*"
+        else:
+            specs, glob = self.specs(), str(pattern)
+        manifest, models = self.manifest(self.target_name(target)), self.fault_models()
+        faults = tuple(
+            fault
+            for spec in specs
+            if any(fnmatchcase(name, glob) for name in (spec.name, *_variants(spec)))
+            for fault in expand(spec, seed, reading, models=models, manifest=manifest)
+            if fnmatchcase(spec.name, glob) or fnmatchcase(fault.spec, glob)
+        )
+        if not faults:
+            known = [name for spec in specs for name in (spec.name, *_variants(spec))]
+            raise MutatorError(
+                f"no fault is named like '{glob}'",
+                where=self.library / "faults",
+                expected="<module>/<fault_type>, with or without /<variant>, with * for any text",
+                remedy="see `mutator list specs`" + suggestion(glob, known),
+            )
+        return faults
+
+    def target_name(self, given: str | None = None) -> str:
+        """The target that was named, or the library's only one; MutatorError if it has none or several."""
+        names = tuple(self.targets)
+        if given is None and len(names) != 1:
+            known = ", ".join(names) or "none"
+            raise MutatorError(
+                f"{len(names)} targets in the library ({known})", remedy="name one: --manifest NAME"
+            )
+        return given or names[0]
+
+    @property
+    def scenarios(self) -> Mapping[str, Path]:
+        """The scenarios of the library by name."""
+        return self._files("scenarios")
 
     def scenario(self, name: str | Path) -> Path:
         """File of the scenario `name`, or the scenario file of that path."""
         return self._file("scenarios", name, "scenario")
 
-    def campaign_names(self) -> tuple[str, ...]:
-        """Names of the campaigns in the library."""
-        return self._names("campaigns")
+    @property
+    def campaigns(self) -> Mapping[str, Path]:
+        """The campaigns of the library by name."""
+        return self._files("campaigns")
 
     def campaign(self, name: str | Path) -> Path:
         """File of the campaign `name`, or the campaign file of that path."""
         return self._file("campaigns", name, "campaign")
 
-    def context_table_names(self) -> tuple[str, ...]:
-        """Names of the context tables in the library."""
-        return self._names("stpa/contexts")
+    @property
+    def context_tables(self) -> Mapping[str, Path]:
+        """The context tables of the library by name; `context_table` reads one."""
+        return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path) -> ContextTable:
         """The context table `name`, or the table of that path."""
@@ -129,17 +206,18 @@ class Workspace:
         folder = self.library / "stpa"
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
-    def _names(self, folder: str) -> tuple[str, ...]:
+    def _files(self, folder: str) -> dict[str, Path]:
         base = self.library / folder
-        return tuple(sorted(p.relative_to(base).with_suffix("").as_posix() for p in base.rglob("*.yaml")))
+        files = {p.relative_to(base).with_suffix("").as_posix(): p for p in base.rglob("*.yaml")}
+        return dict(sorted(files.items()))
 
     def _file(self, folder: str, name: str | Path, what: str) -> Path:
         """A file of the library by name, or the file at a path that ends in .yaml."""
         if str(name).endswith((".yaml", ".yml")) and Path(name).is_file():
             return Path(name)
-        known = self._names(folder)
+        known = self._files(folder)
         if str(name) in known:
-            return self.library / folder / f"{name}.yaml"
+            return known[str(name)]
         raise MutatorError(
             f"no {what} '{name}'",
             where=self.library / folder,
@@ -148,8 +226,13 @@ class Workspace:
         )
 
 
-def _environment(name: str) -> Path | None:
-    value = os.environ.get(name)
+def _variants(spec: FaultSpec) -> list[str]:
+    return [f"{spec.name}/{variant.name}" for variant in spec]
+
+
+def _named(given: str | Path | None, variable: str) -> Path | None:
+    """The folder that is given, or named by the environment."""
+    value = given or os.environ.get(variable)
     return Path(value) if value else None
 
 

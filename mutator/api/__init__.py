@@ -1,4 +1,4 @@
-"""The public Python API behind `import mutator`.
+"""The public Python API behind `import mutator`: what the command line does is a call of what is here.
 
-The command line calls what is here; nothing here prints.
+Nothing here prints, asks or ends the process; that is left to who calls.
 """

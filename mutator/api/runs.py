@@ -1,50 +1,112 @@
-"""A run folder for notebooks: its results as a pandas frame; its traces, patches and faults when asked."""
+"""A run folder: its results as a pandas frame; its experiments, golden runs and faults when asked."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
+from mutator._common.tables import Table
+from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
+from mutator.api.html import facts_html, text_html
+from mutator.api.mutants import built
+from mutator.api.selection import Bench, WorkspaceLike, open_workspace
+from mutator.api.trials import Trial, trial_of
+from mutator.campaigns.plans import Plan, load_plan
 from mutator.errors import MutatorError
+from mutator.execution.merging import merge
+from mutator.execution.session import Summary
+from mutator.execution.single_run import rerun
 from mutator.execution.traces import Traces
-from mutator.model import Experiment, Fault
+from mutator.exports import Format
+from mutator.exports.write import export
+from mutator.model import Experiment, Fault, Record, Status
+from mutator.outcomes import results as results_table
+from mutator.outcomes import rows as tables
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
-from mutator.store import plan_file as planfile
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.report import building
+from mutator.report import series
+from mutator.report.film import Shot, film_experiment
+from mutator.store import plan_file
+from mutator.store.records import read_records
+from mutator.store.run_folder import HEAD, RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
+from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def load_run(path: str | Path, *, root: str | Path | None = None) -> "Run":
-    """The run folder at `path`.
+RUNS = Path("runs")
 
-    `root` holds fault_library/ and templates/, which traces need; default: as on the command line, the
-    environment's or the nearest folder upward. MutatorError when `path` is no run folder.
+
+def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
+    """The run folder at `path`, finished or not. Nothing is read before it is asked for.
+
+    `workspace` is what traces and new reports need: a Workspace, or the folder that holds the library;
+    default: found as on the command line, and only when needed. MutatorError when `path` is no run folder.
     """
-    return Run(RunFolder.open(Path(path)), Path(root) if root is not None else None)
+    return Run(RunFolder.open(Path(path)), None if workspace is None else open_workspace(workspace))
 
 
-@dataclass(frozen=True, repr=False)
+def newest_run(root: Path) -> Path:
+    """The run folder in runs/, here or under `root`, that was planned last; MutatorError if there is none."""
+    here = {base.resolve() for base in (RUNS, root / RUNS)}
+    heads = [head for base in here for head in base.glob(f"*/{HEAD}")]
+    if not heads:
+        raise MutatorError(
+            "no run folder in runs/",
+            remedy="name one: --run DIR, or make one: `mutator run quickstart --out runs/first`",
+        )
+    newest = max(heads, key=lambda head: (head.stat().st_mtime_ns, str(head)))
+    return _from_here(newest.parent)
+
+
+def _from_here(path: Path) -> Path:
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+def merge_runs(shards: Sequence[str | Path], out: str | Path) -> "Run":
+    """Merge the shards of a plan into the run folder `out`: the one that a single machine would have made."""
+    merge([Path(shard) for shard in shards], Path(out))
+    return load_run(out)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """A run folder, read when asked. Experiments are named by their id, or by the start of just one."""
+    """A run folder, read when asked. `summary` is what `mutator.run` came to; None for a loaded run."""
 
     folder: RunFolder
-    root: Path | None = None
-    _shown: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, compare=False)
+    given_workspace: Workspace | None = None
+    summary: Summary | None = None
 
     def __repr__(self) -> str:
         head = self.folder.head
-        done = f"{len(self.frame)} of {self.folder.planned} experiments"
-        return f"<Run {self.folder.path.name}: {done} of {head['campaign']}, {head['reading']}>"
+        done = f"{sum(self.endings.values())} of {self.folder.planned} experiments"
+        failed = len(self.harness_errors)
+        errors = f", {failed} with a HARNESS ERROR" if failed else ""
+        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}>"
+
+    def _repr_html_(self) -> str:
+        return text_html(repr(self)) + facts_html(self.endings.items()) + str(self.counts().as_html())
 
     @property
     def path(self) -> Path:
         """The folder."""
         return self.folder.path
+
+    @cached_property
+    def workspace(self) -> Workspace:
+        """Library, templates and target that the run is looked at with."""
+        return self.given_workspace or Workspace.find()
+
+    @cached_property
+    def _bench(self) -> Bench:
+        """The run's target in that workspace."""
+        return Bench.of(self.workspace, self.folder.head["target"])
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -54,24 +116,56 @@ class Run:
         return {key: head[key] for key in keys} | self.folder.provenance
 
     @cached_property
+    def plan(self) -> Plan:
+        """The frozen plan."""
+        return load_plan(self.path)
+
+    @cached_property
     def faults(self) -> dict[str, Fault]:
         """The planned faults by id: value, aim, and what is injected where."""
-        return planfile.read_faults(self.path)
+        return plan_file.read_faults(self.path)
 
     @cached_property
     def experiments(self) -> dict[str, Experiment]:
         """The planned experiments by id, in the plan's order."""
-        return {e.id: e for e in planfile.read_all(self.path)}
+        return {e.id: e for e in plan_file.read_all(self.path)}
 
     @cached_property
-    def frame(self) -> pd.DataFrame:
+    def records(self) -> Mapping[str, Record]:
+        """The record of each experiment that has one, by id."""
+        return read_records(self.path)
+
+    @cached_property
+    def results(self) -> "pd.DataFrame":
         """A row per experiment that has a record, by experiment id: the columns of results.csv, typed.
 
         As `mutator.outcomes.reader.Results.frame` makes it; the table is brought up to date first.
         """
         return Results.up_to_date(self.path).frame()
 
-    def golden(self, scenario: str, changes: tuple[str, ...] | None = None) -> pd.DataFrame:
+    @property
+    def endings(self) -> dict[str, int]:
+        """How many experiments ended how: outcomes of those that ended well, statuses of the others."""
+        return tables.outcome_counts(self._rows)
+
+    @property
+    def harness_errors(self) -> dict[str, str]:
+        """Experiments that the harness failed at, and why; `mutator.run` tries them again."""
+        return {r.experiment_id: r.detail for r in self._rows if r.status is Status.HARNESS_ERROR}
+
+    def counts(self) -> Table:
+        """How the experiments of each fault type ended."""
+        hazards = tables.hazard_names(self._rows)
+        counts = tables.counts_by(self._rows, tables.by_fault_type)
+        heads, rows = tables.count_table(counts, "fault type", hazards)
+        return Table(heads=heads, rows=rows, right=range(1, len(heads)))
+
+    def experiment(self, id: str) -> "RunExperiment":
+        """The planned experiment whose id is `id` or starts so; MutatorError for none or several."""
+        wanted = self.folder.find(id)
+        return RunExperiment(experiment=self.experiments[wanted], record=self.records.get(wanted), run=self)
+
+    def golden(self, scenario: str, changes: tuple[str, ...] | None = None) -> "pd.DataFrame":
         """The fault-free run of a scenario: a column per channel, by time in s.
 
         `changes` of the scenario tell apart what was driven in several ways, `("no_lead",)`; default: those
@@ -88,42 +182,136 @@ class Run:
                 where=self.path,
                 expected=f"one of {', '.join(known) or 'none'}",
             )
-        return self._once(folder.name, lambda: load_trace(self._traces.manifest, folder))
+        return trace_frame(load_trace(self._bench.manifest, folder), self._bench.manifest)
 
-    def trace(self, experiment: str) -> pd.DataFrame:
-        """The faulty run of an experiment: a column per channel, by time in s.
+    def report(self, *, anew: bool = False) -> building.Report:
+        """Write the report, Markdown and one HTML page, unless it is up to date.
 
-        Where no trace was kept, which is usual, it is driven again, to the same bytes, and kept. MutatorError
-        when the target is no longer the one that was run, or another trace comes out.
+        `anew` writes it at any rate. It may drive a few experiments again. Where no library is found, the
+        results stand alone.
         """
-        name = self.folder.find(experiment)
-        return self._once(name, lambda: self._traces.of(name)[1])
+        workspace = self._workspace_if_any()
+        if not anew:
+            return building.ensure(self.path, workspace)
+        results_table.build(self.path)
+        return building.write(self.path, workspace)
 
-    def patch(self, experiment: str) -> str:
-        """The source diff of an experiment that ran."""
-        path = self.folder.patch(self.folder.find(experiment))
-        if not path.is_file():
-            raise MutatorError(
-                f"no patch of {experiment}", where=path, remedy="it has not run, or its mutant was refused"
-            )
-        return path.read_bytes().decode("utf-8", "surrogateescape")
+    def export(
+        self, format: Format | str, out: str | Path | None = None, *, failures: Sequence[str] = ()
+    ) -> Path:
+        """Write the run for other tools; default: a file in exports/ of the run folder, which is returned.
+
+        `failures` are the endings that JUnit shows as failures.
+        """
+        if format not in (known := [f.value for f in Format]):
+            raise MutatorError(f"format '{format}'", expected=f"one of {', '.join(known)}")
+        wanted = Format(format)
+        workspace = self.workspace if wanted is Format.MUTATION_ELEMENTS else None
+        place = None if out is None else Path(out)
+        return export(self.path, wanted, place, workspace=workspace, failures=failures)
+
+    def check_equivalence(self) -> None:
+        """CheckFailed when a sample that was run again on the reference engine gave another result."""
+        equivalence.judge(self.folder, read_records(self.path))
+
+    def _workspace_if_any(self) -> Workspace | None:
+        try:
+            return self.workspace
+        except MutatorError:
+            return None
+
+    @cached_property
+    def _rows(self) -> tuple[tables.Row, ...]:
+        return Results.up_to_date(self.path).rows()
 
     @cached_property
     def _traces(self) -> Traces:
-        return Traces(self._workspace, self.folder)
+        """Traces that are kept in the run folder, and those that are driven when needed."""
+        return Traces(self.workspace, self.folder)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class RunExperiment(ExperimentResult):
+    """An experiment of a run."""
+
+    run: Run
 
     @cached_property
-    def _workspace(self) -> Workspace:
-        return Workspace.find(self.root)
+    def patch(self) -> str:
+        """The whole patch, probe included: the kept one, or made now when it has not run yet."""
+        kept = self.run.folder.patch(self.id)
+        if kept.exists():
+            return kept.read_bytes().decode("utf-8", "surrogateescape")
+        return built(self.run._bench, self.fault, self.experiment.trigger).patch
 
-    def _once(self, name: str, read: Callable[[], Trace]) -> pd.DataFrame:
-        if name not in self._shown:
-            self._shown[name] = _frame(read(), self._traces.manifest)
-        return self._shown[name]
+    def traces(self, *, exact: bool = False) -> TraceFrames:
+        """Golden and faulty run as pandas frames.
 
+        A kept trace is read. Without one, and always with `exact`, the experiment is driven again, and its
+        trace is kept; that takes as long as one run. MutatorError when it has not run yet, when target,
+        templates or scenario have changed since, and when another result comes out than the campaign's.
+        """
+        if exact:
+            trial = self.rerun(keep=True)
+            if trial.same_as_record is False:
+                raise MutatorError(
+                    f"{self.id} driven again is not what the campaign found", where=self.run.path
+                )
+            return trial.traces()
+        golden, faulty = self._load_traces()
+        manifest = self._target()
+        return TraceFrames(golden=trace_frame(golden, manifest), faulty=trace_frame(faulty, manifest))
 
-def _frame(trace: Trace, manifest: TargetManifest) -> pd.DataFrame:
-    """A trace by time in s; `attrs["units"]` has the units of the channels that the manifest tells."""
-    frame = pd.DataFrame(dict(trace)).set_index(manifest.time_channel)
-    frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared, *manifest.plotted)}
-    return frame
+    def rerun(self, *, keep: bool = False) -> Trial:
+        """Drive it again; `Trial.same_as_record` says whether the record is the campaign's.
+
+        With `keep` its trace, its plot and what the report's page draws stay in the run folder. MutatorError
+        when target, templates or scenario have changed since.
+        """
+        run, folder = self.run, self.run.folder
+        temporary = None if keep else TemporaryDirectory(prefix="mutator-rerun-")
+        out = Path(temporary.name) / self.id if temporary else None
+        single, same = rerun(run.workspace, folder.path, self.id, out=out)
+        manifest = run._bench.manifest
+        trial = trial_of(single, manifest, same_as_record=same if self.record else None, temporary=temporary)
+        if keep and trial.save_plot(self.plot_file):
+            golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
+            series.keep(folder, manifest, golden, faulty, single.record)
+        return trial
+
+    def film(self, shots: Sequence[Shot]) -> bool:
+        """Drive golden and faulty run again and write videos or stills of them; is the record the campaign's?
+
+        MutatorError for a target that cannot be filmed, and a faulty run that left no film.
+        """
+        run, facts = self.run, describe(self.experiment)
+        trigger = facts["trigger"].removesuffix(": True")
+        title = f"{facts['fault']}   {facts['scenario']}   {trigger}"
+        return film_experiment(run.workspace, run._bench.manifest, run.path, self.id, title, shots)
+
+    @property
+    def plot_file(self) -> Path:
+        """Where the run folder keeps its plot."""
+        return self.run.path / "plots" / f"{self.id}.svg"
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the run folder has its plot and what the report's page draws."""
+        return self.plot_file.exists() and series.series_path(self.run.folder, self.id).exists()
+
+    def not_run(self) -> MutatorError:
+        """What to say of an experiment that is only planned."""
+        campaign, out = self.run.folder.head["campaign"], _from_here(self.run.path)
+        return MutatorError(
+            f"experiment {self.id} has not run yet",
+            where=self.run.path,
+            remedy=f"run it: `mutator run {campaign} --out {out}`",
+        )
+
+    def _target(self) -> TargetManifest:
+        return self.run._bench.manifest
+
+    def _load_traces(self) -> tuple[Trace, Trace]:
+        if self.record is None:
+            raise self.not_run()
+        return self.run._traces.of(self.id)

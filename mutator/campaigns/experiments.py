@@ -159,7 +159,7 @@ class Expansion:
 
     def _scenario_digest(self, scenario: str) -> str:
         if scenario not in self._digests:
-            known = self.workspace.scenario_names()
+            known = self.workspace.scenarios
             if scenario not in known:  # a file from anywhere could change, or be another one elsewhere
                 raise self.campaign.error(
                     self._scenario_keys(scenario),

@@ -2,13 +2,17 @@
 
 import csv
 import io
+from collections import Counter
 from dataclasses import asdict, dataclass, fields
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mutator._common.files import is_half_written, make_folder, write_atomic, write_json
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
+from mutator._common.tables import Table
+from mutator._common.text import counted
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
@@ -25,6 +29,9 @@ from mutator.store.check_results import measured_cpu_s
 from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
 from mutator.store.shards import Shard
 from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # First part of every plan digest. Digests are cited, so this text stays whatever becomes of the run schema.
 _DIGEST_PREFIX = "run/1"
@@ -66,7 +73,7 @@ class Cost:
     measured: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Plan:
     """Experiments in the order they are run, and how they are cut into chunks (lengths, in order).
 
@@ -84,6 +91,27 @@ class Plan:
     runs: int
     digest: str  # same campaign, choices, library and scenarios: same digest on every machine
     run_cpu_s: float | None = None
+
+    def __repr__(self) -> str:
+        count = counted(len(self.experiments), "experiment")
+        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, seed {self.seed}>"
+
+    def _repr_html_(self) -> str:
+        groups = sorted(self.groups().items())
+        rows = [(f"{module}/{kind}", method, str(n)) for (module, kind, method), n in groups]
+        rows.append(("total", "", str(len(self.experiments))))
+        table = Table(heads=("fault type", "method", "experiments"), rows=rows, right=(2,)).as_html()
+        return f"<p>{escape(repr(self))}</p>{table}"
+
+    def frame(self) -> "pd.DataFrame":
+        """A pandas frame of the planned experiments: the columns of `rows`, by experiment id."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows()).set_index("experiment_id")
+
+    def groups(self) -> Counter[tuple[str, str, str]]:
+        """How many experiments there are of each (module, fault type, method)."""
+        return Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in self.experiments)
 
     def rows(self) -> list[dict[str, object]]:
         """One dict per experiment: the columns of the results table that are known before running."""

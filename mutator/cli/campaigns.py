@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from collections import Counter
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,9 +27,9 @@ from mutator.cli.progress import duration
 from mutator.cli.run_folders import show_counts
 
 if TYPE_CHECKING:
+    from mutator.api.runs import Run
     from mutator.campaigns.plans import Cost
     from mutator.execution.session import Summary
-    from mutator.workspace import Workspace
 
 CampaignName = Annotated[
     str, typer.Argument(metavar="CAMPAIGN", help="A campaign of the library, or a campaign file.")
@@ -67,26 +67,24 @@ def plan(
 
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
-    from mutator.campaigns.plans import Choices, freeze, load_plan, make_plan
-    from mutator.engines.forkable import not_forked
+    from mutator.api.campaigns import not_forkable
+    from mutator.api.campaigns import plan as plan_campaign
+    from mutator.campaigns.plans import Choices
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
     chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
     with terminal.wait("planning"):
-        made = make_plan(workspace, campaign, chosen)
-    folder = freeze(made, out, workspace)
-    manifest = workspace.manifest(made.campaign.target)
-    faults = [experiment.fault for experiment in made.experiments]
-    anew = not_forked(manifest, workspace.fault_models(), faults)
-    cost = load_plan(folder.path).cost(workers)  # knows what a run took, once one was driven here
-    groups = Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in made.experiments)
+        made = plan_campaign(campaign, out, choices=chosen, workspace=workspace)
+    folder = out.resolve()
+    anew = not_forkable(made, workspace)
+    cost, groups = made.cost(workers), made.groups()
     if as_json:
         kinds = [
             {"module": m, "fault_type": f, "method": how, "experiments": n}
             for (m, f, how), n in sorted(groups.items())
         ]
-        facts = {"run": str(folder.path), "digest": made.digest, "seed": made.seed, "reading": made.reading}
+        facts = {"run": str(folder), "digest": made.digest, "seed": made.seed, "reading": made.reading}
         terminal.emit(
             facts
             | {"experiments": len(made.experiments), "runs": made.runs, "groups": kinds, "cost": cost}
@@ -104,7 +102,7 @@ def plan(
     for why, variants in _by_reason(anew).items():
         terminal.say(f"on the reference engine: {', '.join(variants)}: {why}")
     terminal.say(f"expected: {_cost_line(cost)}")
-    terminal.say(f"plan: {short_path(folder.path / 'plan.csv')} (digest {made.digest[:16]})")
+    terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {made.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
     terminal.say(f"run it: {shlex.join(command)}")
 
@@ -154,46 +152,50 @@ def run(
     place: Place,
 ) -> None:
     """Run or resume a campaign; ends with its table and report."""
+    from mutator.api.campaigns import IncompleteRun
+    from mutator.api.campaigns import run as run_campaign
     from mutator.campaigns.plans import Choices
     from mutator.cli.progress import campaign_progress
-    from mutator.execution.running import run_campaign
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
     chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     try:
-        with campaign_progress(terminal) as notify:
-            summary = run_campaign(
-                workspace,
+        with campaign_progress(terminal) as notify, warnings.catch_warnings():
+            warnings.simplefilter("ignore", IncompleteRun)  # `_print_end` says it in full
+            made = run_campaign(
                 campaign,
                 out,
-                workers=workers,
                 choices=chosen,
+                workers=workers,
                 engine=engine,
                 reviewed=reviewed,
-                notify=notify,
+                progress=notify,
+                workspace=workspace,
             )
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
-    _tell(terminal, out, summary, workspace)
-    if summary.exit_code:
-        raise typer.Exit(summary.exit_code)
+    assert made.summary is not None  # it has just run
+    _print_end(terminal, out, made, made.summary)
+    if made.summary.exit_code:
+        raise typer.Exit(made.summary.exit_code)
 
 
-def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspace") -> None:
+def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None:
     """The end of a run: table, report, and what is left to do."""
-    from mutator.report import building as reports
-
     with terminal.wait("writing the report"):  # it may drive a few experiments again
-        written = reports.ensure(out, workspace) if summary.results else None
+        written = run.report() if summary.results else None
+    report = (
+        [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []
+    )
     if terminal.as_json:
         counts = {"planned": summary.planned, "done": summary.done, "ran": summary.ran}
-        paths = {"run": str(out), "report": str(written.markdown) if written else None}
+        paths = {"run": str(out), "report": str(report[0]) if report else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
         terminal.emit(counts | paths | found)
     if written:
-        show_counts(terminal, out)
+        show_counts(terminal, run)
     terminal.say(
         f"{summary.done} of {summary.planned} experiments done, "
         f"{summary.ran} now in {duration(summary.elapsed_s)}"
@@ -201,7 +203,7 @@ def _tell(terminal: Terminal, out: Path, summary: "Summary", workspace: "Workspa
     if summary.proof:
         terminal.say(f"proof: {summary.proof}")
     if written:
-        terminal.say(f"report: {written.markdown} and {written.page}")
+        terminal.say(f"report: {report[0]} and {report[1]}")
     if summary.harness_errors:
         terminal.say(
             f"{len(summary.harness_errors)} harness errors, in no count; the same command tries them again:"

@@ -52,16 +52,14 @@ def compare(
     Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
     what got better, worse, newly hazardous, with paired statistics; a page, a table and CSV are written.
     """
-    from mutator.comparison import comparison as comparing
-    from mutator.comparison import pages
+    from mutator.api.comparisons import compare as compare_runs
 
     terminal = Terminal(as_json)
     gates = _gates(fail_on or [])
     with terminal.wait("comparing"):
-        found = comparing.compare(run_a, run_b, only)
-        place = out or found.b.folder.path / "report" / f"compare-{found.a.name}"
-        written = pages.write(found, place)
-    failing = comparing.findings(found, gates)
+        compared = compare_runs(run_a, run_b, only=only)
+        written = compared.write(out)
+    found, failing = compared.comparison, compared.findings(gates)
     if as_json:
         terminal.emit(_as_json(found, failing) | {"page": str(written.page), "pairs_csv": str(written.pairs)})
     else:

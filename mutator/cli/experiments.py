@@ -11,10 +11,8 @@ from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.cli.experiment_view import Found
+    from mutator.api.runs import RunExperiment
     from mutator.report.film import Shot
-    from mutator.workspace import Workspace
-
 
 DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 
@@ -56,74 +54,57 @@ def show(
     place: Place,
 ) -> None:
     """Show diff, times, verdict, plot of golden against faulty; or watch them."""
-    from mutator.cli import experiment_view as view
+    from mutator.api.experiment_results import describe
+    from mutator.cli import experiment_view
 
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    found = view.find_experiment(workspace, run, experiment)
-    patch = view.experiment_patch(workspace, found)
-    drawn = _plot(terminal, workspace, found) if plot and found.record else None
-    filmed = _film(terminal, workspace, found, video, still or [])
+    found = experiment_view.find_experiment(place.workspace(), run, experiment)
+    patch = found.patch
+    drawn = _plot(terminal, found) if plot and found.record else None
+    filmed = _film(terminal, found, video, still or [])
     if as_json:
-        outcome = view.verdict(found.record) if found.record else {"status": None}
-        facts = {**view.describe(found.experiment), **outcome, "patch": patch}
-        facts |= {"run": str(found.folder.path), "plot": str(drawn) if drawn else None}
+        facts = {**describe(found.experiment), **found.verdict, "patch": patch}
+        facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
         terminal.emit(facts | {"films": filmed})
         return
-    view.print_experiment(terminal, found.experiment, patch)
+    experiment_view.print_experiment(terminal, found.experiment, patch)
     if found.record is None:
-        terminal.say(str(view.not_run(found)))
+        terminal.say(str(found.not_run()))
     else:
-        view.print_verdict(terminal, found.record)
+        experiment_view.print_verdict(terminal, found.record)
     if drawn:
         terminal.say(f"plot: {short_path(drawn)}")
     for path in filmed:
         terminal.say(f"film: {short_path(path)}")
 
 
-def _plot(terminal: Terminal, workspace: "Workspace", found: "Found") -> Path | None:
-    """The experiment's plot, drawn from its kept trace, or from one made now."""
-    from mutator.cli import experiment_view as view
-    from mutator.execution.single_run import rerun as run_again
-    from mutator.report.series import series_path
-
-    plot = plot_path(found.folder.path, found.experiment.id)
-    if plot.exists() and series_path(found.folder, found.experiment.id).exists():
-        return plot
+def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
+    """The experiment's plot: the kept one, or one made now."""
+    if found.is_drawn:
+        return found.plot_file
     with terminal.wait("no trace was kept: driving it again"):
-        single, same = run_again(workspace, found.folder.path, found.experiment.id)
-    if not same:
+        trial = found.rerun(keep=True)
+    if trial.same_as_record is False:
         terminal.note(DIFFERS)
-    return view.keep_plot(workspace.manifest(found.plan.campaign.target), single, found.folder, plot)
+    return found.plot_file if trial.has_trace else None
 
 
-def _film(
-    terminal: Terminal,
-    workspace: "Workspace",
-    found: "Found",
-    video: Path | None,
-    stills: list[str],
-) -> list[Path]:
+def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills: list[str]) -> list[Path]:
     """Write the video and the stills that are wanted; returns their paths."""
-    from mutator.cli import experiment_view as view
-    from mutator.report.film import Shot, film_experiment
+    from mutator.report.film import Shot
 
     shots = [_still(text, found) for text in stills]
     shots += [Shot(out=video)] if video else []
     if not shots:
         return []
-    facts = view.describe(found.experiment)
-    trigger = facts["trigger"].removesuffix(": True")
-    title = f"{facts['fault']}   {facts['scenario']}   {trigger}"
-    manifest = workspace.manifest(found.plan.campaign.target)
     with terminal.wait("driving it again with a film"):
-        same = film_experiment(workspace, manifest, found.folder.path, found.experiment.id, title, shots)
+        same = found.film(shots)
     if not same:
         terminal.note(DIFFERS)
     return [shot.out for shot in shots]
 
 
-def _still(text: str, found: "Found") -> "Shot":
+def _still(text: str, found: "RunExperiment") -> "Shot":
     """The still of `T=FILE`, or of `T` alone: it is kept beside the plots, where the report finds it."""
     from mutator.report.film import Shot
 
@@ -136,13 +117,8 @@ def _still(text: str, found: "Found") -> "Shot":
         raise MutatorError(
             f"'{text}'", where="--still", expected="a time in s, alone or with a file: 14.5 or 14.5=early.png"
         )
-    kept = found.folder.path / "plots" / f"{found.experiment.id}-{time:.2f}s.jpg"
+    kept = found.plot_file.with_name(f"{found.id}-{time:.2f}s.jpg")
     return Shot(out=Path(name) if name else kept, t=time)
-
-
-def plot_path(run: Path, experiment_id: str) -> Path:
-    """Where the plot of an experiment is kept in a run folder."""
-    return run / "plots" / f"{experiment_id}.svg"
 
 
 RERUN_EXAMPLES = """\b
@@ -165,42 +141,29 @@ def rerun(
 
     Exit code 1 if the new record differs from the campaign's.
     """
-    import shutil
-
-    from mutator.cli import experiment_view as view
-    from mutator.execution.single_run import rerun as run_again
+    from mutator.api.experiment_results import describe
+    from mutator.cli import experiment_view
 
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    found = view.find_experiment(workspace, run, experiment)
-    kept_before = (found.folder.path / "traces" / found.experiment.id).is_dir()
+    found = experiment_view.find_experiment(place.workspace(), run, experiment)
     with terminal.wait(f"driving {found.experiment.scenario} again"):
-        single, same = run_again(workspace, found.folder.path, found.experiment.id)
-    plot = None
-    if trace:
-        manifest = workspace.manifest(found.plan.campaign.target)
-        drawn = plot_path(found.folder.path, found.experiment.id)
-        plot = view.keep_plot(manifest, single, found.folder, drawn)
-    elif not kept_before:
-        shutil.rmtree(single.faulty.parent)
-    recorded = found.record is not None
+        trial = found.rerun(keep=trace)
+    same, traces = trial.same_as_record, trial.single.faulty
+    plot = found.plot_file if trace and trial.has_trace else None
     if as_json:
-        facts = {**view.describe(found.experiment), **view.verdict(single.record)}
-        facts |= {"same_as_record": same if recorded else None}
-        terminal.emit(
-            facts | {"traces": str(single.faulty) if trace else None, "plot": str(plot) if plot else None}
-        )
-    view.print_verdict(terminal, single.record)
-    terminal.say(_comparison(recorded, same), style=None if same else "bold red")
+        facts = {**describe(found.experiment), **trial.verdict, "same_as_record": same}
+        terminal.emit(facts | {"traces": str(traces) if trace else None, "plot": str(plot) if plot else None})
+    experiment_view.print_verdict(terminal, trial.record)
+    terminal.say(_comparison(same), style="bold red" if same is False else None)
     if trace:
-        terminal.say(f"trace: {short_path(single.faulty)}")
+        terminal.say(f"trace: {short_path(traces)}")
         terminal.say(f"plot: {short_path(plot)}" if plot else "no plot: the run left no trace")
-    if not same:
+    if same is False:
         raise typer.Exit(EXIT_CHECK_FAILED)
 
 
-def _comparison(recorded: bool, same: bool) -> str:
-    if not recorded:
+def _comparison(same: bool | None) -> str:
+    if same is None:
         return "no record to compare with: the campaign has not run it yet"
     return (
         "the same as the campaign's record, byte for byte" if same else "DIFFERS from the campaign's record"

@@ -44,13 +44,13 @@ def export(
     place: Place,
 ) -> None:
     """Write a run for other tools: mutation report, JUnit, CSV, Parquet."""
-    from mutator.exports.write import export as write
+    from mutator.api.runs import load_run
 
     terminal = Terminal(as_json)
     workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None
     endings = [name.strip() for name in failures.split(",")] if failures else []
     with terminal.wait("writing"):
-        written = write(run, format, out, workspace=workspace, failures=endings)
+        written = load_run(run, workspace=workspace).export(format, out, failures=endings)
     if as_json:
         terminal.emit({"format": format.value, "file": str(written)})
     terminal.say(f"{format.value}: {short_path(written)}")

@@ -2,20 +2,15 @@
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from mutator._common.text import counted
-from mutator.cli import choose
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
-from mutator.errors import EXIT_HARNESS_ERRORS
+from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.readable_diffs import readable
-
-if TYPE_CHECKING:
-    from mutator.model import Experiment
-    from mutator.workspace import Workspace
 
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
 
@@ -32,7 +27,7 @@ TriggerText = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the verbs to the command line."""
-    app.command("try", epilog=TRY_EXAMPLES)(try_fault)
+    app.command("try", epilog=TRY_EXAMPLES)(try_spec)
     app.command("diff", epilog=DIFF_EXAMPLES)(diff)
     app.command("generate", epilog=GENERATE_EXAMPLES)(generate)
 
@@ -46,7 +41,7 @@ Examples:
 
 
 @with_place
-def try_fault(
+def try_spec(
     spec: SpecName,
     scenario: Annotated[str, typer.Option("--scenario", "-s", help="Name or file of a driving scenario.")],
     trigger: TriggerText = "always",
@@ -74,42 +69,26 @@ def try_fault(
 
     The spec need not be in the library: a file will do.
     """
-    from mutator.cli.experiment_view import show_single
-    from mutator.execution.single_run import run_single
+    from mutator.api.selection import Bench, FaultChoice, one_of_each_variant
+    from mutator.api.trials import try_fault
+    from mutator.cli.experiment_view import show_trial
     from mutator.model import Status
 
     terminal = Terminal(as_json)
-    workspace = place.workspace()
-    target = choose.find_target(workspace, manifest)
-    choice = choose.FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
-    faults = choice.faults(workspace, target, workspace.fault_models())
-    fault, _ = choose.one_of_each_variant(faults)[0]
+    bench = Bench.of(place.workspace(), manifest)
+    choice = FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
+    faults = bench.faults(choice)
+    fault, _ = one_of_each_variant(faults)[0]
     if len(faults) > 1:
         terminal.note(f"{fault.label}, one of {len(faults)} (choose by --variant, --value)")
-    armed_after_s = target.armed_after_s if armed_after is None else armed_after
-    when = choose.find_trigger(workspace, trigger, armed_after_s)
-    experiment = _experiment(workspace, fault, scenario, when, seed or 0)
-    folder = out / experiment.id
+    when = bench.trigger(trigger, armed_after)
     with terminal.wait(f"driving {scenario}, fault-free and faulty"):
-        single = run_single(workspace, target, experiment, folder)
-    show_single(terminal, target, single, plot=folder / "plot.svg")
-    if single.record.status is Status.HARNESS_ERROR:
+        trial = try_fault(
+            fault, scenario, when, seed=seed or 0, target=manifest, workspace=bench.workspace, out=out
+        )
+    show_trial(terminal, trial)
+    if trial.status is Status.HARNESS_ERROR:
         raise typer.Exit(EXIT_HARNESS_ERRORS)
-
-
-def _experiment(workspace: "Workspace", fault: Any, scenario: str, trigger: Any, seed: int) -> "Experiment":
-    from mutator._common.hashing import digest
-    from mutator.model import Experiment, Method
-
-    file = workspace.scenario(scenario)
-    return Experiment(
-        fault=fault,
-        scenario=scenario,
-        scenario_digest=digest(file.read_bytes()),
-        method=Method.GUIDED,
-        trigger=trigger,
-        seed=seed,
-    )
 
 
 DIFF_EXAMPLES = """\b
@@ -146,20 +125,20 @@ def diff(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     if EXPERIMENT_ID.fullmatch(what) and not Path(what).exists():
-        from mutator.cli.experiment_view import experiment_patch, find_experiment
+        from mutator.cli.experiment_view import find_experiment
 
         found = find_experiment(workspace, run, what)
-        name = (found.experiment.fault.label, found.experiment.id)
-        _print_diffs(terminal, [(*name, experiment_patch(workspace, found))], whole=patch)
+        _print_diffs(terminal, [(found.fault.label, found.id, found.patch)], whole=patch)
         return
-    from mutator.mutants.building import build
+    from mutator.api.mutants import built
+    from mutator.api.selection import Bench, FaultChoice, one_of_each_variant
 
-    target, models = choose.find_target(workspace, manifest), workspace.fault_models()
-    choice = choose.FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
-    when = choose.find_trigger(workspace, trigger, target.armed_after_s)
+    bench = Bench.of(workspace, manifest)
+    choice = FaultChoice(spec=what, variant=variant, value=value, seed=seed, reading=reading)
+    when = bench.trigger(trigger)
     diffs = []
-    for fault, of in choose.one_of_each_variant(choice.faults(workspace, target, models)):
-        mutant = build(target, models, fault, when)
+    for fault, of in one_of_each_variant(bench.faults(choice)):
+        mutant = built(bench, fault, when)
         many = f", one of {of}" if of > 1 else ""
         diffs.append((fault.label + many, mutant.id, mutant.patch))
     _print_diffs(terminal, diffs, whole=patch)
@@ -209,21 +188,25 @@ def generate(
     place: Place,
 ) -> None:
     """Write mutants as patches or trees, with an index."""
-    from mutator.cli.generate import Request, write_mutants
+    from mutator.api.mutant_files import pairs_of_campaign, pairs_of_specs, write_mutants
+    from mutator.api.selection import Bench
+    from mutator.campaigns.plans import Choices
 
     terminal = Terminal(as_json)
-    request = Request(
-        specs=tuple(specs or ()),
-        campaign=campaign,
-        triggers=tuple(triggers or ()),
-        seed=seed,
-        reading=reading,
-        manifest=manifest,
-        trees=trees,
-    )
-    target, index = write_mutants(place.workspace(), request, out, terminal)
+    workspace = place.workspace()
+    if campaign and (specs or triggers):
+        raise MutatorError(
+            "--campaign together with specs or --trigger", expected="one or the other", where="generate"
+        )
+    if campaign:
+        bench, pairs = pairs_of_campaign(workspace, campaign, Choices(seed=seed, reading=reading))
+    else:
+        bench = Bench.of(workspace, manifest)
+        pairs = pairs_of_specs(bench, specs or (), triggers or (), seed=seed, reading=reading)
+    with terminal.count(len(pairs), "mutants") as step:
+        index = write_mutants(bench, pairs, out, trees=trees, step=step)
     if as_json:
         terminal.emit(index)
     terminal.say(f"{counted(len(index), 'mutant')} in {out}; the list of them is {out / 'index.csv'}")
     first = out / index[0]["patch"]
-    terminal.say(f"apply one: patch -p1 -d {short_path(target.root)} < {first}")
+    terminal.say(f"apply one: patch -p1 -d {short_path(bench.manifest.root)} < {first}")

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator._common.text import counted
-from mutator.cli.choose import target_name
 from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
@@ -56,7 +55,7 @@ def stpa(
             expected="a hazard analysis",
             remedy="write one, as docs/explanation/hazard-analysis.md says; campaigns need none",
         )
-    target = workspace.manifest(target_name(workspace, manifest))
+    target = workspace.manifest(workspace.target_name(manifest))
     problems = check_analysis(analysis, workspace.specs(), target)
     if svg:
         _write(svg, draw(analysis))

@@ -1,6 +1,6 @@
 """`list`, `check`, `doctor`: what the library holds, whether it can be used, and whether this machine can."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator._common.text import counted
-from mutator.cli.choose import context_tables, target_name
 from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
@@ -73,14 +72,14 @@ def _specs(workspace: "Workspace") -> Table:
 
 
 def _scenarios(workspace: "Workspace") -> Table:
-    return _files({name: workspace.scenario(name) for name in workspace.scenario_names()}, "title")
+    return _files(workspace.scenarios, "title")
 
 
 def _campaigns(workspace: "Workspace") -> Table:
-    return _files({name: workspace.campaign(name) for name in workspace.campaign_names()}, "about")
+    return _files(workspace.campaigns, "about")
 
 
-def _files(files: dict[str, Path], told: str) -> Table:
+def _files(files: Mapping[str, Path], told: str) -> Table:
     """Files of the library by name, with what their key `told` says of them, where they have one."""
     from mutator.config.yaml_files import load
 
@@ -108,7 +107,7 @@ def _models(workspace: "Workspace") -> Table:
 def _triggers(workspace: "Workspace") -> Table:
     rows = [
         {"table": table.name, "name": row.id, "condition": row.condition, "about": _line(row.about)}
-        for table in context_tables(workspace)
+        for table in map(workspace.context_table, workspace.context_tables)
         for row in table.rows
     ]
     return ["table", "name", "condition", "about"], rows
@@ -116,7 +115,7 @@ def _triggers(workspace: "Workspace") -> Table:
 
 def _targets(workspace: "Workspace") -> Table:
     rows = []
-    for name in workspace.target_names():
+    for name in workspace.targets:
         manifest = workspace.manifest(name)
         row = {"name": name, "root": short_path(manifest.root), "package": manifest.package}
         rows.append(row | {"files": len(manifest.tree.files)})
@@ -155,7 +154,7 @@ def check(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     with terminal.wait("checking every spec in every reading"):
-        problems = check_library(workspace, target_name(workspace, manifest))
+        problems = check_library(workspace, workspace.target_name(manifest))
     if as_json:
         terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
     for problem in problems:

@@ -42,9 +42,7 @@ class Wanted:
                 target = plan.campaign.target
                 groups = catalogue.of_plan(workspace, plan)
             else:
-                from mutator.cli.choose import target_name
-
-                target = target_name(workspace, self.manifest)
+                target = workspace.target_name(self.manifest)
                 groups = catalogue.of_library(
                     workspace,
                     workspace.manifest(target),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mutator.cli import review_view as view
+from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.errors import MutatorError
 
@@ -33,7 +33,7 @@ def walk_through(terminal: Terminal, load: Callable[[], "Loaded"], by: str) -> N
     review = found.review
     left = [g for g in found.groups if review.state(g) in (State.NEW, State.CHANGED)]
     for number, group in enumerate(left, start=1):
-        view.print_group(terminal, review, group)
+        review_view.print_group(terminal, review, group)
         key = _asked(terminal, f"{number} of {len(left)}")
         if key == "q":
             break
@@ -43,8 +43,8 @@ def walk_through(terminal: Terminal, load: Callable[[], "Loaded"], by: str) -> N
         verdict = Verdict.APPROVED if key == "a" else Verdict.REJECTED
         review = review.decided([group], verdict, by, remark)
         review.write()
-        terminal.say(f"{group.id} {review.describe(group)}", style=view.STYLES[verdict.value])
-    terminal.say(f"{short_path(review.path)}: {view.counts(review, found.groups)}")
+        terminal.say(f"{group.id} {review.describe(group)}", style=review_view.STYLES[verdict.value])
+    terminal.say(f"{short_path(review.path)}: {review_view.counts(review, found.groups)}")
 
 
 def _asked(terminal: Terminal, where: str) -> str:

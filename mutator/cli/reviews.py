@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from mutator._common.text import counted
-from mutator.cli import review_view as view
+from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
 from mutator.cli.review_choice import COLUMNS, Wanted
@@ -102,7 +102,7 @@ def list_groups(
     terminal = Terminal(as_json)
     wanted = _wanted(place, campaign, specs, reading, seed, manifest)
     found = wanted.load(terminal).matching(only, exclude)
-    view.print_list(terminal, found.review, found.groups)
+    review_view.print_list(terminal, found.review, found.groups)
 
 
 @with_place
@@ -122,10 +122,10 @@ def show(
     found = _wanted(place, campaign, specs, reading, seed, manifest).load(terminal)
     shown = found.find(groups)
     if as_json:
-        terminal.emit([view.data(found.review, group, whole=True) for group in shown])
+        terminal.emit([review_view.data(found.review, group, whole=True) for group in shown])
         return
     for group in shown:
-        view.print_group(terminal, found.review, group)
+        review_view.print_group(terminal, found.review, group)
 
 
 @with_place
@@ -178,10 +178,10 @@ def _decide(
     decided = found.review.decided(groups, verdict, by, remark)
     decided.write()
     if terminal.as_json:
-        terminal.emit([view.data(decided, group) for group in groups])
+        terminal.emit([review_view.data(decided, group) for group in groups])
     for group in groups:
-        terminal.say(f"{group.id} {decided.describe(group)}", style=view.STYLES[verdict.value])
-    terminal.say(f"{short_path(decided.path)}: {view.counts(decided, found.groups)}")
+        terminal.say(f"{group.id} {decided.describe(group)}", style=review_view.STYLES[verdict.value])
+    terminal.say(f"{short_path(decided.path)}: {review_view.counts(decided, found.groups)}")
 
 
 @with_place

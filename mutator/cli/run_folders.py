@@ -13,6 +13,7 @@ from mutator.cli.options import Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
+    from mutator.api.runs import Run
     from mutator.workspace import Workspace
 
 
@@ -23,17 +24,11 @@ def register(app: typer.Typer) -> None:
     app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
 
-def show_counts(terminal: Terminal, run: Path) -> None:
+def show_counts(terminal: Terminal, run: "Run") -> None:
     """The table of results by fault type, and how the experiments ended."""
-    from mutator.outcomes import rows as tables
-    from mutator.outcomes.reader import Results
-
-    rows = Results.of_run(run).rows()
-    hazards = tables.hazard_names(rows)
-    heads, lines = tables.count_table(tables.counts_by(rows, tables.by_fault_type), "fault type", hazards)
-    terminal.table(heads, lines, right=range(1, len(heads)), total=True)
-    endings = ", ".join(f"{name} {n}" for name, n in tables.outcome_counts(rows).items())
-    terminal.say(f"outcomes: {endings}")
+    counts = run.counts()
+    terminal.table(counts.heads, counts.rows, right=tuple(counts.right), total=True)
+    terminal.say(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 
 MERGE_EXAMPLES = """\b
@@ -51,17 +46,16 @@ def merge(
 
     It is the one that a single machine would have made: the same results, byte for byte.
     """
-    from mutator.execution import merging
-    from mutator.store.run_folder import RunFolder
+    from mutator.api.runs import merge_runs
+    from mutator.outcomes.results import CSV
 
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
-        results = merging.merge(shards, out)
-    planned = RunFolder.open(out).planned
+        planned = merge_runs(shards, out).folder.planned
     if as_json:
         terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
     terminal.say(
-        f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {short_path(results)}"
+        f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {short_path(out / CSV)}"
     )
     terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
 
@@ -85,22 +79,17 @@ def report(
     An unfinished run gets a report of what it has so far. What was published stands beside the results if
     a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
     """
-    from mutator.outcomes import results
-    from mutator.report import building as reports
-    from mutator.store.records import read_records
-    from mutator.store.run_folder import RunFolder
-    from mutator.verification import equivalence as proof
+    from mutator.api.runs import load_run
 
     terminal = Terminal(as_json)
-    folder = RunFolder.open(run)
-    results.build(folder.path)
+    loaded = load_run(run, workspace=_library(place))
     with terminal.wait("writing the report"):  # it may drive a few experiments again
-        written = reports.write(folder.path, _library(place))
+        written = loaded.report(anew=True)
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
-    show_counts(terminal, run)
+    show_counts(terminal, loaded)
     terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
-    proof.judge(folder, read_records(folder.path))
+    loaded.check_equivalence()
 
 
 def _library(place: Place) -> "Workspace | None":
@@ -128,15 +117,15 @@ def clean(
 
     Anything that is no run folder, and a run under way, is left alone.
     """
-    from mutator.store import run_folder as runfolder
+    from mutator.store import run_folder
 
     terminal = Terminal()
-    folders = [runfolder.RunFolder.open(path).path for path in runs]
+    folders = [run_folder.RunFolder.open(path).path for path in runs]
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
         if not typer.confirm(f"delete {', '.join(map(short_path, folders))}?"):
             return
     for folder in folders:
-        runfolder.clean(folder)
+        run_folder.clean(folder)
         terminal.say(f"deleted {short_path(folder)}")

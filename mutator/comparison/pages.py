@@ -36,7 +36,7 @@ def write(comparison: Comparison, out: Path) -> Written:
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
         write_atomic(out / "tables" / f"{sheet.name}.csv", sheet.csv().encode())
-    write_atomic(pairs, _table(_pair_line(p) for p in comparison.pairs))
+    write_atomic(pairs, _table(pair_line(p) for p in comparison.pairs))
     unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
     write_atomic(out / "unmatched.csv", _table(unmatched, heads=("why", "experiment", "words")))
     write_atomic(text, markdown(comparison).encode())
@@ -168,7 +168,7 @@ def _shown_side(row: Row) -> dict[str, str]:
     }
 
 
-def _pair_line(pair: Pair) -> dict[str, object]:
+def pair_line(pair: Pair) -> dict[str, object]:
     """A pair's line of pairs.csv; times are s of simulation since its start."""
     row = pair.row_b
     line: dict[str, object] = {

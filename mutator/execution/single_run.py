@@ -64,11 +64,11 @@ def run_single(
 
 
 def rerun(
-    workspace: Workspace, run: Path, experiment_id: str, *, film: Path | None = None
+    workspace: Workspace, run: Path, experiment_id: str, *, out: Path | None = None, film: bool = False
 ) -> tuple[Single, bool]:
-    """Run a planned experiment again with its trace kept in the run folder (traces/<id>/).
+    """Run a planned experiment again into the folder `out` (default: traces/<id>/ of the run folder).
 
-    With a folder `film` golden and faulty run are driven and kept there, each with a film.
+    With `film` the golden run is driven again, too, and both leave a film.
     The flag says whether the record equals the one of the campaign (true if there is none yet).
     """
     folder = RunFolder.open(run)
@@ -80,7 +80,7 @@ def rerun(
         workspace,
         manifest.filming() if film else manifest,
         experiment,
-        film or folder.path / "traces" / wanted,
+        out or folder.path / "traces" / wanted,
         limits=folder.limits,
         golden=golden if golden.is_dir() and not film else None,
     )

@@ -1,11 +1,13 @@
 """Golden against faulty on one time axis, with marks for trigger, manifestation, alerts and hazards.
 
-matplotlib's Agg and SVG back ends, without pyplot: no display, no global state, the same bytes each time.
+Figures of matplotlib without pyplot: no display, no global state, the same bytes each time.
 """
 
+import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +26,7 @@ GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: told apart by colour-blind read
 FAULTY_COLOUR = "#d55e00"
 PANEL_HEIGHT = 1.1  # inches
 WIDTH = 9.0
+PNG_DPI = 110
 
 
 class MarkKind(StrEnum):
@@ -65,18 +68,13 @@ def marks_of(record: Record) -> tuple[Mark, ...]:
     return tuple(sorted(marks, key=lambda m: m.t))
 
 
-def plot_run(
-    golden: Trace,
-    faulty: Trace,
-    manifest: TargetManifest,
-    *,
-    title: str,
-    marks: Iterable[Mark] = (),
-    paths: Sequence[Path],
-) -> None:
-    """Draw the manifest's channels of two runs into `paths` (.svg or .png by suffix), one panel a channel.
+def draw_run(
+    golden: Trace, faulty: Trace, manifest: TargetManifest, *, title: str, marks: Iterable[Mark] = ()
+) -> "Figure":
+    """The manifest's channels of two runs, one panel a channel; `save` writes the figure.
 
-    Compared channels (actuators) come first. A channel that either run lacks is left out.
+    Compared channels (actuators) come first. A channel that either run lacks is left out; MutatorError when
+    none is left.
     """
     channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
     if not channels:
@@ -86,18 +84,27 @@ def plot_run(
     for axis, channel in zip(axes, channels, strict=True):
         _panel(axis, channel, (golden[time], golden[channel.name]), (faulty[time], faulty[channel.name]))
     _decorate(figure, axes, title, tuple(marks))
-    save(figure, paths)
+    return figure
 
 
 def _figure(rows: int) -> tuple["Figure", list["Axes"]]:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, 1.1 + PANEL_HEIGHT * rows), layout="constrained")
+    figure = _figure_type()(figsize=(WIDTH, 1.1 + PANEL_HEIGHT * rows), layout="constrained")
     axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     return figure, list(axes)
+
+
+@cache
+def _figure_type() -> type["Figure"]:
+    from matplotlib.figure import Figure
+
+    class RunFigure(Figure):
+        """A figure that a notebook shows, whatever back end pyplot has there."""
+
+        def _repr_png_(self) -> bytes:
+            self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
+            return png.getvalue()
+
+    return RunFigure
 
 
 def _panel(axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any]) -> None:
@@ -143,7 +150,7 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
         for path in paths:
             path.parent.mkdir(parents=True, exist_ok=True)
             no_date = {"Date": None} if path.suffix == ".svg" else None
-            figure.savefig(path, dpi=110, metadata=no_date)
+            figure.savefig(path, dpi=PNG_DPI, metadata=no_date)
 
 
 def finite(values: Any) -> Any:

@@ -36,7 +36,7 @@ def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
     problems = [
         *_twice(summary, lambda row: f"{row['method']} in {row['scenario']}"),
         *_unknown(summary, lambda row: row["method"], "method", set(_METHODS)),
-        *_unknown(summary, lambda row: row["scenario"], "scenario", set(workspace.scenario_names())),
+        *_unknown(summary, lambda row: row["scenario"], "scenario", set(workspace.scenarios)),
         *_twice(coverage, _kind),
         *_unknown(coverage, _kind, "fault type", kinds),
     ]

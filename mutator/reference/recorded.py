@@ -22,7 +22,7 @@ OBSERVED = {
 def results(workspace: Workspace) -> str:
     """docs/reference/results.md."""
     left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
-    manifests = [workspace.manifest(name) for name in workspace.target_names()]
+    manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
         [
             generated("Result columns"),
@@ -63,7 +63,7 @@ def _columns(columns: Iterable[Column]) -> Iterator[str]:
 
 def channels(workspace: Workspace) -> str:
     """docs/reference/channels.md."""
-    manifests = [workspace.manifest(name) for name in workspace.target_names()]
+    manifests = [workspace.manifest(name) for name in workspace.targets]
     parts = [
         generated("Channels and units"),
         "What is observed, recorded and compared of each target of the library, as its "

@@ -43,7 +43,7 @@ def film_experiment(
     """
     with TemporaryDirectory(prefix="film-", dir=run) as name:
         folder = Path(name).resolve()
-        single, same = rerun(workspace, run, experiment_id, film=folder)
+        single, same = rerun(workspace, run, experiment_id, out=folder, film=True)
         if not (single.faulty / FILM).is_dir():
             raise MutatorError(
                 f"the faulty run left no film: {single.record.status.value}, {single.record.detail}",

@@ -104,7 +104,7 @@ def of_library(
     globs over specs (none: all); MutatorError for one that matches nothing.
     """
     models = workspace.fault_models()
-    tables = map(workspace.context_table, workspace.context_table_names())
+    tables = map(workspace.context_table, workspace.context_tables)
     contexts = [t for table in tables for t in table.triggers(armed_after_s=manifest.armed_after_s)]
     triggers = (*contexts, at_time(manifest.armed_after_s))
     faults = [

@@ -75,6 +75,6 @@ def _share(group: Group) -> str:
 def _campaign(workspace: Workspace, plan: Plan) -> str:
     """The campaign as a command names it: by name if the library has this text under it, else by file."""
     name = plan.campaign.name
-    known = name in workspace.campaign_names()
+    known = name in workspace.campaigns
     same = known and workspace.campaign(name).read_bytes() == plan.campaign.source
     return name if same else shlex.quote(str(plan.campaign.path))

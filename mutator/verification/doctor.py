@@ -139,7 +139,7 @@ def _library(workspace: "Workspace") -> Iterator[Finding]:
         yield Finding(name="templates", level=Level.OK, found=found)
     except MutatorError as e:
         yield Finding(name="templates", level=Level.FAIL, found=str(e), remedy=e.remedy or "")
-    names = workspace.target_names()
+    names = workspace.targets
     if not names:
         remedy = "a manifest in targets/ describes a controller tree"
         yield Finding(name="target", level=Level.FAIL, found="no manifest in the library", remedy=remedy)

@@ -41,7 +41,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     manifest = found.tried(lambda: workspace.manifest(target))
     models = found.tried(workspace.fault_models)
     hazards = found.tried(workspace.hazards)
-    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_table_names()]
+    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
     readings = found.tried(workspace.readings)
     spec_files = workspace.spec_files() if readings else ()
     specs = [found.tried(partial(workspace.spec, path)) for path in spec_files]
@@ -65,7 +65,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 def check_campaigns(workspace: Workspace, readings: Readings) -> list[MutatorError]:
     """Problems of the library's campaigns, and those that the studies they ask for find in its data."""
     found, studies = _Found(), set()
-    for name in workspace.campaign_names():
+    for name in workspace.campaigns:
         campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
         if campaign:
             found.tried(partial(check_readings, campaign, readings))

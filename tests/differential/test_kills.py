@@ -71,7 +71,7 @@ class Campaign:
 
     def __init__(self, workspace: Workspace, folder: Path, words: Sequence[str], seed: int) -> None:
         self.workspace, self.folder, self.words = workspace, folder, words
-        self.tree = workspace.manifest(workspace.target_names()[0]).root
+        self.tree = workspace.manifest(workspace.target_name()).root
         self.before = contents(self.tree)
         self.random = random.Random(seed)
         self.stages: list[str] = []  # in which the kills came

@@ -47,6 +47,7 @@ def test_options_go_before_the_environment(
     monkeypatch.setenv("MUTATOR_TARGET", str(other))
     assert Workspace.find().target == other
     assert Workspace.find(target=root / "target").target == root / "target"
+    assert Workspace.find(str(root), target=str(root / "target")).target == root / "target"
 
 
 def test_outside_a_clone_there_is_what_ships(elsewhere: Path) -> None:
@@ -73,10 +74,10 @@ def test_a_named_folder_must_be_there(elsewhere: Path) -> None:
 
 def test_names_and_paths(toy: Workspace) -> None:
     """Everything of the library is found by name or by the path of its file."""
-    assert toy.target_names() == ("toy",)
-    assert toy.scenario_names() == ("follow",)
-    assert toy.context_table_names() == ("pedals",)
-    assert toy.campaign_names() == ()
+    assert list(toy.targets) == ["toy"]
+    assert list(toy.scenarios) == ["follow"]
+    assert list(toy.context_tables) == ["pedals"]
+    assert not toy.campaigns
     path = toy.library / "scenarios" / "follow.yaml"
     assert toy.scenario("follow") == toy.scenario(path) == path
     assert toy.spec_files() == (toy.library / "faults" / "sensor" / "distance.yaml",)
@@ -102,3 +103,41 @@ def test_specs_lie_where_their_names_say(toy: Workspace) -> None:
     path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
     with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):
         toy.specs()
+
+
+def test_it_is_shown_in_a_line_and_as_a_table(toycar: Workspace) -> None:
+    """A notebook sees how much there is, and the names."""
+    assert repr(toycar).endswith("9 fault specs, 2 scenarios, 1 context table, 3 campaigns, 1 target>")
+    shown = toycar._repr_html_()
+    for name in ("sensor/lane", "near_far", "small", "toycar", str(toycar.templates)):
+        assert name in shown
+
+
+def test_faults_to_iterate_over(toycar: Workspace) -> None:
+    """A pattern chooses specs or variants; values come from the seed; a file is as good as a name."""
+    names = {fault.spec for fault in toycar.faults("sensor/*")}
+    assert names == {
+        *("sensor/distance/longer", "sensor/distance/nearer"),
+        *("sensor/lane/shifted", "sensor/silence/no_data"),
+    }
+    whole, variant = toycar.faults("sensor/distance"), toycar.faults("sensor/distance/longer")
+    assert variant == tuple(fault for fault in whole if fault.spec == "sensor/distance/longer")
+    assert {fault.value for fault in variant} != {
+        fault.value for fault in toycar.faults("sensor/distance/longer", seed=1)
+    }
+    assert toycar.faults(toycar.library / "faults" / "sensor" / "distance.yaml") == whole
+    assert {fault.reading for fault in toycar.faults("*/lane/*", reading="as_coded")} == {"as_coded"}
+    with pytest.raises(
+        MutatorError, match=r"no fault is named like 'sensor/lan'.*did you mean 'sensor/lane'"
+    ):
+        toycar.faults("sensor/lan")
+
+
+def test_the_only_target_is_meant(toycar: Workspace) -> None:
+    """A target need not be named where there is just one."""
+    assert toycar.target_name() == "toycar"
+    other = toycar.library / "targets" / "other.yaml"
+    other.write_bytes((toycar.library / "targets" / "toycar.yaml").read_bytes())
+    with pytest.raises(MutatorError, match=r"2 targets in the library \(other, toycar\)"):
+        toycar.target_name()
+    assert toycar.target_name("other") == "other"

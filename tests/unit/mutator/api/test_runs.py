@@ -3,6 +3,7 @@
 import dataclasses
 import re
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +41,12 @@ def run(
     """A toy run with made up records."""
     folder = tmp_path_factory.mktemp("load")
     toycar = copy_toycar(folder)
-    return mutator.load_run(write_run(toycar, folder / "first", became), root=toycar.library.parent)
+    return mutator.load_run(write_run(toycar, folder / "first", became), workspace=toycar)
 
 
 def test_the_frame_is_typed(run: Run) -> None:
     """Names are categories, flags are flags that may be unknown, times are floats with their unit."""
-    frame = run.frame
+    frame = run.results
     assert len(frame) == 24
     assert frame.index.name == "experiment_id"
     assert list(frame["outcome"].cat.categories) == [o.value for o in Outcome]
@@ -61,7 +62,7 @@ def test_the_frame_is_typed(run: Run) -> None:
 
 def test_hazards_of_the_frame(run: Run) -> None:
     """Any hazard and the first one are told; of a crash it is not known whether there would have been one."""
-    frame = run.frame
+    frame = run.results
     lane, silence = (frame[frame["fault_type"] == name] for name in ("lane", "silence"))
     assert lane["hazard"].all()
     assert set(lane["t_hazard"]) == {4.0}
@@ -74,7 +75,7 @@ def test_it_says_what_it_is(run: Run) -> None:
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "packages", "choices"} <= set(run.provenance)
-    assert set(run.frame["fault_id"]) == set(run.faults)
+    assert set(run.results["fault_id"]) == set(run.faults)
     assert list(run.experiments) == list(plan_file.ids(run.path))
 
 
@@ -95,28 +96,62 @@ def driven(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) ->
     lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA})
     lines.append(dataclasses.asdict(single.record))
     lines.close()
-    return mutator.load_run(folder.path, root=toycar.library.parent)
+    return mutator.load_run(folder.path, workspace=toycar)
 
 
 def test_traces_are_driven_when_asked_for(driven: Run) -> None:
     """Golden and faulty run are frames by time with units; the latter is driven again, once, and kept."""
-    [name] = driven.frame.index
+    [name] = driven.results.index
     golden = driven.golden("A")
     assert (golden.index.name, len(golden)) == ("time", 120)
     assert golden.attrs["units"]["speed"] == "m/s"
     assert not (driven.path / "traces").exists()
-    faulty = driven.trace(name[:6])
-    assert list(faulty.columns) == list(golden.columns)
-    assert not faulty.equals(golden)
-    assert (driven.path / "traces" / name / "faulty" / "log.npz").is_file()
-    assert driven.trace(name) is faulty
-    assert "# fi:" in driven.patch(name)
+    experiment = driven.experiment(name[:6])
+    traces = experiment.traces()
+    assert traces.golden.equals(golden)
+    assert list(traces.faulty.columns) == list(golden.columns)
+    assert traces.difference["wheel_turn"].abs().max() > 0.0
+    kept = driven.path / "traces" / name / "faulty" / "log.npz"
+    assert kept.is_file()
+    before = kept.stat().st_mtime_ns
+    assert experiment.traces().faulty.equals(traces.faulty)
+    assert kept.stat().st_mtime_ns == before
+    assert experiment.traces(exact=True).faulty.equals(traces.faulty)
+    assert kept.stat().st_mtime_ns > before
+
+
+def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
+    """Diff, fault, record, verdict and plot are at hand, and a notebook gets a table and a picture."""
+    [name] = driven.results.index
+    experiment = driven.experiment(name)
+    assert "# fi:" in experiment.diff
+    assert "_fi.py" in experiment.patch
+    assert "_fi.py" not in experiment.diff
+    assert experiment.fault.fault_type == "lane"
+    assert experiment.record is not None
+    assert experiment.verdict["outcome"] == experiment.ending == driven.results["outcome"][name]
+    assert "wheel_turn" in [axis.get_ylabel().split("\n")[0] for axis in experiment.plot().axes]
+    assert repr(experiment) in unescape(experiment._repr_html_())
+
+
+def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
+    """A re-run says whether its record is the campaign's, and leaves nothing behind unless asked to."""
+    experiment = driven.experiment(driven.results.index[0])
+    trial = experiment.rerun()
+    assert trial.same_as_record is True
+    assert len(trial.traces().faulty) == 120
+    assert not (driven.path / "traces").exists()
+    assert not experiment.is_drawn
+    experiment.rerun(keep=True)
+    assert experiment.is_drawn
 
 
 def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The code of the page runs as it is printed, one block after the other, on a run in runs/first."""
-    assert driven.root is not None
-    monkeypatch.setenv("MUTATOR_ROOT", str(driven.root))
+    library = driven.workspace.library
+    monkeypatch.setenv("MUTATOR_ROOT", str(library.parent))
+    small = (library / "campaigns" / "small.yaml").read_text()
+    (library / "campaigns" / "quickstart.yaml").write_text(small.replace("name: small", "name: quickstart"))
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
@@ -124,24 +159,55 @@ def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pyte
     names: dict[str, Any] = {}
     for block in blocks:
         exec(compile(block, PAGE, "exec"), names)
-    assert names["difference"].max() == 0.0 < (names["faulty"] - names["golden"])["wheel_turn"].abs().max()
-    assert names["fault"].fault_type == "lane"
+    assert names["traces"].difference["wheel_turn"].abs().max() > 0.0
+    assert names["experiment"].fault.fault_type == "lane"
+    assert names["second"].summary.done == 12
+    assert names["trial"].outcome == "hazard"
 
 
 def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
     """Asking for what a run does not have names what it has."""
     with pytest.raises(MutatorError, match="no golden run Z"):
         run.golden("Z")
-    with pytest.raises(MutatorError, match="no patch of"):
-        run.patch(run.frame.index[0])
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
-        run.trace("zz")
+        run.experiment("zz")
     with pytest.raises(MutatorError, match="no run folder"):
         mutator.load_run(tmp_path)
 
 
-def test_only_what_is_offered_is_there() -> None:
-    """The package offers `load_run` without loading pandas for it; other names are an error as ever."""
-    assert "load_run" in dir(mutator)
-    with pytest.raises(AttributeError, match="no attribute 'load_runs'"):
-        mutator.load_runs  # noqa: B018
+def test_a_planned_experiment_has_a_diff_and_no_traces(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
+    """Before it ran, an experiment's mutant is made when asked for; its traces are an error that helps."""
+    run = mutator.load_run(write_run(toycar, tmp_path / "r", lambda e: None), workspace=toycar)
+    experiment = run.experiment(next(iter(run.experiments)))
+    assert "# fi:" in experiment.diff
+    assert (experiment.record, experiment.ending) == (None, "not run")
+    for ask in (experiment.traces, experiment.plot):
+        with pytest.raises(MutatorError, match=r"has not run yet.*mutator run toy --out"):
+            ask()
+
+
+def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> None:
+    """A run with harness errors says so where it is shown, and names the experiments."""
+    run = mutator.load_run(
+        write_run(
+            toycar,
+            tmp_path / "r",
+            lambda e: {"status": Status.HARNESS_ERROR, "outcome": None, "detail": "oh"},
+        )
+    )
+    assert "24 with a HARNESS ERROR" in repr(run)
+    assert "HARNESS ERROR" in run._repr_html_()
+    assert set(run.harness_errors.values()) == {"oh"}
+
+
+def test_reports_and_exports(run: Run) -> None:
+    """A run writes its report and its exports; what is exported as CSV is results.csv."""
+    assert run.export("csv").read_bytes() == (run.path / "results.csv").read_bytes()
+    with pytest.raises(MutatorError, match=r"'xls'.*expected one of mutation-elements, junit, csv, parquet"):
+        run.export("xls")
+    written = run.report()
+    assert written.rows == 24
+    assert run.report() == written
+    run.check_equivalence()

@@ -81,7 +81,7 @@ def test_mistakes_are_told_with_their_line(
 
 def test_the_campaigns_that_ship_are_read(clone: Workspace) -> None:
     """Every campaign of the library loads and is named as its file."""
-    names = clone.campaign_names()
+    names = clone.campaigns
     assert "quickstart" in names
     for name in names:
         assert load_campaign(clone.campaign(name)).name == name

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.figures.run_plot import Mark, MarkKind, marks_of, plot_run
+from mutator.figures.run_plot import Mark, MarkKind, draw_run, marks_of, save
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.targets.manifest import Channel
 
@@ -33,7 +33,8 @@ def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
 def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
     """Every channel both runs have is a panel with its unit; every mark stands there with its time."""
     mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
-    plot_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark], paths=[tmp_path / "p.svg"])
+    figure = draw_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark])
+    save(figure, [tmp_path / "p.svg"])
     root = ET.parse(tmp_path / "p.svg").getroot()
     text = " ".join("".join(e.itertext()) for e in root.iter("{http://www.w3.org/2000/svg}text"))
     for wanted in (
@@ -54,20 +55,20 @@ def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleN
 def test_the_same_run_draws_the_same_svg(tmp_path: Path, manifest: SimpleNamespace) -> None:
     """A plot made again is the same file, byte for byte."""
     for name in ("a.svg", "b.svg"):
-        plot_run(trace(), trace(0.1), manifest, title="x", paths=[tmp_path / name])
+        save(draw_run(trace(), trace(0.1), manifest, title="x"), [tmp_path / name])
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
 def test_a_png_is_a_png(tmp_path: Path, manifest: SimpleNamespace) -> None:
     """The suffix decides the format."""
-    plot_run(trace(), trace(), manifest, title="x", paths=[tmp_path / "p.png"])
+    save(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
     """Nothing to draw is an error that names the manifest, not an empty picture."""
     with pytest.raises(MutatorError, match=re.escape("m.yaml")):
-        plot_run(trace(), {"t": TIME}, manifest, title="x", paths=[tmp_path / "p.svg"])
+        draw_run(trace(), {"t": TIME}, manifest, title="x")
 
 
 def test_marks_come_from_the_record_in_order_of_time() -> None:

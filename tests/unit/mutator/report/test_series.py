@@ -10,7 +10,7 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.model import Outcome, Record, Status
-from mutator.report import series as report_series
+from mutator.report import series
 from mutator.report.series import BUCKETS, chosen, keep, packed_series, thinned
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -77,4 +77,4 @@ def test_a_kept_series_is_the_same_file_each_time(
     before = path.read_bytes()
     assert before.startswith(b'Series.loaded("eeeeeeeeeeeeeeee", "')
     assert keep(folder, toycar.manifest("toycar"), trace, trace, record()).read_bytes() == before
-    assert report_series.kept(tmp_path / "report") == ["e" * 16]
+    assert series.kept(tmp_path / "report") == ["e" * 16]

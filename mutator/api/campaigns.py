@@ -1,0 +1,93 @@
+"""Campaigns: planned, run, resumed."""
+
+import warnings
+from pathlib import Path
+
+from mutator.api.runs import Run
+from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.campaigns.plans import Choices, Plan, freeze, load_plan, make_plan
+from mutator.engines.forkable import not_forked
+from mutator.execution.running import run_campaign
+from mutator.execution.session import Notify, Summary
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+class IncompleteRun(UserWarning):
+    """A run ended before all of its experiments had a result, or with harness errors."""
+
+
+def plan(
+    campaign: str | Path,
+    out: str | Path | None = None,
+    *,
+    choices: Choices | None = None,
+    workspace: WorkspaceLike = None,
+) -> Plan:
+    """Expand a campaign (a name of the library or a file) into its experiments; none is run.
+
+    With `out` the plan is frozen there: `run` with the same folder runs exactly these experiments.
+    MutatorError for a mistake in campaign or choices, when no experiment is left, and for a folder that holds
+    anything else.
+    """
+    found = open_workspace(workspace)
+    made = make_plan(found, campaign, choices)
+    if out is None:
+        return made
+    return load_plan(freeze(made, Path(out), found).path)  # knows what a run took, once one was driven here
+
+
+def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:
+    """The variants of a plan that only the reference engine can run, and why."""
+    faults = [experiment.fault for experiment in plan.experiments]
+    return not_forked(workspace.manifest(plan.campaign.target), workspace.fault_models(), faults)
+
+
+def run(
+    campaign: str | Path,
+    out: str | Path,
+    *,
+    choices: Choices | None = None,
+    workers: int = 0,
+    engine: str | None = None,
+    reviewed: bool = False,
+    progress: Notify | None = None,
+    workspace: WorkspaceLike = None,
+) -> Run:
+    """Run a campaign (a name of the library or a file) into the run folder `out`, or resume it there.
+
+    What has a result is not run again. A plan that is frozen in `out` is used as it is: choices that are not
+    given are the frozen ones. `workers` is the number of processes (0: this one alone), `engine` a name of
+    `mutator.engines.registry` (None: the fastest that is worth it). With `reviewed` nothing runs that has no
+    approval. `progress` is called about twice a second, from another thread.
+
+    `Run.summary` says what this call came to. Harness errors, a full disk or an interruption end in an
+    IncompleteRun warning; the same call then goes on. MutatorError for wrong input; CheckFailed when
+    something is not approved, and when the checks before the campaign or the equivalence check fail.
+    """
+    found, place = open_workspace(workspace), Path(out)
+    summary = run_campaign(
+        found,
+        campaign,
+        place,
+        workers=workers,
+        choices=choices,
+        engine=engine,
+        reviewed=reviewed,
+        notify=progress,
+    )
+    if summary.exit_code:
+        warnings.warn(_what_is_left(summary), IncompleteRun, stacklevel=2)
+    return Run(RunFolder.open(place), found, summary)
+
+
+def _what_is_left(summary: Summary) -> str:
+    parts = [f"{summary.done} of {summary.planned} experiments have a result"]
+    if summary.harness_errors:
+        name, detail = summary.harness_errors[0]
+        parts.append(f"{len(summary.harness_errors)} harness errors, the first {name}: {detail}")
+    if summary.problem:
+        parts.append(summary.problem)
+    if summary.interrupted:
+        parts.append("interrupted")
+    return "; ".join(parts) + "; the same call goes on"

@@ -1,0 +1,104 @@
+"""Two runs of the same faults compared, as pandas frames."""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator._common.tables import Table
+from mutator.api.html import text_html
+from mutator.api.runs import Run
+from mutator.comparison import comparison as comparing
+from mutator.comparison import pages
+from mutator.comparison.comparison import Comparison, Finding, Gate
+from mutator.comparison.pairs import Pair
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SHOWN = 3  # tables that a notebook shows: how they ended, what changed, rates
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunComparison:
+    """Two runs, matched experiment by experiment; `comparison` has all that is known of the pairs."""
+
+    comparison: Comparison
+
+    def __repr__(self) -> str:
+        names = self.comparison.names
+        return f"<RunComparison {names.a} against {names.b}: {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        names = self.comparison.names
+        differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.differs]
+        facts = Table(heads=("what differs", names.a, names.b), rows=differing).as_html()
+        sheets = [text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:SHOWN]]
+        return text_html(self.summary) + facts + "".join(sheets)
+
+    @property
+    def summary(self) -> str:
+        """The comparison in a few sentences."""
+        return pages.summary(self.comparison)
+
+    @cached_property
+    def pairs(self) -> "pd.DataFrame":
+        """A row for each experiment that both runs have; columns of the runs end in `_a` and `_b`.
+
+        The columns of pairs.csv: ids, fault, scenario, method, trigger, `changes` (as in `Gate`, with
+        semicolons between them), endings, and times in s of simulation since its start.
+        """
+        return _frame(self.comparison.pairs)
+
+    @cached_property
+    def changed(self) -> "pd.DataFrame":
+        """Those of them whose result changed, new hazards first."""
+        return _frame(self.comparison.changed)
+
+    @cached_property
+    def tables(self) -> "dict[str, pd.DataFrame]":
+        """The tables by name: endings, changes, and rates and times with paired statistics.
+
+        A share of n is five columns: count, of, rate and both ends of its interval.
+        """
+        import pandas as pd
+
+        return {s.name: pd.read_csv(io.StringIO(s.csv())) for s in self.comparison.sheets}
+
+    def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
+        """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "new-crash")`."""
+        known = [gate.value for gate in Gate]
+        if strangers := [gate for gate in gates if gate not in known]:
+            raise MutatorError(f"gate '{strangers[0]}'", expected=f"one of {', '.join(known)}")
+        return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
+
+    def write(self, out: str | Path | None = None) -> pages.Written:
+        """Write page, Markdown and CSV into `out`; default: report/compare-<first run> of the second run."""
+        a, b = self.comparison.a, self.comparison.b
+        default = b.folder.path / "report" / f"compare-{a.name}"
+        return pages.write(self.comparison, default if out is None else Path(out))
+
+
+def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None) -> RunComparison:
+    """Compare two runs, experiment by experiment, `a` being before and `b` after.
+
+    Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
+    `only` is a filter over what is known of them before running. MutatorError when none has a partner;
+    CheckFailed when the equivalence check of a run failed.
+    """
+    return RunComparison(comparing.compare(_path(a), _path(b), only))
+
+
+def _path(run: Run | str | Path) -> Path:
+    return run.path if isinstance(run, Run) else Path(run)
+
+
+def _frame(pairs: Sequence[Pair]) -> "pd.DataFrame":
+    import pandas as pd
+
+    frame = pd.DataFrame([pages.pair_line(pair) for pair in pairs])
+    times = [name for name in frame.columns if name.startswith("t_")]
+    return frame.astype(dict.fromkeys(times, float))

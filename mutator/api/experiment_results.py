@@ -1,0 +1,161 @@
+"""One experiment to look at: what was injected, what became of it, golden against faulty."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mutator.api.html import diff_html, facts_html, text_html
+from mutator.figures.run_plot import draw_run, marks_of
+from mutator.model import Experiment, Fault, Outcome, Record, Status
+from mutator.mutants.readable_diffs import readable
+from mutator.outcomes.golden import Trace
+from mutator.outcomes.verdicts import reaction_time
+from mutator.targets.manifest import TargetManifest
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class TraceFrames:
+    """Golden and faulty run as pandas frames: a column per channel, by time in s.
+
+    `attrs["units"]` of a frame has the units of the channels that the manifest names.
+    """
+
+    golden: "pd.DataFrame"
+    faulty: "pd.DataFrame"
+
+    def __repr__(self) -> str:
+        rows, columns = self.golden.shape
+        return f"<TraceFrames: {columns} channels, {rows} steps golden, {len(self.faulty)} faulty>"
+
+    @property
+    def difference(self) -> "pd.DataFrame":
+        """Faulty less golden, at the times that both runs have."""
+        times = self.golden.index.intersection(self.faulty.index)
+        return self.faulty.loc[times].astype(float) - self.golden.loc[times].astype(float)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class ExperimentResult(ABC):
+    """An experiment and its record; `record` is None before it was run."""
+
+    experiment: Experiment
+    record: Record | None
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id}: {self.experiment.label}: {self.ending}>"
+
+    def _repr_html_(self) -> str:
+        return text_html(repr(self)) + diff_html(self.diff) + facts_html(self._facts())
+
+    def _facts(self) -> list[tuple[str, object]]:
+        facts = describe(self.experiment) | (verdict(self.record) if self.record else {"status": "not run"})
+        texts = {
+            name: ", ".join(f"{k} {v:.4g}" for k, v in value.items()) or None
+            for name, value in facts.items()
+            if isinstance(value, dict)
+        }
+        return list((facts | texts).items())
+
+    @property
+    def id(self) -> str:
+        """The experiment's id."""
+        return self.experiment.id
+
+    @property
+    def fault(self) -> Fault:
+        """What was injected."""
+        return self.experiment.fault
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """What the fault did; None unless the run ended well."""
+        return self.record.outcome if self.record else None
+
+    @property
+    def status(self) -> Status | None:
+        """Whether the experiment itself worked; None before it was run."""
+        return self.record.status if self.record else None
+
+    @property
+    def ending(self) -> str:
+        """The outcome, or the status of what did not end well: `hazard`, `crashed`, `not run`."""
+        return str(self.outcome or self.status or "not run")
+
+    @property
+    def verdict(self) -> dict[str, Any]:
+        """What became of it, as plain data; times in s of simulation, None: did not happen."""
+        return verdict(self.record) if self.record else {"status": None}
+
+    @property
+    @abstractmethod
+    def patch(self) -> str:
+        """The whole patch, probe included."""
+
+    @property
+    def diff(self) -> str:
+        """The source diff for reading: without the probe, which every mutant gets."""
+        return readable(self.patch)[0]
+
+    def plot(self) -> "Figure":
+        """Golden against faulty, a panel for each channel of the manifest, with marks for what happened."""
+        golden, faulty = self._load_traces()
+        facts = describe(self.experiment)
+        title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
+        marks = marks_of(self.record) if self.record else ()
+        return draw_run(golden, faulty, self._target(), title=title, marks=marks)
+
+    @abstractmethod
+    def _target(self) -> TargetManifest: ...
+
+    @abstractmethod
+    def _load_traces(self) -> tuple[Trace, Trace]: ...
+
+
+def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
+    """A trace by time in s; `attrs["units"]` has the units of the channels that the manifest names."""
+    import pandas as pd
+
+    frame = pd.DataFrame(dict(trace)).set_index(manifest.time_channel)
+    frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared, *manifest.plotted)}
+    return frame
+
+
+def describe(experiment: Experiment) -> dict[str, Any]:
+    """What the experiment is, for people and as JSON."""
+    fault, trigger = experiment.fault, experiment.trigger
+    hold = fault.hold or trigger.hold
+    return {
+        "experiment": experiment.id,
+        "fault": fault.label,
+        "aim": fault.aim,
+        "reading": fault.reading,
+        "scenario": " ".join((experiment.scenario, *experiment.changes)),
+        "method": experiment.method.value,
+        "trigger": f"{trigger.name}: {trigger.condition}",
+        "armed_after_s": trigger.armed_after_s,
+        "hold": hold.value,
+        "seed": experiment.seed,
+    }
+
+
+def verdict(record: Record) -> dict[str, Any]:
+    """What became of it, for people and as JSON. Times in s of simulation; None: did not happen."""
+    activation = record.activation
+    return {
+        "status": record.status.value,
+        "outcome": record.outcome.value if record.outcome else None,
+        "detail": record.detail,
+        "activated_s": activation.first if activation else None,
+        "active_until_s": activation.last if activation else None,
+        "activations": activation.count if activation else 0,
+        "manifested_s": record.t_manifest,
+        "hazards_s": dict(record.hazards),
+        "alerts_s": dict(record.alerts),
+        "reaction_time_s": reaction_time(record.hazards, record.alerts),
+        "largest_difference": dict(record.max_dev),
+        "trace_digest": record.trace_digest,
+    }

@@ -1,0 +1,30 @@
+"""Small pieces of HTML that notebooks show."""
+
+from collections.abc import Iterable
+from html import escape
+
+from mutator._common.tables import Table
+
+_COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
+
+
+def facts_html(facts: Iterable[tuple[str, object]]) -> str:
+    """Names and values as a table of two columns; what is None is left out."""
+    rows = [[name, str(value)] for name, value in facts if value is not None]
+    return str(Table(heads=("", ""), rows=rows).as_html())
+
+
+def text_html(text: str) -> str:
+    """A paragraph."""
+    return f"<p>{escape(text)}</p>"
+
+
+def diff_html(patch: str) -> str:
+    """A unified diff with its lines in colours."""
+    return f"<pre>{''.join(map(_line, patch.splitlines()))}</pre>"
+
+
+def _line(line: str) -> str:
+    colour = None if line.startswith(("+++", "---")) else _COLOURS.get(line[:1])
+    text = escape(line) + "\n"
+    return f'<span style="color:{colour}">{text}</span>' if colour else text

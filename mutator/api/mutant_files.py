@@ -1,0 +1,134 @@
+"""Many mutants written to a folder: patches, optionally trees, and an index of them."""
+
+import csv
+import fnmatch
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+
+from mutator._common.files import make_folder
+from mutator.api.mutants import BuiltMutant, built
+from mutator.api.selection import Bench, FaultChoice, context_tables
+from mutator.campaigns.plans import Choices, make_plan
+from mutator.errors import MutatorError
+from mutator.model import Fault, Trigger
+from mutator.mutants.building import write_tree
+from mutator.workspace import Workspace
+
+COLUMNS = (
+    "mutant_id",
+    "fault_id",
+    "spec",
+    "value",
+    "unit",
+    "reading",
+    "trigger",
+    "condition",
+    "hold",
+    "changes",
+    "files",
+    "patch",
+    "tree",
+    "tree_digest",
+)
+Pair = tuple[Fault, Trigger]
+
+
+def pairs_of_specs(
+    bench: Bench,
+    specs: Iterable[str],
+    triggers: Sequence[str] = (),
+    *,
+    seed: int | None = None,
+    reading: str | None = None,
+) -> list[Pair]:
+    """Every fault of the specs (names, globs over them, files) under every trigger; default: all contexts."""
+    made = [bench.trigger(text) for text in triggers]
+    if not made:
+        armed_after_s = bench.manifest.armed_after_s
+        tables = context_tables(bench.workspace)
+        made = [trigger for table in tables for trigger in table.triggers(armed_after_s=armed_after_s)]
+    pairs: list[Pair] = []
+    for name in _spec_names(bench.workspace, specs):
+        faults = bench.faults(FaultChoice(spec=name, seed=seed, reading=reading))
+        pairs += [(fault, trigger) for fault in faults for trigger in made]
+    if not pairs:
+        raise MutatorError("no spec named", remedy="name specs (`mutator list specs`) or --campaign")
+    return pairs
+
+
+def pairs_of_campaign(workspace: Workspace, campaign: str, choices: Choices) -> tuple[Bench, list[Pair]]:
+    """The campaign's target, and what is injected when in its experiments."""
+    plan = make_plan(workspace, campaign, choices)
+    return Bench.of(workspace, plan.campaign.target), [(e.fault, e.trigger) for e in plan.experiments]
+
+
+def write_mutants(
+    bench: Bench,
+    pairs: Sequence[Pair],
+    out: Path,
+    *,
+    trees: bool = False,
+    step: Callable[[], None] = lambda: None,
+) -> list[dict[str, str]]:
+    """Write `out`/patches, `out`/trees if wanted, and `out`/index.csv; returns the index.
+
+    `out` must be new or empty, since old patches beside new ones would be taken for theirs. `step` is called
+    after each pair.
+    """
+    make_folder(out)
+    if any(out.iterdir()):
+        raise MutatorError(
+            "not empty", where=out, expected="a new or empty folder", remedy="choose another --out"
+        )
+    (out / "patches").mkdir()
+    index: dict[str, dict[str, str]] = {}
+    for fault, trigger in pairs:
+        mutant = built(bench, fault, trigger)
+        if mutant.id not in index:
+            index[mutant.id] = _write(mutant, out, trees=trees)
+        step()
+    rows = list(index.values())
+    with (out / "index.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+    return rows
+
+
+def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
+    """The specs meant: a glob is matched against the library's names, anything else is taken as it is."""
+    for text in wanted:
+        if not any(c in text for c in "*?["):
+            yield text
+            continue
+        hits = fnmatch.filter([s.name for s in workspace.specs()], text)
+        if not hits:
+            raise MutatorError(f"no spec matches {text!r}", remedy="see `mutator list specs`")
+        yield from hits
+
+
+def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
+    """Write one mutant below `out`; returns its line of the index."""
+    mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
+    patch = Path("patches") / f"{mutant.id}.patch"
+    (out / patch).write_bytes(mutant.patch_bytes)
+    tree = Path("trees") / mutant.id
+    if trees:
+        write_tree(built_mutant.manifest, mutant, out / tree)
+    cells = (
+        mutant.id,
+        fault.id,
+        fault.spec,
+        fault.value,
+        fault.unit,
+        fault.reading,
+        trigger.name,
+        trigger.condition,
+        (fault.hold or trigger.hold).value,
+        ";".join(fault.changes),
+        ";".join(sorted(mutant.files)),
+        patch.as_posix(),
+        tree.as_posix() if trees else "",
+        mutant.tree_digest,
+    )
+    return {k: "" if v is None else str(v) for k, v in zip(COLUMNS, cells, strict=True)}

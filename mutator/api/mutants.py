@@ -1,0 +1,89 @@
+"""A fault built into the target's source: its diff, its files, its tree."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator._common.files import make_folder
+from mutator.api.html import diff_html, text_html
+from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
+from mutator.errors import MutatorError
+from mutator.model import Fault, Trigger
+from mutator.mutants.building import Mutant, build, write_tree
+from mutator.mutants.readable_diffs import readable
+from mutator.targets.manifest import TargetManifest
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BuiltMutant:
+    """A fault under a trigger, built into a target. The same of all three has the same `id` everywhere."""
+
+    fault: Fault
+    trigger: Trigger
+    mutant: Mutant
+    manifest: TargetManifest
+
+    def __repr__(self) -> str:
+        return f"<BuiltMutant {self.id}: {self.fault.label}, {self.trigger.name}>"
+
+    def _repr_html_(self) -> str:
+        return text_html(repr(self)) + diff_html(self.diff)
+
+    @property
+    def id(self) -> str:
+        """Content hash of fault, trigger, target and templates."""
+        return self.mutant.id
+
+    @property
+    def patch(self) -> str:
+        """The whole patch, probe included; `patch -p1` applies it at the target's root."""
+        return self.mutant.patch
+
+    @property
+    def diff(self) -> str:
+        """The patch for reading: without the probe, which every mutant gets."""
+        return readable(self.patch)[0]
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """The whole content of each file that differs from the target's, by its path below the root."""
+        return self.mutant.files
+
+    def write(self, folder: str | Path) -> Path:
+        """Write the whole mutated source tree into a new or empty folder; returns the folder."""
+        place = Path(folder)
+        make_folder(place)
+        if any(place.iterdir()):
+            raise MutatorError(
+                "not empty", where=place, expected="a new or empty folder", remedy="choose another folder"
+            )
+        write_tree(self.manifest, self.mutant, place)
+        return place
+
+
+def build_mutant(
+    fault: FaultLike,
+    trigger: TriggerLike = "always",
+    *,
+    value: float | None = None,
+    reading: str | None = None,
+    seed: int = 0,
+    target: str | None = None,
+    workspace: WorkspaceLike = None,
+) -> BuiltMutant:
+    """Build a fault into the target's source; nothing is run or written.
+
+    `fault` is a Fault, a spec (`radar/chaff`), one of its variants (`radar/chaff/distance`), or a spec file;
+    of several values the middle one is taken, or `value` in the spec's unit. `trigger` is a Trigger, a
+    context (`C2`), a time in s, `always`, or a condition (`hwt <= 2 and rs > 0`). `target` names a manifest;
+    default: the library's only one. MutatorError for a mistake in any of them, and for a place in the source
+    that is not found; InvalidMutant (a MutatorError) when the mutant does not compile.
+    """
+    bench = Bench.of(workspace, target)
+    chosen = bench.fault(fault, value=value, seed=seed, reading=reading)
+    return built(bench, chosen, bench.trigger(trigger))
+
+
+def built(bench: Bench, fault: Fault, trigger: Trigger) -> BuiltMutant:
+    """The mutant of a fault under a trigger; many of one bench share what was parsed."""
+    mutant = build(bench.manifest, bench.models, fault, trigger)
+    return BuiltMutant(fault=fault, trigger=trigger, mutant=mutant, manifest=bench.manifest)

@@ -1,0 +1,160 @@
+"""From what a user types to a workspace, a target, faults and triggers."""
+
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TypeAlias
+
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.faults.fault_models import FaultModels
+from mutator.faults.specs import FaultSpec, Variant
+from mutator.model import Fault, Trigger
+from mutator.stpa.context_tables import ContextTable
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import TYPED, read_trigger
+from mutator.verification.library import check_spec
+from mutator.workspace import Workspace
+
+WorkspaceLike: TypeAlias = "Workspace | str | PathLike[str] | None"
+FaultLike: TypeAlias = "Fault | str | PathLike[str]"
+TriggerLike: TypeAlias = "Trigger | str | float"
+
+
+def open_workspace(given: WorkspaceLike) -> Workspace:
+    """The workspace that is given, at the root that is given, or found from the current folder."""
+    if isinstance(given, Workspace):
+        return given
+    return Workspace.find(None if given is None else Path(given))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultChoice:
+    """Which faults of one spec are meant. `spec` is a name or a file; `value` replaces the drawn ones."""
+
+    spec: str
+    variant: str | None = None
+    value: float | None = None
+    seed: int | None = None
+    reading: str | None = None
+
+    def narrowed(self, spec: FaultSpec) -> FaultSpec:
+        """The spec with the chosen variant and value alone."""
+        variants = tuple(v for v in spec if self.variant in (None, v.name))
+        if not variants:
+            names = ", ".join(v.name for v in spec)
+            raise MutatorError(f"no variant {self.variant!r}", where=spec.path, expected=f"one of {names}")
+        if self.value is not None:
+            variants = tuple(_with_value(spec, v, self.value) for v in variants)
+        return dataclasses.replace(spec, variants=variants)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A workspace with one of its targets: what faults are chosen for, built into and tried on."""
+
+    workspace: Workspace
+    manifest: TargetManifest
+
+    @classmethod
+    def of(cls, workspace: WorkspaceLike, target: str | None = None) -> "Bench":
+        """The bench of a target by name or manifest file; default: the library's only one."""
+        found = open_workspace(workspace)
+        return cls(found, found.manifest(found.target_name(target)))
+
+    @cached_property
+    def models(self) -> FaultModels:
+        """The fault models of the workspace."""
+        return self.workspace.fault_models()
+
+    def faults(self, choice: FaultChoice) -> tuple[Fault, ...]:
+        """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line."""
+        spec = choice.narrowed(self.workspace.spec(choice.spec))
+        for problem in check_spec(spec, self.models, self.manifest):
+            raise problem
+        return expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
+
+    def fault(
+        self, given: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
+    ) -> Fault:
+        """The fault that is given, or the middle one of the first variant that its name fits."""
+        if isinstance(given, Fault):
+            if value is not None or reading is not None:
+                raise MutatorError(
+                    f"{given.label} together with a value or a reading",
+                    expected="a fault as it is, or the name of a spec with them",
+                )
+            return given
+        spec, variant = _split(str(given))
+        choice = FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
+        return one_of_each_variant(self.faults(choice))[0][0]
+
+    def trigger(self, given: TriggerLike, armed_after_s: float | None = None) -> Trigger:
+        """The trigger that is given, or of a context (`C1`), a time in s, `always` or a condition.
+
+        Contexts, `always` and conditions count from `armed_after_s` on; default: the manifest's.
+        """
+        if isinstance(given, Trigger):
+            return given
+        armed = self.manifest.armed_after_s if armed_after_s is None else armed_after_s
+        return find_trigger(self.workspace, str(given), armed)
+
+
+def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...]:
+    """The middle fault of each variant, and how many the variant has: they differ in their value alone."""
+    groups: dict[str, list[Fault]] = {}
+    for fault in faults:
+        groups.setdefault(fault.spec, []).append(fault)
+    return tuple((group[len(group) // 2], len(group)) for group in groups.values())
+
+
+def context_tables(workspace: Workspace) -> tuple[ContextTable, ...]:
+    """The context tables of the library, in the order of their names."""
+    return tuple(map(workspace.context_table, workspace.context_tables))
+
+
+def find_trigger(workspace: Workspace, text: str, armed_after_s: float) -> Trigger:
+    """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
+    tables = context_tables(workspace)
+    named = [
+        (table, row.id)
+        for table in tables
+        for row in table.rows
+        if text in (row.id, f"{table.name}/{row.id}")
+    ]
+    if len(named) > 1:
+        known = ", ".join(f"{table.name}/{row}" for table, row in named)
+        raise MutatorError(
+            f"context '{text}' in {len(named)} tables", where="--trigger", expected=f"one of {known}"
+        )
+    if named:
+        table, row = named[0]
+        return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
+    try:
+        return read_trigger(text, armed_after_s)
+    except MutatorError as e:
+        contexts = ", ".join(row.id for table in tables for row in table.rows)
+        raise MutatorError(
+            e.got, where="--trigger", expected=f"a context ({contexts}), {TYPED}", remedy=e.remedy
+        ) from e
+
+
+def _split(name: str) -> tuple[str, str | None]:
+    """`radar/chaff/distance` is a variant of the spec `radar/chaff`; a file is a spec."""
+    parts = name.split("/")
+    if len(parts) == 3 and not name.endswith((".yaml", ".yml")):
+        return "/".join(parts[:2]), parts[2]
+    return name, None
+
+
+def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
+    if variant.draw is None:
+        raise MutatorError(
+            f"variant {variant.name!r} takes no value", where=spec.path, remedy="leave --value out"
+        )
+    exact = int(value) if float(value).is_integer() else value
+    draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact,))
+    return dataclasses.replace(variant, draw=draw)

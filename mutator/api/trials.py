@@ -1,0 +1,130 @@
+"""One fault, put in and driven once: outside of a campaign, or an experiment of a campaign again."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mutator._common.hashing import digest
+from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
+from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
+from mutator.errors import MutatorError
+from mutator.execution.single_run import Single, run_single
+from mutator.figures.run_plot import save
+from mutator.model import Experiment, Method, Record
+from mutator.outcomes.golden import Trace, load_trace
+from mutator.targets.manifest import TargetManifest
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Trial(ExperimentResult):
+    """An experiment that was driven now, beside its golden run.
+
+    `same_as_record` says of an experiment of a campaign whether its record is the campaign's, too; None:
+    there is none to compare with. The output is in `folder`; a temporary one lives as long as this object.
+    """
+
+    record: Record
+    single: Single
+    manifest: TargetManifest
+    same_as_record: bool | None = None
+    _temporary: TemporaryDirectory[str] | None = field(default=None)
+
+    @property
+    def patch(self) -> str:
+        """The whole patch, probe included; empty for a mutant that does not compile."""
+        return self.single.mutant.patch if self.single.mutant else ""
+
+    @property
+    def folder(self) -> Path:
+        """Where golden run (unless it is a campaign's), faulty run and patch are."""
+        return self.single.faulty.parent
+
+    @property
+    def log(self) -> str:
+        """The last lines that the faulty run printed."""
+        return self.single.log
+
+    @property
+    def has_trace(self) -> bool:
+        """Whether the faulty run left a trace."""
+        return (self.single.faulty / self.manifest.trace_file).is_file()
+
+    def traces(self) -> TraceFrames:
+        """Golden and faulty run as pandas frames; MutatorError when the faulty run left no trace."""
+        golden, faulty = self._load_traces()
+        return TraceFrames(
+            golden=trace_frame(golden, self.manifest), faulty=trace_frame(faulty, self.manifest)
+        )
+
+    def save_plot(self, path: Path) -> Path | None:
+        """Write `plot()` to an .svg or .png; None when the faulty run left no trace."""
+        if not self.has_trace:
+            return None
+        save(self.plot(), [path])
+        return path
+
+    def _target(self) -> TargetManifest:
+        return self.manifest
+
+    def _load_traces(self) -> tuple[Trace, Trace]:
+        if not self.has_trace:
+            why = f": {self.record.detail}" if self.record.detail else ""
+            raise MutatorError(
+                f"the faulty run left no trace ({self.ending}{why})", remedy="see `.record` and `.log`"
+            )
+        return load_trace(self.manifest, self.single.golden), load_trace(self.manifest, self.single.faulty)
+
+
+def try_fault(
+    fault: FaultLike,
+    scenario: str | Path,
+    trigger: TriggerLike = "always",
+    *,
+    value: float | None = None,
+    reading: str | None = None,
+    seed: int = 0,
+    armed_after_s: float | None = None,
+    target: str | None = None,
+    workspace: WorkspaceLike = None,
+    out: str | Path | None = None,
+) -> Trial:
+    """Put one fault in and drive twice: fault-free and faulty.
+
+    `fault` and `trigger` are given as for `build_mutant`; contexts, `always` and conditions count from
+    `armed_after_s` on (default: the manifest's). `scenario` is a name or a file. Output goes to a folder of
+    its own in `out`; default: a temporary one, which goes with the Trial.
+    MutatorError for a mistake in what is given, CheckFailed when the golden run does not end well. A fault
+    that crashes the controller is a result, and so is a harness error: see `Trial.status`.
+    """
+    bench = Bench.of(workspace, target)
+    file = bench.workspace.scenario(scenario)
+    experiment = Experiment(
+        fault=bench.fault(fault, value=value, seed=seed, reading=reading),
+        scenario=str(scenario),
+        scenario_digest=digest(file.read_bytes()),
+        method=Method.GUIDED,
+        trigger=bench.trigger(trigger, armed_after_s),
+        seed=seed,
+    )
+    temporary = TemporaryDirectory(prefix="mutator-try-") if out is None else None
+    folder = Path(temporary.name if temporary else out or "") / experiment.id
+    single = run_single(bench.workspace, bench.manifest, experiment, folder)
+    return trial_of(single, bench.manifest, temporary=temporary)
+
+
+def trial_of(
+    single: Single,
+    manifest: TargetManifest,
+    *,
+    same_as_record: bool | None = None,
+    temporary: TemporaryDirectory[str] | None = None,
+) -> Trial:
+    """The trial of a single run."""
+    return Trial(
+        experiment=single.experiment,
+        record=single.record,
+        single=single,
+        manifest=manifest,
+        same_as_record=same_as_record,
+        _temporary=temporary,
+    )

@@ -1,0 +1,66 @@
+"""Campaigns planned, run and compared from Python."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mutator
+from mutator.api import campaigns
+from mutator.errors import MutatorError
+from mutator.execution import running
+from mutator.workspace import Workspace
+
+TWO = mutator.Choices(only='fault_type == "lane"', limit=2)
+
+
+def test_a_plan_is_a_frame(toycar: Workspace, tmp_path: Path) -> None:
+    """A plan is shown in a line and as a table, and is a frame by experiment id; nothing is written."""
+    plan = mutator.plan("toy", workspace=toycar)
+    assert repr(plan) == "<Plan of toy, as_described: 24 experiments, seed 7>"
+    assert "sensor/lane" in plan._repr_html_()
+    assert list(plan.frame().index) == [e.id for e in plan.experiments]
+    assert sum(plan.groups().values()) == 24
+    assert mutator.plan("toy", choices=mutator.Choices(seed=8), workspace=toycar).digest != plan.digest
+    assert not (tmp_path / "p").exists()
+    frozen = mutator.plan("toy", tmp_path / "p", workspace=toycar)
+    assert frozen.digest == plan.digest == mutator.load_run(tmp_path / "p").plan.digest
+
+
+def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Path) -> None:
+    """A run reports its progress and its summary, repeats nothing, and is compared with another one."""
+    seen: list[mutator.Progress] = []
+    first = mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar, progress=seen.append)
+    assert first.summary is not None
+    assert (first.summary.ran, first.summary.done, len(first.results)) == (2, 2, 2)
+    assert {"plan", "checks", "experiments", "results"} == {progress.stage for progress in seen}
+    again = mutator.run("small", tmp_path / "a", workspace=toycar.library.parent)
+    assert again.summary is not None
+    assert (again.summary.ran, again.summary.done) == (0, 2)
+
+    tree = toycar.library.parent / "tree" / "toycar" / "driver.py"
+    tree.write_text(tree.read_text() + "\n# another version of the driver\n")
+    mutator.run("small", tmp_path / "b", choices=TWO, workspace=toycar)
+    same = mutator.compare(first, tmp_path / "b")
+    assert (len(same.pairs), len(same.changed)) == (2, 0)
+    assert list(same.tables["changes"]["fault type"]) == ["sensor/lane", "total"]
+    assert same.findings(["new-hazard", mutator.Gate.UNMATCHED]) == ()
+    assert "2 experiments" in repr(same)
+    assert "What changed" in same._repr_html_()
+    assert same.write().pairs == tmp_path / "b" / "report" / "compare-a" / "pairs.csv"
+    with pytest.raises(MutatorError, match="gate 'bad'"):
+        same.findings(["bad"])
+
+
+def test_harness_errors_are_not_silent(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that leaves harness errors warns, names them, and goes on by the same call."""
+
+    def run_campaign(*args: Any, **kwargs: Any) -> mutator.Summary:
+        return replace(running.run_campaign(*args, **kwargs), harness_errors=(("abcd", "no memory"),), done=1)
+
+    monkeypatch.setattr(campaigns, "run_campaign", run_campaign)
+    with pytest.warns(mutator.IncompleteRun, match="1 of 2.*abcd: no memory.*the same call goes on"):
+        mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar)

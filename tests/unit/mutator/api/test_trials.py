@@ -1,0 +1,75 @@
+"""One fault tried."""
+
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.errors import MutatorError
+from mutator.model import Outcome, Status
+from mutator.workspace import Workspace
+
+
+def test_a_fault_is_tried(toycar: Workspace) -> None:
+    """A fault by name, at a time: diff, verdict, frames by time, and a figure that a notebook shows."""
+    trial = mutator.try_fault("sensor/lane/shifted", "A", 1.0, workspace=toycar)
+    assert (trial.outcome, trial.status) == (Outcome.HAZARD, Status.OK)
+    assert "H3" in trial.verdict["hazards_s"]
+    assert "+++ b/toycar/sensing.py" in trial.diff
+    assert "_fi.py" in trial.patch
+    traces = trial.traces()
+    assert traces.golden.index.name == traces.faulty.index.name == "time"
+    assert traces.faulty.attrs["units"]["speed"] == "m/s"
+    before = traces.difference.loc[:0.9]
+    assert (before == 0.0).all(axis=None)
+    assert traces.difference.abs().max().max() > 0.0
+    assert trial.plot()._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
+    assert "hazard" in repr(trial)
+    assert "toycar/sensing.py" in trial._repr_html_()
+
+
+def test_a_value_is_taken_exactly(toycar: Workspace, tmp_path: Path) -> None:
+    """`value` replaces the drawn ones; with `out` everything is kept there."""
+    trial = mutator.try_fault(
+        "sensor/distance/longer", "A", "near", value=12.5, workspace=toycar, out=tmp_path / "o"
+    )
+    assert trial.fault.value == 12.5
+    assert "gap = gap + 12.5" in trial.diff
+    assert trial.folder == tmp_path / "o" / trial.id
+    assert (trial.folder / "mutant.patch").read_text() == trial.patch
+    assert trial.experiment.trigger.condition == "hwt <= 2.0"
+
+
+def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
+    """A Fault record is tried as it is; a crash of the controller is a result, and has what there is."""
+    [fault] = toycar.faults("hostile/crash")
+    trial = mutator.try_fault(fault, "A", workspace=toycar)
+    assert trial.fault is fault
+    assert trial.status is Status.CRASHED
+    assert trial.record.detail
+    with pytest.raises(MutatorError, match="together with a value"):
+        mutator.try_fault(fault, "A", value=3.0, workspace=toycar)
+
+
+def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
+    """Without `out` nothing is left behind."""
+    trial = mutator.try_fault("sensor/lane/shifted", "A", 5.0, workspace=toycar)
+    folder = trial.folder
+    assert folder.is_dir()
+    del trial
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("fault", "scenario", "trigger", "said"),
+    [
+        ("sensor/lan", "A", "always", "did you mean 'sensor/lane'"),
+        ("sensor/lane/bent", "A", "always", "no variant 'bent'.*expected one of shifted"),
+        ("sensor/lane", "Z", "always", "no scenario 'Z'; expected one of A, B"),
+        ("sensor/lane", "A", "hwt <", "expected a context"),
+    ],
+)
+def test_mistakes_are_told(toycar: Workspace, fault: str, scenario: str, trigger: str, said: str) -> None:
+    """A wrong name says which names there are."""
+    with pytest.raises(MutatorError, match=said):
+        mutator.try_fault(fault, scenario, trigger, workspace=toycar)
