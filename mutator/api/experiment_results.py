@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.api.html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
-from mutator.model import Experiment, Fault, Outcome, Record, Status
+from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes.golden import Trace
 from mutator.outcomes.verdicts import reaction_time
@@ -69,6 +69,16 @@ class ExperimentResult(ABC):
     def fault(self) -> Fault:
         """What was injected."""
         return self.experiment.fault
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return self.experiment.scenario
+
+    @property
+    def trigger(self) -> Trigger:
+        """When the fault is active."""
+        return self.experiment.trigger
 
     @property
     def outcome(self) -> Outcome | None:

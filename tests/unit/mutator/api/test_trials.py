@@ -37,7 +37,8 @@ def test_a_value_is_taken_exactly(toycar: Workspace, tmp_path: Path) -> None:
     assert "gap = gap + 12.5" in trial.diff
     assert trial.folder == tmp_path / "o" / trial.id
     assert (trial.folder / "mutant.patch").read_text() == trial.patch
-    assert trial.experiment.trigger.condition == "hwt <= 2.0"
+    assert (trial.scenario, trial.trigger) == (trial.experiment.scenario, trial.experiment.trigger)
+    assert trial.trigger.condition == "hwt <= 2.0"
 
 
 def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
