@@ -1,6 +1,5 @@
 """Two runs of the same faults compared, as pandas frames."""
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -64,9 +63,7 @@ class RunComparison:
 
         A share of n is five columns: count, of, rate and both ends of its interval.
         """
-        import pandas as pd
-
-        return {s.name: pd.read_csv(io.StringIO(s.csv())) for s in self.comparison.sheets}
+        return {sheet.name: sheet.frame() for sheet in self.comparison.sheets}
 
     def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
         """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "new-crash")`."""

@@ -3,11 +3,15 @@
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mutator._common.tables import Table
 from mutator.statistics.shares import Share
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
 
@@ -42,26 +46,38 @@ class Sheet:
 
     def csv(self) -> str:
         """A share becomes five columns: count, of, rate and both ends of its interval (all of 1, not %)."""
-        wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
+        columns, lines = self._unfolded(_number)
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(
+        writer.writerow(columns)
+        writer.writerows(lines)
+        return out.getvalue()
+
+    def frame(self) -> "pd.DataFrame":
+        """The same columns as a pandas frame, numbers in full."""
+        import pandas as pd
+
+        columns, lines = self._unfolded(float)
+        return pd.DataFrame(lines, columns=columns)
+
+    def _unfolded(self, number: Callable[[float], object]) -> tuple[list[str], list[list[object]]]:
+        """Columns and lines with each share in five of them."""
+        wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
+        columns = [
             name
             for head, is_wide in zip(self.heads, wide, strict=True)
             for name in ([f"{head}: {part}" for part in _SHARE_COLUMNS] if is_wide else [head])
-        )
-        for line in self.lines:
-            writer.writerow(_values(line, wide))
-        return out.getvalue()
+        ]
+        return columns, [_values(line, wide, number) for line in self.lines]
 
 
-def _values(line: Sequence[Cell], wide: Sequence[bool]) -> list[object]:
+def _values(line: Sequence[Cell], wide: Sequence[bool], number: Callable[[float], object]) -> list[object]:
     values: list[object] = []
     for cell, is_wide in zip(line, wide, strict=True):
         if isinstance(cell, Share):
-            values += [cell.count, cell.of, *map(_number, (cell.rate, cell.low, cell.high))]
+            values += [cell.count, cell.of, *map(number, (cell.rate, cell.low, cell.high))]
         else:
-            value = _number(cell) if isinstance(cell, float) else cell
+            value = number(cell) if isinstance(cell, float) else cell
             values += [value, *[None] * (len(_SHARE_COLUMNS) - 1)] if is_wide else [value]
     return values
 

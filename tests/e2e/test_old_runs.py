@@ -72,13 +72,13 @@ def test_there_is_one_for_each_schema() -> None:
 
 def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
     """Plan, records, results and patches are read; each id follows from its content as it did then."""
-    run = load_run(place / "small", root=place / "toy")
+    run = load_run(place / "small", workspace=place / "toy")
     assert [*run.experiments] == [*plan_file.ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
-    assert len(run.frame) == EXPERIMENTS == len(run.experiments)
-    assert {*run.frame.index} == {*read_records(run.path)} == {*read_records(run.path, "proof")}
-    assert all("# fi:" in run.patch(name) for name in run.experiments)
-    assert len(run.golden("A")) == len(run.trace(KEPT)) > 100
+    assert len(run.results) == EXPERIMENTS == len(run.experiments)
+    assert {*run.results.index} == {*read_records(run.path)} == {*read_records(run.path, "proof")}
+    assert all("# fi:" in run.experiment(name).patch for name in run.experiments)
+    assert len(run.golden("A")) == len(run.experiment(KEPT).traces().faulty) > 100
 
 
 def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
