@@ -40,7 +40,7 @@ def stpa(
 ) -> None:
     """Print and check the hazard analysis.
 
-    Exit code 1 if it has a gap or a contradiction; each is told with its file and line.
+    Exit code 1 if it has a gap or a contradiction; each is shown with its file and line.
     """
     from mutator.stpa.checks import check_analysis
     from mutator.stpa.drawing import draw

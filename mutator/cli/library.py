@@ -79,14 +79,14 @@ def _campaigns(workspace: "Workspace") -> Table:
     return _files(workspace.campaigns, "about")
 
 
-def _files(files: Mapping[str, Path], told: str) -> Table:
-    """Files of the library by name, with what their key `told` says of them, where they have one."""
+def _files(files: Mapping[str, Path], key: str) -> Table:
+    """Files of the library by name, with what the value at `key` says about them, where they have one."""
     from mutator.config.yaml_files import load
 
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
         data = load(path).data
-        about = data.get(error_text, "") if isinstance(data, dict) else ""
+        about = data.get(key, "") if isinstance(data, dict) else ""
         rows.append({"name": name, "file": short_path(path), "about": _line(str(about))})
     return ["name", "file", "about"], rows
 
@@ -147,7 +147,7 @@ def check(
 ) -> None:
     """Check library, templates and anchors against the target.
 
-    Exit code 1 if anything is wrong; each problem is told with its file and line.
+    Exit code 1 if anything is wrong; each problem is shown with its file and line.
     """
     from mutator.verification.library import check_library
 

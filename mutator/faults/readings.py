@@ -36,9 +36,13 @@ class Readings:
 
 
 UNDECLARED = Readings(
-    names=("as_described",), about=("The injections, as the text that describes the fault means them.",)
+    names=("as_described", "as_coded"),
+    about=(
+        "The injections, as the text that describes the fault means them.",
+        "The injections, as the code that was published with it has them.",
+    ),
 )
-"""The one reading of a library that declares none. Its name is in the ids of faults and must stay."""
+"""The readings of a library that declares none: those of libraries that are older than `readings.yaml`."""
 
 
 class _DeclaredReadingModel(StrictModel, title="A declared reading"):

@@ -107,7 +107,8 @@ def _readings() -> Iterator[str]:
     yield (
         "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
         "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
-        f"one, `{UNDECLARED.default}`. The first is the\ndefault: every variant is written in it, and it "
+        f"{' and '.join(f'`{name}`' for name in UNDECLARED.names)}. "
+        "The first is the\ndefault: every variant is written in it, and it "
         "holds where another is not written. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )

@@ -13,7 +13,7 @@ import pytest
 
 from mutator import load_run
 from mutator.cli.app import main
-from mutator.execution import session
+from mutator.execution.running import run_campaign
 from mutator.exports import Format
 from mutator.store import plan_file
 from mutator.store.records import read_records
@@ -45,7 +45,7 @@ def fresh(place: Path) -> Path:
     """The same campaign of the same library, run by the code of today."""
     workspace = Workspace.find(root=place / "toy")
     out = place / "fresh"
-    assert session.run(workspace, "small", out, engine="reference", workers=2).exit_code == 0
+    assert run_campaign(workspace, "small", out, engine="reference", workers=2).exit_code == 0
     return out
 
 
@@ -61,6 +61,14 @@ def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixtu
         return (code, *capfd.readouterr())
 
     return run
+
+
+def assert_same_cells(new: Path, old: Path) -> None:
+    """Equal tables, but for columns of a car that this target is not: version 0.1 left them empty."""
+    today, then = (pd.read_csv(path, dtype=str, keep_default_na=False) for path in (new, old))
+    assert (then[[*today.columns]] == today).all(axis=None)
+    gone = then.drop(columns=[*today.columns])
+    assert {*gone.columns} <= {"h2", "t_h2", "max_dev_steer"} and (gone == "").all(axis=None)
 
 
 def test_there_is_one_for_each_schema() -> None:
@@ -86,7 +94,7 @@ def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
     old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
     assert new.head["plan"] == old.head["plan"]
     assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
-    assert (fresh / "results.csv").read_bytes() == (old.path / "results.csv").read_bytes()
+    assert_same_cells(fresh / "results.csv", old.path / "results.csv")
     assert {name: record.trace_digest for name, record in read_records(new.path).items()} == {
         name: record.trace_digest for name, record in read_records(old.path).items()
     }
@@ -118,7 +126,7 @@ def test_it_exports(cli: Cli, place: Path, format: Format) -> None:
 
 
 def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
-    """The report is written anew; the results are made again from the records, to the same bytes."""
+    """The report is written anew; the results are made again from the records, cell for cell."""
     shutil.copytree(place / "small", copy := place / "reported")
     for derived in ("results.csv", "results.parquet", "timings.parquet"):
         (copy / derived).unlink()
@@ -126,7 +134,7 @@ def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
     code, out, err = cli("report", copy)
     assert code == 0, err
     assert "hazard 3" in out and (copy / "report" / "index.html").is_file()
-    assert (copy / "results.csv").read_bytes() == (fixture / "small" / "results.csv").read_bytes()
+    assert_same_cells(copy / "results.csv", fixture / "small" / "results.csv")
 
 
 def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
@@ -151,11 +159,10 @@ def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
-    monkeypatch.setattr("mutator.campaigns.provenance.__version__", "99.0")
     for words in (("run",), ("plan",)):
         code, _, err = cli(*words, "small", "--out", copy)
         assert code == 2 and "was planned by mutator 0.1.0 (run/1)" in err and "can still be read" in err
-    monkeypatch.undo()
+    monkeypatch.setattr("mutator.campaigns.provenance.VERSION", "0.1.0")
     with (library / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("\n")
     with (library / "fault_library" / "targets" / "toycar.yaml").open("a") as file:

@@ -11,7 +11,7 @@ from mutator._common.shipped import refuse_shipped, shipped_folder, write_librar
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.mutants.building import build
-from mutator.triggers.conditions import always
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
