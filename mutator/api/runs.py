@@ -26,8 +26,7 @@ from mutator.outcomes import results as results_table
 from mutator.outcomes import rows as tables
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
-from mutator.report import building
-from mutator.report import series
+from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
 from mutator.store import plan_file
 from mutator.store.records import read_records
