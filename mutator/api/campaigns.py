@@ -58,7 +58,7 @@ def run(
 
     What has a result is not run again. A plan that is frozen in `out` is used as it is: choices that are not
     given are the frozen ones. `workers` is the number of processes (0: this one alone), `engine` a name of
-    `mutator.engines.registry` (None: the fastest that is worth it). With `reviewed` nothing runs that has no
+    `mutator.engines.kinds` (None: the fastest that is worth it). With `reviewed` nothing runs that has no
     approval. `progress` is called about twice a second, from another thread.
 
     `Run.summary` says what this call came to. Harness errors, a full disk or an interruption end in an

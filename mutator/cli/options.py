@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mutator.engines.kinds import ENGINES, FORK
+
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
@@ -46,8 +48,8 @@ Engine = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="reference: an interpreter for each run; warm: a fork of the loaded target; fork: a fork of its "
-        "golden run. The results are the same. Default: fork, where that is possible and worth it.",
+        help="; ".join(f"{kind.name}: {kind.about}" for kind in ENGINES.values())
+        + f". The results are the same. Default: {FORK}, where that is possible and worth it.",
     ),
 ]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]

@@ -1,54 +1,15 @@
-"""The engines there are, and which one runs a campaign."""
+"""Which engine runs a campaign, and making it."""
 
 import os
 import sys
-from dataclasses import dataclass
 from pkgutil import resolve_name
 
 from mutator.engines.jobs import Engine, Setting
+from mutator.engines.kinds import ENGINES, FORK, REFERENCE
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
 _WORTH_IT = 40  # experiments; of fewer, the equivalence check alone would repeat most
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EngineKind:
-    """An engine: its name, what a run of it is, and the function that makes one from a `Setting`.
-
-    `factory` is `module:function`, imported only when the engine is made. `forks` says that the engine
-    needs a target that can be forked.
-    """
-
-    name: str
-    about: str
-    factory: str
-    forks: bool = False
-
-
-REFERENCE, WARM, FORK = "reference", "warm", "fork"
-ENGINES = {
-    kind.name: kind
-    for kind in (
-        EngineKind(
-            name=REFERENCE,
-            about="a fresh interpreter for each run",
-            factory="mutator.engines.reference:make_reference",
-        ),
-        EngineKind(
-            name=WARM,
-            about="a fork of the loaded target",
-            factory="mutator.engines.fork:make_warm",
-            forks=True,
-        ),
-        EngineKind(
-            name=FORK,
-            about="a fork of its golden run",
-            factory="mutator.engines.fork:make_fork",
-            forks=True,
-        ),
-    )
-}
 
 
 def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:

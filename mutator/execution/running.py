@@ -34,7 +34,7 @@ def run_campaign(
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
     A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
-    MutatorError, as is a changed campaign file or target. `engine` is a name in `engines.registry` (None: the
+    MutatorError, as is a changed campaign file or target. `engine` is a name in `engines.kinds` (None: the
     fastest that is worth it). With `reviewed`, nothing runs that is not approved (`mutator.review.gate`).
     `notify` is called from another thread about twice a second. MutatorError for wrong input, CheckFailed
     when something is not approved, and when the preflight or the equivalence check fails.

@@ -19,8 +19,9 @@ from mutator._common.interrupts import terminable
 from mutator._common.locks import owned
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.plans import Choices, make_run_folder
+from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base
-from mutator.engines.registry import REFERENCE, choose_engine
+from mutator.engines.registry import choose_engine
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status

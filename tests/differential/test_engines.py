@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from mutator.engines.jobs import Engine, Execution, Job, RunMode, Setting
+from mutator.engines.kinds import ENGINES
 from mutator.engines.reference import prepare_base
-from mutator.engines.registry import ENGINES, make_engine
+from mutator.engines.registry import make_engine
 from mutator.model import (
     Anchor,
     AnchorKind,

@@ -7,8 +7,9 @@ import pytest
 
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines.jobs import Job, Setting
+from mutator.engines.kinds import ENGINES
 from mutator.engines.reference import ReferenceEngine, prepare_base
-from mutator.engines.registry import ENGINES, make_engine
+from mutator.engines.registry import make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
 from mutator.store.run_folder import golden_key

@@ -4,7 +4,8 @@ from pkgutil import resolve_name
 
 import pytest
 
-from mutator.engines.registry import ENGINES, FORK, REFERENCE, choose_engine
+from mutator.engines.kinds import ENGINES, FORK, REFERENCE
+from mutator.engines.registry import choose_engine
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 

@@ -1,0 +1,42 @@
+"""The list of engines: names, words for people, and where each is made. Nothing is imported for it."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EngineKind:
+    """An engine: its name, what a run of it is, and the function that makes one from a `Setting`.
+
+    `factory` is `module:function`, imported only when the engine is made. `forks` says that the engine
+    needs a target that can be forked.
+    """
+
+    name: str
+    about: str
+    factory: str
+    forks: bool = False
+
+
+REFERENCE, WARM, FORK = "reference", "warm", "fork"
+ENGINES = {
+    kind.name: kind
+    for kind in (
+        EngineKind(
+            name=REFERENCE,
+            about="a fresh interpreter for each run",
+            factory="mutator.engines.reference:make_reference",
+        ),
+        EngineKind(
+            name=WARM,
+            about="a fork of the loaded target",
+            factory="mutator.engines.fork:make_warm",
+            forks=True,
+        ),
+        EngineKind(
+            name=FORK,
+            about="a fork of the golden run",
+            factory="mutator.engines.fork:make_fork",
+            forks=True,
+        ),
+    )
+}
