@@ -18,7 +18,8 @@ from mutator.model import Fault
 from mutator.outcomes.columns import check_names
 from mutator.stpa.analysis import Analysis, load_analysis
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
-from mutator.targets.manifest import TargetManifest, load_manifest
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.manifest_files import load_manifest
 
 _LIBRARY = "fault_library"
 _TEMPLATES = "templates"

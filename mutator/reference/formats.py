@@ -10,7 +10,7 @@ from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
 from mutator.reference.tables import generated, sections
 from mutator.stpa import analysis, context_tables
-from mutator.targets import manifest
+from mutator.targets import manifest_files
 from mutator.workspace import Workspace
 
 STRICT = """\
@@ -74,8 +74,8 @@ def manifests(workspace: Workspace) -> str:
         "[Another controller tree](../how-to/add-a-target.md)\nsays how to write one; what the "
         "manifests of this "
         "library record is in [Channels](channels.md).\n",
-        f"The first key is `schema: {manifest.SCHEMA}`. {_SAME}\n",
-        *sections("target-manifest.md", manifest.ManifestModel),
+        f"The first key is `schema: {manifest_files.SCHEMA}`. {_SAME}\n",
+        *sections("target-manifest.md", manifest_files.ManifestModel),
     )
 
 

@@ -17,7 +17,7 @@ from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultMod
 from mutator.faults.injections import DIMENSIONLESS
 from mutator.faults.readings import Readings
 from mutator.stpa import analysis, context_tables
-from mutator.targets import manifest
+from mutator.targets import manifest_files
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors know best
 _MODEL = re.compile(r"^_?(\w+?)Model$")
@@ -51,7 +51,7 @@ class Format:
 _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
     (campaign_files.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
-    (manifest.ManifestModel, manifest.SCHEMA, "targets/*.yaml"),
+    (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
     (context_tables.HazardsModel, context_tables.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
     (analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),

@@ -8,7 +8,7 @@ from mutator._common import caches
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
-from mutator.targets.manifest import load_manifest
+from mutator.targets.manifest_files import load_manifest
 from mutator.targets.source_tree import matches, read_tree
 from mutator.workspace import Workspace
 
