@@ -35,7 +35,7 @@ def _cpu() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def told(name: str, took: dict[str, float], count: int) -> None:
+def summary_of(name: str, took: dict[str, float], count: int) -> None:
     """Print a line of the table."""
     print(
         f"{name:24}{took['wall_s']:9.1f} s wall {took['cpu_s']:9.1f} s CPU  {count / took['wall_s']:7.2f} "
@@ -60,13 +60,13 @@ def main() -> int:
         first = run(options.campaign, max(WORKERS), Path(place) / "first", more)
         results = (Path(place) / "first" / "results.csv").read_bytes()
         count = results.count(b"\n") - 1
-        told(f"first, {max(WORKERS)} workers", first, count)
+        summary_of(f"first, {max(WORKERS)} workers", first, count)
         same = True
         for number in range(options.rounds):
             for workers in WORKERS if number % 2 == 0 else reversed(WORKERS):
                 out = Path(place) / f"{number}-{workers}"
                 figures[str(workers)].append(run(options.campaign, workers, out, more))
-                told(f"{workers} worker{'s' * (workers > 1)}", figures[str(workers)][-1], count)
+                summary_of(f"{workers} worker{'s' * (workers > 1)}", figures[str(workers)][-1], count)
                 same &= (out / "results.csv").read_bytes() == results
     ratios = {
         key: median(one[key] / two[key] for one, two in zip(figures["1"], figures["2"], strict=True))

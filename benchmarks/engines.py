@@ -2,8 +2,8 @@
 
 `python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. User CPU time of this
 process and of all that it starts; golden runs and what is done once for a campaign (loading the target, one
-look at each golden run) are told apart. Exit code 1 when records differ, or when the fork engine costs more
-than its goals.
+look at each golden run) are counted separately. Exit code 1 when records differ, or when the fork engine
+costs more than its goals.
 """
 
 import argparse

@@ -64,18 +64,18 @@ class Workspace:
     ) -> "Workspace":
         """Each of them from the first place that names or holds it.
 
-        1. the argument; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES, MUTATOR_TARGET; 3. for library and templates
-        `root` or MUTATOR_ROOT, which holds both, else the nearest folder from the current one upward that
-        holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that is missing.
+        1. the argument, or `root`, which holds both library and templates; 2. MUTATOR_LIBRARY,
+        MUTATOR_TEMPLATES and MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder from the current one
+        upward that holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that
+        is missing.
         """
-        base = _named(root, "MUTATOR_ROOT")
-        its_library = _named(library, "MUTATOR_LIBRARY")
-        its_templates = _named(templates, "MUTATOR_TEMPLATES")
-        its_target = _named(target, "MUTATOR_TARGET")
+        its_library = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
+        its_templates = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
+        its_target = Path(target) if target else _environment("MUTATOR_TARGET")
         if its_library is None:
-            its_library = (base or _upward(_LIBRARY) or shipped_folder()) / _LIBRARY
+            its_library = (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
         if its_templates is None:
-            its_templates = (base or _upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
+            its_templates = (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
             library=_folder(its_library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
             templates=_folder(its_templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
@@ -231,9 +231,16 @@ def _variants(spec: FaultSpec) -> list[str]:
     return [f"{spec.name}/{variant.name}" for variant in spec]
 
 
-def _named(given: str | Path | None, variable: str) -> Path | None:
-    """The folder that is given, or named by the environment."""
-    value = given or os.environ.get(variable)
+def _named(folder: str | Path | None, root: str | Path | None, name: str, variable: str) -> Path | None:
+    """The folder `name` that an argument names, itself or by its root, else the one of the environment."""
+    if folder or root:
+        return Path(folder) if folder else Path(root or "") / name
+    base = _environment("MUTATOR_ROOT")
+    return _environment(variable) or (base / name if base else None)
+
+
+def _environment(variable: str) -> Path | None:
+    value = os.environ.get(variable)
     return Path(value) if value else None
 
 

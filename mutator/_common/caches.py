@@ -3,7 +3,6 @@
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
       targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
-      shipped/<digest>/    what an installed wheel carries, unpacked (see `shipped`)
 
 Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
 used. An unwritable or damaged cache is ignored, and any entry may be deleted at any time.
@@ -16,14 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-CHECKS, TARGETS, SHIPPED = "checks", "targets", "shipped"
+CHECKS, TARGETS = "checks", "targets"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """Something in the cache that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `target openpilot`, `shipped`. `size` is what it takes on the disk, in
+    `what` says whose it is: `checks`, `target openpilot`. `size` is what it takes on the disk, in
     bytes, and `used` when it was last read or written, in seconds since the epoch.
     """
 
@@ -33,7 +32,7 @@ class Entry:
     used: float
 
     def delete(self) -> None:
-        """Delete it; nothing happens when it is gone already."""
+        """Delete it; a missing entry is ignored."""
         if self.path.is_dir() and not self.path.is_symlink():
             shutil.rmtree(self.path, ignore_errors=True)
         else:
@@ -61,15 +60,9 @@ def of_target(name: str) -> Path:
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
 
 
-def of_shipped() -> Path:
-    """Where an installed wheel's controller, library and templates are unpacked."""
-    return folder() / SHIPPED
-
-
 def entries() -> list[Entry]:
-    """All that is cached: each campaign's checks, each file that a target keeps, each unpacked archive."""
+    """All that is cached: each campaign's checks, and each file that a target keeps."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
-    found += [_entry(SHIPPED, path) for path in _children(of_shipped())]
     for target in _children(folder() / TARGETS):
         found += [_entry(f"target {target.name}", path) for path in _files(target)]
     return sorted(found, key=lambda entry: (entry.what, entry.path))

@@ -2,16 +2,17 @@
 
 In a clone they are folders beside the package. A wheel carries them as one archive, for two reasons: pip
 compiles every .py file that it installs, and no bytecode may lie beside a target's sources; and nothing must
-make `selfdrive` importable. The archive is unpacked once into the user's cache.
+make `selfdrive` importable. The archive is unpacked once into the user's data folder, $XDG_DATA_HOME or
+~/.local/share: runs read it all the time, so it is no cache to be cleared.
 """
 
+import os
 import shutil
 import tempfile
 from functools import lru_cache
 from pathlib import Path
 from zipfile import ZipFile
 
-from mutator._common import caches
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
@@ -29,12 +30,12 @@ def shipped_folder() -> Path:
     An unpacked archive is compared with the archive, byte for byte, once in each process. MutatorError when
     it was changed or cannot be unpacked.
     """
-    return _unpacked(ARCHIVE, caches.of_shipped()) if ARCHIVE.exists() else CLONE
+    return _unpacked(ARCHIVE, _home()) if ARCHIVE.exists() else CLONE
 
 
 def refuse_shipped(path: Path) -> None:
     """MutatorError when `path`, which is about to be written, is in the unpacked archive."""
-    if ARCHIVE.exists() and path.absolute().is_relative_to(caches.of_shipped()):
+    if ARCHIVE.exists() and path.absolute().is_relative_to(_home()):
         raise MutatorError(
             "part of the library that ships with mutator, which stays as it is",
             where=path,
@@ -74,10 +75,16 @@ def _make_empty(folder: Path) -> None:
         )
 
 
+def _home() -> Path:
+    named = Path(os.environ.get("XDG_DATA_HOME", ""))
+    base = named if named.is_absolute() else Path("~/.local/share").expanduser()
+    return base / "mutator" / "shipped"
+
+
 @lru_cache(maxsize=1)
-def _unpacked(archive: Path, cache: Path) -> Path:
-    """The archive's folder in the cache, named by its digest, made whole or not at all."""
-    folder = cache / digest(archive.read_bytes())[:16]
+def _unpacked(archive: Path, home: Path) -> Path:
+    """The archive's folder in `home`, named by its digest, made whole or not at all."""
+    folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():
         _unpack(archive, folder)
     if changed := _changed(archive, folder):
@@ -105,8 +112,8 @@ def _unpack(archive: Path, folder: Path) -> None:
         raise MutatorError(
             f"cannot unpack what ships with mutator ({err.strerror})",
             where=folder,
-            expected="a cache folder that can be written",
-            remedy="set XDG_CACHE_HOME to one, or work in a clone",
+            expected="a data folder that you may write to",
+            remedy="set XDG_DATA_HOME to one, or work in a clone",
         ) from None
 
 

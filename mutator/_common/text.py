@@ -10,7 +10,7 @@ def counted(count: int, noun: str, plural: str = "") -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as an error shows it: at most 60 characters, text told from numbers by its quotes."""
+    """A value as an error shows it: at most 60 characters, text is quoted, numbers are not."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):

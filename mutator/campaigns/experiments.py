@@ -172,7 +172,7 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """A name that is not known is told at the campaign's `keys`; mistakes in other files stay theirs."""
+        """An unknown name is reported at the campaign's `keys`; mistakes in other files stay there."""
         try:
             yield
         except MutatorError as err:

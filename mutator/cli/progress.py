@@ -77,8 +77,8 @@ class _Lines:
             return
         self.stage, self.next_s = progress.stage, now + LINE_EVERY_S
         parts = [f"{STAGES.get(progress.stage, progress.stage)} {count(progress)}".rstrip()]
-        told = (rate(progress), endings(progress.outcomes), remaining(progress))
-        parts += [part for part in told if part]
+        known = (rate(progress), endings(progress.outcomes), remaining(progress))
+        parts += [part for part in known if part]
         self.terminal.note(", ".join(parts))
 
 

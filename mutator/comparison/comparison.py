@@ -55,7 +55,7 @@ class Comparison:
 
     @cached_property
     def names(self) -> Names:
-        """What the runs are called: their folders' names, told apart where these are the same."""
+        """What the runs are called: their folders' names, made different where these are the same."""
         a, b = self.a.name, self.b.name
         return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
 
@@ -98,14 +98,14 @@ class Comparison:
     def unmatched(self) -> tuple[tuple[str, Experiment], ...]:
         """What could not be compared, with the reason."""
         m, names = self.matching, self.names
-        told: tuple[tuple[str, Sequence[Experiment]], ...] = (
+        groups: tuple[tuple[str, Sequence[Experiment]], ...] = (
             (f"only in {names.a}", m.only_a),
             (f"only in {names.b}", m.only_b),
             (f"no result in {names.a}", m.no_result_a),
             (f"no result in {names.b}", m.no_result_b),
             ("several of this name in one run", m.ambiguous),
         )
-        return tuple((why, experiment) for why, group in told for experiment in group)
+        return tuple((why, experiment) for why, group in groups for experiment in group)
 
     @property
     def incomplete(self) -> int:

@@ -1,4 +1,4 @@
-"""Jobs and engines: what is run, what comes of it, and the interface of whoever runs it."""
+"""Jobs and engines: what is run, its results, and the engine interface."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Execution:
-    """What came of a job. `out` holds the target's trace and record when status is ok.
+    """The result of a job. `out` holds the target's trace and record when status is ok.
 
     `probe` is the probe's report if the tree has one; `log` the tail of what the run printed. `mode`
     says how it was carried out, and `why` another engine did it than the one that was asked; `start` is the

@@ -56,7 +56,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
                 where=out,
                 expected="what this run was planned with: "
                 + (f"no --{name}" if frozen is None else f"--{name} {frozen}"),
-                remedy=f"leave --{name} away, or use another folder",
+                remedy=f"omit --{name}, or use another folder",
             )
     scenarios = {scenario for scenario, _ in head["goldens"]}
     check_sources(out, head["sources"], sources(workspace, workspace.manifest(head["target"]), scenarios))

@@ -26,7 +26,7 @@ class Readings:
         return self.names[0]
 
     def check(self, name: str) -> None:
-        """MutatorError that lists the readings for a name that is none of them."""
+        """MutatorError that lists the readings for an unknown name."""
         if name not in self.names:
             raise MutatorError(
                 f"reading '{name}'",

@@ -51,8 +51,8 @@ def session(ends: Sequence[tuple[str, float]]) -> str:
     """The lines of Python after which the queries below them can be run."""
     if not ends:
         return SESSION
-    told = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
-    return f'{SESSION}\nruns["t_end"] = runs["scenario"].map({{{told}}})'
+    times = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
+    return f'{SESSION}\nruns["t_end"] = runs["scenario"].map({{{times}}})'
 
 
 def markdown(

@@ -14,7 +14,7 @@ from mutator.verification import equivalence
 LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
 _WORDS = {
     RunMode.FORK: "a fork of the golden run, taken right before the fault is first active",
-    RunMode.GOLDEN: "no run: the trigger never holds, so what came of the golden run comes of it",
+    RunMode.GOLDEN: "no run: the trigger never holds, so the golden run's result is used",
     RunMode.WARM: "a fork of the loaded program, from the run's beginning",
     RunMode.REFERENCE: "a fresh interpreter (reference engine)",
     None: "no run: there is no mutant",

@@ -11,7 +11,7 @@ Counts = Mapping[tuple[str, str], Tally]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Published:
-    """Counts by (method, scenario) and by (method, fault type), and what tables say of them.
+    """Counts by (method, scenario) and by (method, fault type), and the text that tables show with them.
 
     `source` names their rows. The titles and notes are added to those of the tables that show them.
     `driver_s` is the driver's reaction time in s that the publication assumes.

@@ -29,7 +29,7 @@ def call(*words: object, here: Path) -> str:
     done = subprocess.run(
         [str(word) for word in words],
         cwd=here,
-        env=kept | {"XDG_CACHE_HOME": str(here / "cache")},
+        env=kept | {"XDG_CACHE_HOME": str(here / "cache"), "XDG_DATA_HOME": str(here / "data")},
         capture_output=True,
         text=True,
         check=False,
@@ -124,7 +124,7 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
     mutator = python.with_name("mutator")
     call(mutator, "try", *CHAFF, "--out", elsewhere / "tried", here=elsewhere)
     assert not list((python.parents[1] / "lib").rglob("selfdrive*"))
-    [unpacked] = (elsewhere / "cache" / "mutator" / "shipped").iterdir()
+    [unpacked] = (elsewhere / "data" / "mutator" / "shipped").iterdir()
     assert (unpacked / "target" / "selfdrive" / "__init__.py").is_file()
     assert not [*unpacked.rglob("*.pyc"), *unpacked.rglob("__pycache__")]
 

@@ -5,44 +5,91 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 CLONE = Path(__file__).parents[2]
-MUTATOR = CLONE / "mutator"
 TOP_MODULES = 12
 # may import the harness inside functions: they put off what a command does not need
 LAZY = ("mutator/__init__.py", "mutator/cli/", "mutator/execution/pytest_plugin.py")
 
-Imports = Iterator[tuple[str, str, bool]]
+
+def modules(root: Path) -> Iterator[Path]:
+    yield from sorted((root / "mutator").rglob("*.py"))
 
 
-def modules() -> Iterator[Path]:
-    yield from sorted(MUTATOR.rglob("*.py"))
-
-
-def imports(path: Path) -> Imports:
-    """(file, imported module, whether inside a function) of a module, below TYPE_CHECKING too."""
+def imports(path: Path, root: Path) -> Iterator[tuple[str, bool]]:
+    """(imported module, whether inside a function) of a module, below TYPE_CHECKING too."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     inside = {node for function in functions for node in ast.walk(function)}
-    file = path.relative_to(CLONE).as_posix()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
-                yield file, alias.name, node in inside
+                yield alias.name, node in inside
         elif isinstance(node, ast.ImportFrom) and node.module:
             for alias in node.names:
                 whole = f"{node.module}.{alias.name}"
-                yield file, whole if source(whole) else node.module, node in inside
+                yield whole if source(whole, root) else node.module, node in inside
 
 
-def source(name: str) -> Path | None:
+def source(name: str, root: Path) -> Path | None:
     """File of a module of the harness."""
-    base = CLONE / name.replace(".", "/")
+    base = root / name.replace(".", "/")
     return next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
+
+
+def top_modules(root: Path) -> list[str]:
+    return sorted(path.name for path in (root / "mutator").glob("*.py"))
+
+
+def hidden_imports(root: Path) -> list[str]:
+    """Imports of the harness inside functions, where these are not allowed."""
+    return [
+        f"{path.relative_to(root)}: {name}"
+        for path in modules(root)
+        for name, inside in imports(path, root)
+        if inside
+        and name.partition(".")[0] == "mutator"
+        and not path.relative_to(root).as_posix().startswith(LAZY)
+    ]
+
+
+def cycle(root: Path) -> list[str]:
+    """The modules of a circle of imports; none if there is none."""
+    edges: dict[str, set[str]] = {str(path.relative_to(root)): set() for path in modules(root)}
+    for path in modules(root):
+        for name, _ in imports(path, root):
+            if name.startswith("mutator.") and (found := source(name, root)):
+                edges[str(path.relative_to(root))].add(str(found.relative_to(root)))
+    try:
+        TopologicalSorter(edges).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def strangers_in_target(root: Path) -> list[str]:
+    """Imports, in what runs inside a target's process, of more than the standard library and numpy."""
+    allowed = {*sys.stdlib_module_names, "numpy"}
+    return [
+        f"{path.name}: {name}"
+        for path in (root / "mutator" / "engines" / "in_target").glob("*.py")
+        for name, _ in imports(path, root)
+        if name.partition(".")[0] not in allowed
+    ]
+
+
+def namesakes(root: Path) -> list[str]:
+    """Modules with a function or class of their own name."""
+    return [
+        str(path.relative_to(root))
+        for path in modules(root)
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == path.stem
+    ]
 
 
 def lint(root: Path) -> subprocess.CompletedProcess[str]:
@@ -53,6 +100,12 @@ def lint(root: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+def is_clean(root: Path) -> bool:
+    """Whether all that is checked here holds of a tree."""
+    found = (hidden_imports(root), cycle(root), strangers_in_target(root), namesakes(root))
+    return not any(found) and len(top_modules(root)) <= TOP_MODULES and lint(root).returncode == 0
+
+
 def test_contracts_hold() -> None:
     """Packages import in one direction, without cycles, and harness and target do not know each other."""
     done = lint(CLONE)
@@ -61,44 +114,28 @@ def test_contracts_hold() -> None:
 
 def test_shape_of_the_house() -> None:
     """Few modules lie at the top, no modules import in a circle, and no import hides in a function."""
-    top = sorted(path.name for path in MUTATOR.glob("*.py"))
-    edges = {str(path.relative_to(CLONE)): set[str]() for path in modules()}
-    for path in modules():
-        for file, name, _ in imports(path):
-            if name.startswith("mutator.") and (found := source(name)):
-                edges[file].add(str(found.relative_to(CLONE)))
-    hidden = [
-        f"{file}: {name}"
-        for path in modules()
-        for file, name, inside in imports(path)
-        if inside and name.partition(".")[0] == "mutator" and not file.startswith(LAZY)
-    ]
-    print(f"modules at the top: {len(top)}, imports inside functions: {len(hidden)}", end=", ")
-    TopologicalSorter(edges).prepare()  # CycleError names the modules of a circle
-    print("cycles: 0")
+    top, hidden, circle = top_modules(CLONE), hidden_imports(CLONE), cycle(CLONE)
+    print(
+        f"modules at the top: {len(top)}, cycles: {bool(circle):d}, imports inside functions: {len(hidden)}"
+    )
     assert len(top) <= TOP_MODULES, top
     assert not hidden
+    assert not circle
 
 
 def test_what_runs_inside_a_target_needs_little() -> None:
     """Modules that run in a target's process import the standard library and numpy only."""
-    allowed = {*sys.stdlib_module_names, "numpy"}
-    for path in (MUTATOR / "engines" / "in_target").glob("*.py"):
-        for file, name, _ in imports(path):
-            assert name.partition(".")[0] in allowed, f"{file} imports {name}"
+    assert not strangers_in_target(CLONE)
 
 
 def test_no_function_bears_its_modules_name() -> None:
     """`package.name` is either a module or a function, so nobody imports one for the other."""
-    for path in modules():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                assert node.name != path.stem, path
+    assert not namesakes(CLONE)
 
 
 def test_every_package_says_what_it_is_for() -> None:
     """The docstring of a package says what lives there, and what never does."""
-    for path in MUTATOR.rglob("__init__.py"):
+    for path in (CLONE / "mutator").rglob("__init__.py"):
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
         assert text and len(text) > 60, path
 
@@ -118,18 +155,22 @@ VIOLATIONS = {
     "harness": ("target/selfdrive/sim/run.py", "import mutator.errors"),
     "study": ("mutator/report/building.py", "from mutator import paper"),
     "new package": ("mutator/novel.py", "X = 1"),
+    "stranger in a target's process": ("mutator/engines/in_target/run_once.py", "import pandas"),
+    "hidden import": ("mutator/report/page.py", "def f():\n    from mutator.report import panel"),
+    "namesake": ("mutator/report/page.py", "def page():\n    pass"),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VIOLATIONS)
 def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
-    """Each contract notices an import that it forbids."""
+    """What each contract forbids is noticed."""
     ignored = shutil.ignore_patterns("__pycache__", "*.npz")
     for folder in ("mutator", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=ignored)
     shutil.copy(CLONE / "pyproject.toml", tmp_path)
+    assert is_clean(tmp_path)
     file, line = VIOLATIONS[name]
     with (tmp_path / file).open("a", encoding="utf-8") as module:
         module.write(f"\n{line}\n")
-    assert lint(tmp_path).returncode == 1
+    assert not is_clean(tmp_path)

@@ -44,6 +44,7 @@ def test_options_go_before_the_environment(
     monkeypatch.setenv("MUTATOR_LIBRARY", str(other))
     assert Workspace.find().library == other
     assert Workspace.find(library=root / "fault_library").library == root / "fault_library"
+    assert Workspace.find(root).library == root / "fault_library"
     monkeypatch.setenv("MUTATOR_TARGET", str(other))
     assert Workspace.find().target == other
     assert Workspace.find(target=root / "target").target == root / "target"

@@ -20,13 +20,13 @@ FILES = {"target/selfdrive/a.py": b"A = 1\n", "fault_library/b.yaml": b"b: 1\n",
 
 @pytest.fixture
 def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An installation that came as a wheel, as far as what ships with it goes, and an empty cache."""
+    """An installation that came as a wheel, as far as what ships with it goes, and an empty data folder."""
     path = tmp_path / "shipped.zip"
     with ZipFile(path, "w") as file:
         for name, data in FILES.items():
             file.writestr(name, data)
     monkeypatch.setattr(shipped, "ARCHIVE", path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     return path
 
 
@@ -41,9 +41,9 @@ def test_a_clone_ships_its_own_folders() -> None:
 
 
 def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
-    """Its files, and nothing else, come to lie below the user's cache, and stay for the next process."""
+    """Its files, and nothing else, are unpacked into the user's data folder and stay there."""
     folder = shipped_folder()
-    assert folder.is_relative_to(tmp_path / "cache" / "mutator")
+    assert folder.is_relative_to(tmp_path / "data" / "mutator")
     found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
     assert found == FILES
     before = (folder / "templates/c.j2").stat()
@@ -78,7 +78,7 @@ def delete(folder: Path) -> None:
     ("change", "named"), [(edit, "selfdrive/a.py"), (add, "selfdrive/extra.py"), (delete, "templates/c.j2")]
 )
 def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None], named: str) -> None:
-    """What was edited in the cache never runs as what ships: the file is named, and the way out."""
+    """What was edited there never runs as what ships: the file is named, and the way out."""
     change(shipped_folder())
     with pytest.raises(
         MutatorError, match=rf"no longer as it ships: .*{named}.*delete this folder.*mutator init"
@@ -86,7 +86,7 @@ def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None]
         as_in_a_new_process()
 
 
-def test_bytecode_in_the_cache_is_no_change(archive: Path) -> None:
+def test_bytecode_is_no_change(archive: Path) -> None:
     """Bytecode is never part of a tree, so what somebody left there by an import does no harm."""
     folder = shipped_folder()
     (folder / "target/selfdrive/__pycache__").mkdir()
@@ -94,13 +94,13 @@ def test_bytecode_in_the_cache_is_no_change(archive: Path) -> None:
     assert as_in_a_new_process() == folder
 
 
-def test_a_cache_that_cannot_be_written(
+def test_a_folder_that_cannot_be_written(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The error says which folder it is and how to choose another."""
     (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    with pytest.raises(MutatorError, match=r"file/mutator/shipped.*cannot unpack.*set XDG_CACHE_HOME"):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "file"))
+    with pytest.raises(MutatorError, match=r"file/mutator/shipped.*cannot unpack.*set XDG_DATA_HOME"):
         shipped_folder()
 
 
