@@ -10,7 +10,7 @@ import pandas as pd
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.model import Outcome, Status
 from mutator.outcomes.rows import Row, by_fault_type
-from mutator.statistics.compare import holm
+from mutator.statistics.contrasts import holm
 from mutator.statistics.paired import mcnemar, rate_difference, times
 from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, P, Sheet

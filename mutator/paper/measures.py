@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.statistics import compare, times
+from mutator.statistics import times
 from mutator.statistics.shares import CONFIDENCE, Share
 from mutator.statistics.shares import share as wilson
 from mutator.statistics.tallies import by_kind

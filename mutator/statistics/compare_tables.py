@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from mutator.statistics import compare
-from mutator.statistics.compare import WHOLES, Whole
+from mutator.statistics.contrasts import WHOLES, Whole
 from mutator.statistics.paired import Matched
 from mutator.statistics.published import OURS, Published, by_source
 from mutator.statistics.shares import share

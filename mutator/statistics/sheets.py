@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from mutator.statistics import compare_tables, summary_tables, time_tables
-from mutator.statistics.compare import GUIDED, RANDOM
+from mutator.statistics.contrasts import GUIDED, RANDOM
 from mutator.statistics.published import Published
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.tallies import by_kind, by_scenario

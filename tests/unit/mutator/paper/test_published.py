@@ -8,7 +8,6 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.paper.published import Paper, load_paper
-from mutator.statistics import compare
 from mutator.statistics.compare_tables import kinds_sheet, overall_sheet
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet

@@ -5,9 +5,8 @@ import math
 import pandas as pd
 import pytest
 
-from mutator.statistics import compare
-from mutator.statistics.compare import Stratum
 from mutator.statistics.compare_tables import pairs_sheet
+from mutator.statistics.contrasts import Stratum
 from mutator.statistics.paired import Matched
 
 from .results_frame import results
