@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.statistics import times
+from mutator.statistics import contrasts, times
 from mutator.statistics.shares import CONFIDENCE, Share
 from mutator.statistics.shares import share as wilson
 from mutator.statistics.tallies import by_kind
@@ -62,9 +62,9 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Hazard rate of guided less that of random runs; whole faults (location and value) resampled."""
     chosen = _query(runs, of)
     one, other = (
-        _share(chosen, f'method == "{how}"', "is_hazard") for how in (compare.GUIDED, compare.RANDOM)
+        _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
     )
-    found = compare.resampled(chosen, "injected")  # of these runs: they are chosen already
+    found = contrasts.resampled(chosen, "injected")  # of these runs: they are chosen already
     return Estimate(
         estimate=found.difference,
         low=found.low,
@@ -76,8 +76,8 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Odds of a hazard, guided against random, common to the fault types (Mantel-Haenszel)."""
-    parts = compare.strata(by_kind(_query(runs, of)), "injected")
-    found = compare.mantel_haenszel(parts)
+    parts = contrasts.strata(by_kind(_query(runs, of)), "injected")
+    found = contrasts.mantel_haenszel(parts)
     said = f"- ({found.strata} fault types)"
     if not math.isnan(found.odds_ratio):
         said = (
@@ -99,7 +99,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     its columns end in `_guided` and `_random`."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
-    matched = compare.mcnemar(_query(compare.pairs(runs), of))
+    matched = contrasts.mcnemar(_query(contrasts.pairs(runs), of))
     unlike = matched.first_only + matched.second_only
     low = high = estimate = math.nan
     if unlike:

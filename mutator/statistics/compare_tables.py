@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from mutator.statistics import contrasts
 from mutator.statistics.contrasts import WHOLES, Whole
 from mutator.statistics.paired import Matched
 from mutator.statistics.published import OURS, Published, by_source
@@ -16,8 +17,8 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
         for source, counts in sources.items():
-            parts = compare.strata(counts, whole)
-            pooled = compare.mantel_haenszel(parts)
+            parts = contrasts.strata(counts, whole)
+            pooled = contrasts.mantel_haenszel(parts)
             rates = (
                 share(sum(s.guided_hazards for s in parts), sum(s.guided for s in parts)),
                 share(sum(s.random_hazards for s in parts), sum(s.random for s in parts)),
@@ -43,7 +44,7 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
     if source != OURS:  # single runs are needed, which are not published
         return (None,) * 4
-    found = compare.resampled(frame, whole)
+    found = contrasts.resampled(frame, whole)
     return (found.difference, found.low, found.high, found.clusters)
 
 
@@ -53,9 +54,9 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
         for source, counts in sources.items():
-            parts = compare.strata(counts, whole)
-            p_values = [compare.fisher(stratum) for stratum in parts]
-            for stratum, p, adjusted in zip(parts, p_values, compare.holm(p_values), strict=True):
+            parts = contrasts.strata(counts, whole)
+            p_values = [contrasts.fisher(stratum) for stratum in parts]
+            for stratum, p, adjusted in zip(parts, p_values, contrasts.holm(p_values), strict=True):
                 guided = share(stratum.guided_hazards, stratum.guided)
                 random = share(stratum.random_hazards, stratum.random)
                 lines.append((whole, source, stratum.kind, guided, random, P(p), P(adjusted)))
@@ -70,7 +71,7 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     """Exact McNemar on matched pairs, of all and of each fault type, adjusted over the types."""
-    paired = compare.pairs(frame)
+    paired = contrasts.pairs(frame)
     lines: list[tuple[Cell, ...]] = []
     for which, some in (
         ("all", paired),
@@ -78,9 +79,9 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     ):
         if some.empty:
             continue
-        kinds = {str(kind): compare.mcnemar(group) for kind, group in some.groupby("kind")}
-        adjusted = compare.holm([matched.p for matched in kinds.values()])
-        lines.append((which, "total", *_cells(compare.mcnemar(some)), None))
+        kinds = {str(kind): contrasts.mcnemar(group) for kind, group in some.groupby("kind")}
+        adjusted = contrasts.holm([matched.p for matched in kinds.values()])
+        lines.append((which, "total", *_cells(contrasts.mcnemar(some)), None))
         lines += [
             (which, kind, *_cells(matched), P(p))
             for (kind, matched), p in zip(kinds.items(), adjusted, strict=True)

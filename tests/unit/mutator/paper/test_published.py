@@ -8,6 +8,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.paper.published import Paper, load_paper
+from mutator.statistics import contrasts
 from mutator.statistics.compare_tables import kinds_sheet, overall_sheet
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
@@ -110,7 +111,7 @@ def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Pa
 def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
     """Held constant over fault types, guided faults are the more hazardous ones per activated fault only."""
     activated, injected = (
-        compare.mantel_haenszel(compare.strata(paper.coverage, whole)) for whole in compare.WHOLES
+        contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
     )
     assert activated.strata == injected.strata == 17
     assert injected.high < 1

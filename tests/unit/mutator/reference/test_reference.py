@@ -132,7 +132,7 @@ def test_a_schema_takes_a_model_of_ones_own() -> None:
 def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the library is the one that came with a wheel, there is no clone to write pages into."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
     with pytest.raises(MutatorError, match="ships with mutator"):
         next(write(Workspace(library=library, templates=library.with_name("templates"))))

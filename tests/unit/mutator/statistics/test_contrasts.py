@@ -5,6 +5,7 @@ import math
 import pandas as pd
 import pytest
 
+from mutator.statistics import contrasts
 from mutator.statistics.compare_tables import pairs_sheet
 from mutator.statistics.contrasts import Stratum
 from mutator.statistics.paired import Matched
@@ -42,7 +43,7 @@ def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
 
 def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
     """Mantel-Haenszel: sum of a*d/n over sum of b*c/n, here (10*15/40 + 4*18/40) / (10*5/40 + 16*2/40)."""
-    pooled = compare.mantel_haenszel([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
+    pooled = contrasts.mantel_haenszel([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
     assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
     assert pooled.low < 1 < pooled.odds_ratio < pooled.high
     assert 0.05 < pooled.p < 1
@@ -51,28 +52,28 @@ def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
 def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
     """A type that never is a hazard says nothing of the odds; if all are so, nothing is known."""
     one = stratum((10, 20), (5, 20))
-    pooled = compare.mantel_haenszel([one, stratum((0, 9), (0, 9))])
-    assert pooled.odds_ratio == pytest.approx(compare.mantel_haenszel([one]).odds_ratio)
-    assert math.isnan(compare.mantel_haenszel([stratum((0, 9), (0, 9))]).odds_ratio)
+    pooled = contrasts.mantel_haenszel([one, stratum((0, 9), (0, 9))])
+    assert pooled.odds_ratio == pytest.approx(contrasts.mantel_haenszel([one]).odds_ratio)
+    assert math.isnan(contrasts.mantel_haenszel([stratum((0, 9), (0, 9))]).odds_ratio)
 
 
 def test_holm_adjusts_as_in_the_textbook() -> None:
     """The smallest of three is tripled, the next doubled, and none is below one before it."""
-    assert compare.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
-    assert compare.holm([]) == ()
+    assert contrasts.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
+    assert contrasts.holm([]) == ()
 
 
 def test_pairs_are_of_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
     """Every guided run meets its random partner by the name of the row; one without is left out."""
-    found = compare.pairs(frame)
+    found = contrasts.pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
-    assert compare.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)
+    assert contrasts.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)
 
 
 def test_mcnemar_is_exact() -> None:
     """Eight discordant pairs, all to one side: twice a half to the eighth."""
     made = [row for i in range(8) for row in pair(str(i), HIT, RAN)]
-    assert compare.mcnemar(compare.pairs(results(*made))).p == pytest.approx(2 * 0.5**8)
+    assert contrasts.mcnemar(contrasts.pairs(results(*made))).p == pytest.approx(2 * 0.5**8)
 
 
 def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.DataFrame) -> None:
@@ -90,7 +91,7 @@ def test_resampling_draws_whole_faults() -> None:
     """Copies of a run in other scenarios add no information: the interval stays that of the faults."""
     once = [row for i in range(12) for row in pair(str(i), HIT if i < 8 else RAN, HIT if i < 4 else RAN)]
     often = [row | {"scenario": s} for s in ("S1", "S2", "S3", "S4") for row in once]
-    single, copied = (compare.resampled(results(*rows), "injected") for rows in (once, often))
+    single, copied = (contrasts.resampled(results(*rows), "injected") for rows in (once, often))
     assert single.difference == pytest.approx(4 / 12)
     assert single == copied
     assert single.low < 4 / 12 < single.high
@@ -98,6 +99,6 @@ def test_resampling_draws_whole_faults() -> None:
 
 def test_a_difference_needs_runs_of_both_methods() -> None:
     """Without random runs there is no difference and no interval."""
-    found = compare.resampled(results(HIT, RAN), "activated")
+    found = contrasts.resampled(results(HIT, RAN), "activated")
     assert math.isnan(found.difference)
     assert math.isnan(found.low)
