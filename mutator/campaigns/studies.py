@@ -14,8 +14,8 @@ from mutator.workspace import Workspace
 GROUP = "mutator.studies"
 FUNCTIONS = ("check", "published", "drawings")
 PARTS = ("about", "panels", *FUNCTIONS)
-"""What an entry point's object must have: the fields of `mutator.report.studies.Study`, a package that may not
-be imported here."""
+"""What an entry point's object must have: the fields of `mutator.report.studies.Study`, which this layer may
+not import."""
 
 
 class Study(Protocol):
