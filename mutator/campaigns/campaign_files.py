@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
-from mutator.campaigns.studies import study_names
+from mutator.campaigns.studies import Study, find_study
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.readings import FILE, Readings
@@ -215,7 +215,10 @@ class CampaignModel(StrictModel, title="The file"):
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Read a campaign file strictly; MutatorError with file and line for anything wrong with it."""
+    """Read a campaign file strictly; MutatorError with file and line for anything wrong with it.
+
+    Whether its study can be had is asked by `load_study` alone: old runs open without it.
+    """
     model, source = read(path, CampaignModel, SCHEMA)
     for key in ("scenarios", "setting", "methods"):
         values = getattr(model, key)
@@ -224,13 +227,6 @@ def load_campaign(path: Path) -> Campaign:
                 raise source.error(
                     (key, i), f"'{value}' stands here a second time", remedy="remove one of the two"
                 )
-    if model.study is not None and model.study not in (known := study_names()):
-        raise source.error(
-            ("study",),
-            f"study '{model.study}' is not installed",
-            expected=f"one of {', '.join(known) or 'none'}",
-            remedy="correct the name, or install the package that provides the study",
-        )
     triggers = model.triggers
     return Campaign(
         name=model.name,
@@ -257,6 +253,18 @@ def load_campaign(path: Path) -> Campaign:
         chunk=model.chunk,
         yaml=source,
     )
+
+
+def load_study(campaign: Campaign) -> Study | None:
+    """The study that a campaign asks for, if any; MutatorError with file and line if it cannot be had."""
+    if campaign.study is None:
+        return None
+    try:
+        return find_study(campaign.study)
+    except MutatorError as error:
+        raise campaign.yaml.error(
+            ("study",), error.got, expected=error.expected, remedy=error.remedy
+        ) from error
 
 
 def check_readings(campaign: Campaign, readings: Readings) -> None:

@@ -13,7 +13,7 @@ from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
-from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
@@ -146,6 +146,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     seed = loaded.seed if choices.seed is None else choices.seed
     readings = workspace.readings()
     check_readings(loaded, readings)
+    load_study(loaded)
     reading = choices.reading or loaded.reading or readings.default
     _check(choices, readings)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)

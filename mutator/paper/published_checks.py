@@ -17,13 +17,19 @@ _REMEDY = "compare with the published table"
 
 
 def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
-    """Every problem of `references/paper_*.yaml`; none where nothing is cited.
+    """Every problem of `references/paper_*.yaml` in a library whose campaigns ask for the study.
 
-    Numbers that cannot be (`load_paper`), a row that stands twice, methods, scenarios and fault types that
-    the library does not have, and sums over scenarios that are not those over fault types.
+    Missing files, numbers that cannot be (`load_paper`), a row that stands twice, methods, scenarios and
+    fault types that the library does not have, and sums over scenarios that are not those over fault types.
     """
     references = workspace.library / "references"
-    if not any((references / name).is_file() for name in FILES):
+    if missing := [name for name in FILES if not (references / name).is_file()]:
+        yield MutatorError(
+            f"the published numbers are not in this library: no {', '.join(missing)}",
+            where=references,
+            expected=f"{', '.join(FILES[:-1])} and {FILES[-1]}",
+            remedy="copy them from the library that ships, or remove `study:` from the campaigns",
+        )
         return
     try:
         paper = load_paper(references)

@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from mutator.campaigns.campaign_files import check_readings, load_campaign
-from mutator.campaigns.studies import find_study
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
+from mutator.campaigns.studies import study_problems
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
@@ -64,15 +64,25 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 
 def check_campaigns(workspace: Workspace, readings: Readings) -> list[MutatorError]:
     """Problems of the library's campaigns, and those that the studies they ask for find in its data."""
-    found, studies = _Found(), set()
+    found, asked = _Found(), set[str]()
     for name in workspace.campaigns:
         campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
-        if campaign:
-            found.tried(partial(check_readings, campaign, readings))
-            studies |= {campaign.study} if campaign.study else set()
-    for study in sorted(studies):
-        found.problems += find_study(study).check(workspace)
+        if campaign is None:
+            continue
+        found.tried(partial(check_readings, campaign, readings))
+        study = found.tried(partial(load_study, campaign))
+        if study and campaign.study and campaign.study not in asked:
+            asked.add(campaign.study)
+            problems = study_problems(campaign.study, study, workspace)
+            found.problems += [_placed(problem, campaign) for problem in problems]
     return found.problems
+
+
+def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:
+    """A study's problem; at the campaign that asks for the study if it names no file."""
+    if problem.where:
+        return problem
+    return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
 
 
 class _Found:

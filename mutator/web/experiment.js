@@ -110,7 +110,8 @@ class Experiment {
       el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try()));
   }
 
-  /** `mutator try` of this fault; a time for what was triggered at random. */
+  /** `mutator try` of this fault; a time for what was triggered at random. The reading is always there: which one
+   *  is the default is up to the library. */
   #try() {
     const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
     const quoted = (text) => (/^[\w./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
@@ -119,7 +120,7 @@ class Experiment {
     if (this.text("variant")) parts.push("--variant", quoted(this.text("variant")));
     if (isNumber) parts.push("--value", value);
     if (when) parts.push("--trigger", quoted(when));
-    if (this.text("reading") && this.text("reading") !== "as_described") parts.push("--reading", quoted(this.text("reading")));
+    if (this.text("reading")) parts.push("--reading", quoted(this.text("reading")));
     return parts.join(" ");
   }
 

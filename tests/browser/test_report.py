@@ -79,7 +79,8 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
         "#experiment .command code", "all => all.map((c) => c.textContent)"
     )
     assert f"mutator rerun {name} --run {run}" in commands
-    assert any(command.startswith("mutator try sensor/") for command in commands)
+    [again] = [command for command in commands if command.startswith("mutator try sensor/")]
+    assert again.endswith(" --reading as_described"), "the reading is named, whichever is the default"
     page.page.go_back()
     page.page.wait_for_selector("#experiment", state="hidden")
 

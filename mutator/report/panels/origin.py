@@ -1,6 +1,7 @@
 """Where results come from: how the experiments were run, and what they could be made again with."""
 
 from mutator._common.tables import Table
+from mutator.campaigns.studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.review import gate
@@ -54,11 +55,13 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
 
 
 def _study(run: ReportedRun) -> dict[str, str]:
-    """The study that the campaign asks for, and why this report has nothing of it, if so."""
+    """The study that the campaign asks for, and why this report may have nothing of it."""
     name = run.folder.head.get("study")
     if not name:
         return {}
-    if run.study:
-        return {"study": f"{name} ({run.study.about})"}
+    if run.study and run.workspace:
+        problems = study_problems(name, run.study, run.workspace)
+        why = f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else ""
+        return {"study": f"{name} ({run.study.about}){why}"}
     why = "cannot be loaded here" if run.workspace else "needs a fault library, of which there is none here"
     return {"study": f"{name}, which {why}"}

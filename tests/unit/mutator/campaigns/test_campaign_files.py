@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.campaign_files import check_readings, load_campaign
+from mutator.campaigns.campaign_files import check_readings, load_campaign, load_study
 from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Method
@@ -131,12 +131,14 @@ def test_readings_are_those_of_the_library(
     assert any(told in str(problem) for problem in check_library(toycar, "toycar"))
 
 
-def test_a_study_that_is_not_installed_is_refused(tmp_path: Path) -> None:
+def test_a_study_that_is_not_installed_is_refused(toycar: Workspace, tmp_path: Path) -> None:
     """With its line and the studies that there are; without one, a campaign has none."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
-    assert load_campaign(path).study is None
+    assert make_plan(toycar, path).campaign.study is None
     path.write_text(TEXT.replace("target: toycar", "target: toycar\nstudy: moon_landing"))
     said = "mine.yaml:5: study 'moon_landing' is not installed; expected one of driving_agent_resilience"
     with pytest.raises(MutatorError, match=said):
-        load_campaign(path)
+        make_plan(toycar, path)
+    with pytest.raises(MutatorError, match=said):
+        load_study(load_campaign(path))

@@ -1,5 +1,6 @@
 """Studies are found by their entry points, wherever they come from."""
 
+import dataclasses
 import re
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -7,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import studies
+from mutator.campaigns.plans import freeze, load_plan, make_plan
 from mutator.campaigns.studies import find_study, study_names
 from mutator.errors import MutatorError
 from mutator.report import building
+from mutator.report.studies import Study
+from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 from ..report.made_run import make_run
@@ -57,3 +61,124 @@ def test_what_is_not_there_is_refused_with_what_is(installed: None) -> None:
         find_study("moon_landing")
     with pytest.raises(MutatorError, match=r"'broken' cannot be loaded: .*MISSING"):
         find_study("broken")
+
+
+STRANGERS = {
+    "gone": ("no_such_package:STUDY", r"ModuleNotFoundError: .*no_such_package"),
+    "nameless": ("json:NOPE", "AttributeError: .*NOPE"),
+    "raising": ("strange_studies.raising:STUDY", "ZeroDivisionError: division by zero"),
+    "unwritten": ("strange_studies.unwritten:STUDY", "SyntaxError"),
+    "malformed": ("not an object!", "cannot be loaded"),
+    "function": (
+        "json:dumps",
+        "is no study: json:dumps is a function without about, panels, check, published, drawings",
+    ),
+    "module": ("json", "is no study: json is a module without"),
+    "unmade": ("mutator.report.studies:Study", "is no study: mutator.* is a class, not an object of it"),
+    "idle": ("strange_studies.idle:STUDY", "is no study: .*:STUDY has no function check;"),
+    "paneless": ("strange_studies.idle:PANELESS", "is no study: .* has panels that are not functions;"),
+}
+MADE = """
+from types import SimpleNamespace
+
+def nothing(*_):
+    return ()
+
+STUDY = SimpleNamespace(about="", check=None, published=nothing, panels=(), drawings=nothing)
+PANELESS = SimpleNamespace(about="", check=nothing, published=nothing, panels=(3,), drawings=nothing)
+FAILING = SimpleNamespace(about="", check=lambda _: 1 / 0, published=nothing, panels=(), drawings=nothing)
+TALKING = SimpleNamespace(about="", check=lambda _: ["oh"], published=nothing, panels=(), drawings=nothing)
+"""
+BAD_CHECKS = {
+    "failing": ("strange_studies.idle:FAILING", "fails: ZeroDivisionError: division by zero"),
+    "talking": ("strange_studies.idle:TALKING", "gives 'oh', which is no MutatorError"),
+}
+
+
+@pytest.fixture
+def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Entry points of an installed package, each wrong in a way of its own, beside a sound one."""
+    package = tmp_path / "site" / "strange_studies"
+    package.mkdir(parents=True)
+    (package / "raising.py").write_text("STUDY = 1 / 0")
+    (package / "unwritten.py").write_text("STUDY = (")
+    (package / "idle.py").write_text(MADE)
+    info = package.parent / "strange_studies-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strange-studies\nVersion: 1\n")
+    lines = [f"{name} = {value}" for name, (value, _) in (STRANGERS | BAD_CHECKS).items()]
+    (info / "entry_points.txt").write_text("\n".join([f"[{studies.GROUP}]", *lines]))
+    monkeypatch.syspath_prepend(package.parent)
+
+
+def asking(toycar: Workspace, study: str) -> Path:
+    """The smallest campaign of the library, which now asks for a study in its last line."""
+    path = toycar.campaign("small")
+    path.write_text(f"{path.read_text()}study: {study}\n")
+    return path
+
+
+@pytest.mark.parametrize("study", STRANGERS)
+def test_what_is_no_study_is_told_at_the_campaign_that_asks_for_it(
+    strangers: None, toycar: Workspace, study: str
+) -> None:
+    """Planning refuses it and `mutator check` lists it: line, reason, the other studies, a remedy."""
+    before = [str(problem) for problem in check_library(toycar, "toycar")]
+    path = asking(toycar, study)
+    line = len(path.read_text().splitlines())
+    with pytest.raises(MutatorError) as error:
+        make_plan(toycar, "small")
+    told = str(error.value)
+    assert told.startswith(f"{path}:{line}: study '{study}' ")
+    assert re.search(STRANGERS[study][1], told)
+    known = re.search(r"expected one of (.*); correct or reinstall the package", told, re.S)
+    assert known
+    assert known[1].split(", ") == [name for name in study_names() if name != study]
+    after = [str(problem) for problem in check_library(toycar, "toycar")]
+    assert [problem for problem in after if problem not in before] == [told]
+
+
+@pytest.mark.parametrize("study", BAD_CHECKS)
+def test_a_check_that_fails_is_a_problem_of_the_library(
+    strangers: None, toycar: Workspace, study: str
+) -> None:
+    """An error in a study's own check ends no `mutator check`: it is listed, at the campaign."""
+    path = asking(toycar, study)
+    line = len(path.read_text().splitlines())
+    problems = [str(problem) for problem in check_library(toycar, "toycar")]
+    said = f"{path}:{line}: the check of study '{study}' {BAD_CHECKS[study][1]}; correct the package"
+    assert any(problem.startswith(said) for problem in problems)
+
+
+def test_a_report_says_that_its_study_is_none(strangers: None, tmp_path: Path) -> None:
+    """The report of a run whose study was replaced since is written without it."""
+    run = tmp_path / "run"
+    run.mkdir()
+    written = building.write(make_run(run, study="function"), Workspace.find(root=CLONE))
+    assert "function, which cannot be loaded here" in written.markdown.read_text()
+
+
+def test_every_campaign_that_asks_for_a_missing_study_is_told(toycar: Workspace) -> None:
+    """One mistake in two files is two to correct."""
+    for name in ("small", "toy"):
+        path = toycar.campaign(name)
+        path.write_text(f"{path.read_text()}study: moon_landing\n")
+    found = [problem for problem in check_library(toycar, "toycar") if "moon_landing" in str(problem)]
+    assert [Path(str(problem.where)).name for problem in found] == ["small.yaml", "toy.yaml"]
+
+
+def test_a_run_opens_without_its_study(
+    installed: None, toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was planned with a study that is uninstalled since is still read; planning it anew is refused."""
+    asking(toycar, "crash_tests")
+    folder = freeze(make_plan(toycar, "small"), tmp_path / "planned", toycar)
+    monkeypatch.setattr(studies, "entry_points", EntryPoints().select)
+    assert load_plan(folder.path).campaign.study == "crash_tests"
+    with pytest.raises(MutatorError, match="'crash_tests' is not installed; expected no study"):
+        make_plan(toycar, "small")
+
+
+def test_the_parts_asked_for_are_those_of_a_study() -> None:
+    """What is checked when a study is loaded is what a report uses of it."""
+    assert set(studies.PARTS) == {field.name for field in dataclasses.fields(Study)}

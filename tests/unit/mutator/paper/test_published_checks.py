@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator.paper.published import FILES
 from mutator.paper.published_checks import check_paper
 from mutator.verification.library import check_library
 from mutator.workspace import Workspace
@@ -27,10 +28,20 @@ def workspace(tmp_path: Path) -> Workspace:
 
 
 def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
-    """Nothing is wrong with them, and nothing is asked of a library that cites none."""
+    """Nothing is wrong with them."""
     assert list(check_paper(workspace)) == []
-    shutil.rmtree(workspace.library / "references")
-    assert list(check_paper(workspace)) == []
+
+
+def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None:
+    """Its campaigns ask for numbers that are not there: the folder, the files and a remedy are named."""
+    references = workspace.library / "references"
+    shutil.rmtree(references)
+    [problem] = check_paper(workspace)
+    assert problem.where == str(references)
+    for file in FILES:
+        assert file in problem.got
+        assert file in str(problem.expected)
+    assert "copy them" in str(problem.remedy)
 
 
 @pytest.mark.parametrize(
@@ -84,4 +95,16 @@ def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar:
     campaign.write_text(f"{campaign.read_text()}study: driving_agent_resilience\n")
     asked = [str(problem) for problem in check_library(toycar, "toycar")]
     [new] = [problem for problem in asked if problem not in told]
-    assert str(references / "paper_summary.yaml") in new
+    assert new.startswith(str(references))
+    assert "no paper_summary.yaml, paper_times.yaml" in new
+
+
+def test_a_library_without_any_is_told_only_if_a_campaign_asks(toycar: Workspace) -> None:
+    """No published number is needed where no campaign asks for the study."""
+    told = [str(problem) for problem in check_library(toycar, "toycar")]
+    assert not any("references" in problem for problem in told)
+    campaign = toycar.library / "campaigns" / "small.yaml"
+    campaign.write_text(f"{campaign.read_text()}study: driving_agent_resilience\n")
+    asked = [str(problem) for problem in check_library(toycar, "toycar")]
+    [new] = [problem for problem in asked if problem not in told]
+    assert new.startswith(f"{toycar.library / 'references'}: the published numbers are not in this library")

@@ -55,3 +55,13 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
         assert "t_h1 > t_activation" in text
     assert "action_" not in written.markdown.read_text()
     assert "<figure" not in written.page.read_text().replace('el("figure"', "")
+
+
+def test_a_library_without_the_papers_numbers_is_said_in_the_origin(run: Path, toycar: Workspace) -> None:
+    """Both forms name the study and say that its data are not there; the library that ships has them."""
+    said = "the published numbers are not in this library"
+    for workspace, expected in ((toycar, True), (HERE, False)):
+        written = building.write(run, workspace)
+        for text in (written.markdown.read_text(), written.page.read_text()):
+            assert "driving_agent_resilience (Rubaiyat" in text
+            assert (said in text) is expected
