@@ -8,13 +8,12 @@ code 1 where 11,280 experiments do not open in time.
 """
 
 import argparse
-import csv
 import json
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -23,19 +22,20 @@ import numpy as np
 from growth import record
 from markupsafe import Markup
 
-from mutator.campaigns.plans import make_plan
-from mutator.model import Experiment, Record
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes import results
-from mutator.outcomes import rows as tables
-from mutator.outcomes.columns import COLUMNS
+from mutator.outcomes.reader import Results
+from mutator.outcomes.rows import outcome_counts
 from mutator.report import browse as report_browse
 from mutator.report import page as report_page
 from mutator.report import series as report_series
 from mutator.report.browse import Browse
 from mutator.report.page import Content
 from mutator.review.groups import shapes
+from mutator.store.records import SCHEMA, LineWriter
 from mutator.web import embedded
 from mutator.workspace import Workspace
 
@@ -66,16 +66,27 @@ STEPS = {  # what a reader does first
 }
 
 
-def experiments_of(workspace: Workspace, size: int) -> list[Experiment]:
-    """The paper's experiments, with other seeds where there are too few."""
-    planned = make_plan(workspace, "paper").experiments
-    return [replace(planned[i % len(planned)], seed=1 + i // len(planned)) for i in range(size)]
+def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
+    """Write a run folder with results, of made-up records; its experiments.
+
+    They are those of the paper's campaign, with other seeds where there are too few.
+    """
+    plan = make_plan(workspace, "paper")
+    known = plan.experiments
+    experiments = [replace(known[i % len(known)], seed=1 + i // len(known)) for i in range(size)]
+    freeze(replace(plan, experiments=tuple(experiments), chunks=(size,)), out, workspace)
+    lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    for number, experiment in enumerate(experiments):
+        lines.append(asdict(record(experiment, number)))
+    lines.close()
+    results.build(out)
+    return experiments
 
 
 def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator[tuple[str, str, str]]:
     """The diffs without the probe: an experiment has the same with another seed."""
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
-    known: dict[tuple[Any, ...], str] = {}
+    known: dict[tuple[str, Trigger], str] = {}
     for experiment in experiments:
         key = (experiment.fault.id, experiment.trigger)
         if key not in known:
@@ -84,11 +95,11 @@ def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator
 
 
 def made_series(workspace: Workspace, records: Sequence[Record]) -> Iterator[Markup]:
-    """As many series as a page carries, of traces that are as long as real ones."""
+    """A series of each record, of traces that are as long as real ones."""
     manifest = workspace.manifest("openpilot")
     draw = np.random.default_rng(1)
     channels = [channel.name for channel in (*manifest.compared, *manifest.plotted)]
-    for one in records[: report_series.CHOSEN]:
+    for one in records:
         golden = {"t": np.arange(3000) / 100}
         faulty = {"t": np.arange(3000) / 100}
         for name in channels:
@@ -102,21 +113,16 @@ def made_series(workspace: Workspace, records: Sequence[Record]) -> Iterator[Mar
 def write(size: int, out: Path) -> dict[str, float]:
     """Write the page of so many experiments; what it took and how large its parts are, KB."""
     workspace = Workspace.find(root=ROOT)
-    experiments = experiments_of(workspace, size)
-    records = [record(experiment, number) for number, experiment in enumerate(experiments)]
-    made = [results.row(e, r) for e, r in zip(experiments, records, strict=True)]
-    with (out / "results.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, [*COLUMNS, "variant", "aim", "condition", "detail"], restval="")
-        writer.writeheader()
-        writer.writerows(made)
+    experiments = {e.id: e for e in written_run(workspace, size, out)}
     began = process_time()
-    rows = tables.read_results(out / "results.csv")
-    with (out / "results.csv").open(newline="") as file:
-        lines = list(csv.DictReader(file))
+    found = Results.of_run(out)
+    rows, lines = found.rows(), list(found.lines())
     table = embedded(report_browse.table(rows, lines), "table")
     table_s = process_time() - began
-    details = report_browse.details(experiments, shapes(patches(workspace, experiments)), rows)
+    shown = [experiments[row.experiment_id] for row in rows]
+    details = report_browse.details(shown, shapes(patches(workspace, shown)), rows)
     detail = embedded(details, "details")
+    records = [record(experiment, n) for n, experiment in enumerate(shown[: report_series.CHOSEN])]
     series = list(made_series(workspace, records))
     browse = Browse(
         facts=Markup(json.dumps({"filmed": True, "series": []})),
@@ -127,7 +133,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     content = Content(
         name=f"{size} experiments",
         alarm="",
-        outcomes=tables.outcome_counts(rows),
+        outcomes=outcome_counts(rows),
         planned="",
         notes="",
         panels=(),
@@ -174,8 +180,9 @@ def main() -> int:
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
         browser = playwright.chromium.launch(executable_path=browser_path, args=flags)
         for size in options.sizes:
-            found[size] = write(size, Path(folder))
-            found[size] |= opened(browser, Path(folder) / "index.html", options.repeat)
+            out = Path(folder) / str(size)
+            found[size] = write(size, out)
+            found[size] |= opened(browser, out / "index.html", options.repeat)
         browser.close()
     names = list(next(iter(found.values())))
     print("experiments " + " ".join(f"{name:>13}" for name in names))

@@ -14,11 +14,16 @@ _MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table of texts. Each row has a cell for each head; columns in `right` are aligned to the right."""
+    """A table of texts. Each row has a cell for each head; columns in `right` are aligned to the right.
+
+    A cell may be Markup, which HTML shows as it is: a link, say. With `named` the first cell of a row is its
+    head.
+    """
 
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]
     right: Collection[int] = ()
+    named: bool = False
 
     def as_text(self) -> str:
         """Columns padded to equal width, two spaces between them, no trailing spaces."""
@@ -41,23 +46,37 @@ class Table:
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
     def as_html(self, style: str = "") -> "Markup":
-        """A scrollable HTML table of class `style`, every text escaped.
+        """A scrollable HTML table of class `style`, every text escaped; no head if all heads are empty.
 
-        A row whose first cell is empty continues the row above it and gets the class `group`.
+        A row whose first cell is empty continues the row above it and gets the class `group`; cells of the
+        columns in `right` get the class `number`.
         """
         from markupsafe import Markup
 
-        cell, head = Markup("<td>{}</td>").format, Markup('<th scope="col">{}</th>').format
+        cells = [Markup("<td>{}</td>").format] * len(self.heads)
+        for index in self.right:
+            cells[index] = Markup('<td class="number">{}</td>').format
+        if self.named:
+            cells[0] = Markup('<th scope="row">{}</th>').format
         rows = [
             Markup("<tr{}>{}</tr>\n").format(
-                Markup("" if row[0] else ' class="group"'), Markup("").join(map(cell, row))
+                Markup("" if row[0] else ' class="group"'),
+                Markup("").join(cell(text) for cell, text in zip(cells, row, strict=True)),
             )
             for row in self.rows
         ]
         return Markup(
             '<div class="scroll" tabindex="0" role="region" aria-label="Table"><table class="{}">\n'
-            "<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody></table></div>"
-        ).format(style, Markup("").join(map(head, self.heads)), Markup("").join(rows))
+            "{}<tbody>\n{}</tbody></table></div>"
+        ).format(style, self._html_head(), Markup("").join(rows))
+
+    def _html_head(self) -> "Markup":
+        from markupsafe import Markup
+
+        if not any(self.heads):
+            return Markup("")
+        heads = Markup("").join(Markup('<th scope="col">{}</th>').format(head) for head in self.heads)
+        return Markup("<thead><tr>{}</tr></thead>\n").format(heads)
 
 
 def markdown_line(text: str) -> str:

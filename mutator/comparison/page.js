@@ -2,14 +2,14 @@
 /* Filters the table of changed experiments by text and by kinds of change, and shows the first of what is left;
    the choice is kept in the fragment. */
 (() => {
-  const table = document.getElementById("changed");
-  if (!table) return;
-  const limit = Number(table.dataset.limit);
+  const place = document.getElementById("changed");
+  if (!place) return;
+  const limit = Number(place.dataset.limit);
   const words = document.getElementById("words");
   const shown = document.getElementById("shown");
   const buttons = [...document.querySelectorAll("button[data-change]")];
-  const rows = [...table.rows].slice(1).map((row) => ({
-    row, text: row.textContent.toLowerCase(), changes: row.dataset.changes.split(" "),
+  const rows = [...place.querySelectorAll("tbody tr")].map((row) => ({
+    row, text: row.textContent.toLowerCase(), changes: [...row.querySelectorAll(".change")].map((e) => e.textContent),
   }));
 
   /** Show the rows that have all chosen changes and all words, as many as the limit allows. */
@@ -48,4 +48,5 @@
   words.addEventListener("input", changed);
   addEventListener("hashchange", restore);
   restore();
+  place.dataset.filtered = "";
 })();

@@ -3,7 +3,7 @@
 import csv
 import io
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files as package_files
 from pathlib import Path
@@ -12,6 +12,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator._common.tables import Table, markdown_line
 from mutator._common.text import counted
 from mutator.comparison.comparison import Comparison, Gate, ending_change
+from mutator.comparison.differences import Fact
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.outcomes.rows import Row
 from mutator.web import asset
@@ -87,9 +88,9 @@ def markdown(comparison: Comparison) -> str:
     """The comparison as Markdown."""
     c = comparison
     parts = [f"# {c.names.a} against {c.names.b}", summary(c), *c.remarks, "## What differs between the runs"]
-    differing = [[f.name, f.a, f.b] for f in c.facts if f.differs]
-    if differing:
-        parts.append(Table(heads=("what", c.names.a, c.names.b), rows=differing).as_markdown())
+    differing = _facts(c, [fact for fact in c.facts if fact.differs])
+    if differing.rows:
+        parts.append(differing.as_markdown())
     else:
         parts.append("Nothing: the same sources, choices and versions.")
     parts.append(files_text(c))
@@ -112,9 +113,16 @@ def _listed(pairs: tuple[Pair, ...]) -> str:
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 
 
+def _facts(comparison: Comparison, facts: Sequence[Fact]) -> Table:
+    names = comparison.names
+    return Table(
+        heads=("what", names.a, names.b), rows=[(fact.name, fact.a, fact.b) for fact in facts], named=True
+    )
+
+
 def _reasons(comparison: Comparison) -> Table:
     rows = [(why, str(number)) for why, number in reasons(comparison)]
-    return Table(heads=("why", "experiments"), rows=rows)
+    return Table(heads=("why", "experiments"), rows=rows, right=(1,))
 
 
 def page(comparison: Comparison) -> str:
@@ -129,13 +137,13 @@ def page(comparison: Comparison) -> str:
     return environment.from_string(_own("page.html")).render(
         c=comparison,
         summary=summary(comparison),
-        differing=[fact for fact in comparison.facts if fact.differs],
+        differing=_facts(comparison, [fact for fact in comparison.facts if fact.differs]),
+        origin=_facts(comparison, [f for f in comparison.facts if not f.name.startswith("package ")]),
         files=files_text(comparison),
         counts=[(change.value, counts[change]) for change in Change if counts[change]],
-        reasons=reasons(comparison),
-        lines=list(map(_shown, comparison.changed)),
+        reasons=_reasons(comparison),
+        changed=_changed(comparison),
         limit=SHOWN,
-        bad=_BAD,
         base_css=Markup(asset("base.css")),
         script=Markup(_own("page.js")),
     )
@@ -145,27 +153,41 @@ def _own(name: str) -> str:
     return package_files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-def _shown(pair: Pair) -> dict[str, object]:
-    """What the page's table shows of a pair."""
-    same = pair.a.id == pair.b.id
-    return {
-        "words": pair.b.label,
-        "changes": [change.value for change in Change if change in pair.changes],
-        "sides": [_shown_side(pair.row_a), _shown_side(pair.row_b)],
-        "ids": [pair.a.id] if same else [pair.a.id, pair.b.id],
-    }
+def _changed(comparison: Comparison) -> Table:
+    """The experiments that changed, as the page lists them; its script filters the rows by their changes."""
+    a, b = comparison.names.a, comparison.names.b
+    heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "ids")
+    return Table(heads=heads, rows=list(map(_changed_row, comparison.changed)), right=(4, 5))
 
 
-def _shown_side(row: Row) -> dict[str, str]:
-    time = time_to_hazard(row)
+def _changed_row(pair: Pair) -> tuple[str, ...]:
+    from markupsafe import Markup
+
+    badge = Markup('<span class="change{}">{}</span> ').format
+    changes = [change.value for change in Change if change in pair.changes]
+    sides = (pair.row_a, pair.row_b)
+    return (
+        pair.b.label,
+        Markup("").join(badge(" bad" if change in _BAD else "", change) for change in changes),
+        *map(_ending, sides),
+        *map(_hazard_time, sides),
+        Markup("<br>").join(map(Markup("<code>{}</code>").format, dict.fromkeys((pair.a.id, pair.b.id)))),
+    )
+
+
+def _ending(row: Row) -> str:
+    """How a run ended, as a badge, then its hazards, alerts and what was said."""
+    from markupsafe import Markup
+
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
     if row.detail:
         details.append(row.detail)
-    return {
-        "ending": row.ending,
-        "details": ", ".join(details),
-        "time": "" if time is None else f"{time:.2f}",
-    }
+    return Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
+
+
+def _hazard_time(row: Row) -> str:
+    time = time_to_hazard(row)
+    return "" if time is None else f"{time:.2f}"
 
 
 def pair_line(pair: Pair) -> dict[str, object]:

@@ -113,6 +113,11 @@ def tagged(code: str, tag: str, guarded: int = 0) -> str:
     return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
 
 
+def tag_words() -> dict[str, Any]:
+    """What a page needs to find injected lines: the mark before a tag, the tags of the probe's own lines."""
+    return {"mark": _MARK, "probe": [IMPORT_TAG, OBSERVE_TAG]}
+
+
 def import_statement(package: str) -> str:
     """The tagged line that imports the probe."""
     return tagged(f"from {package} import {PROBE_NAME}", IMPORT_TAG)

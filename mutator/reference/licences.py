@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
+from mutator._common.tables import Table
 from mutator.errors import MutatorError
 
 PAGE = Path("docs", "reference", "licences.md")
@@ -25,8 +26,6 @@ those of `av` and `opencv-python-headless` carry FFmpeg; the `.dist-info` of suc
 *Needed by* says who asks for a package: `mutator` to run; an extra of it (`test`, `dev`, `train`); or only
 other packages of this table.
 
-| package | needed by | licence |
-|---|---|---|
 """
 _ROW = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
 
@@ -36,11 +35,9 @@ def write_licences(clone: Path) -> None:
     page = clone / PAGE
     known = table_of(page.read_text(encoding="utf-8")) if page.exists() else {}
     direct = _needed_by(clone)
-    rows = (
-        f"| {name} | {direct.get(name, 'others')} | {_licence(name, known)} |\n"
-        for name in constrained(clone)
-    )
-    page.write_text(_HEAD + "".join(rows), encoding="utf-8")
+    rows = [(name, direct.get(name, "others"), _licence(name, known)) for name in constrained(clone)]
+    table = Table(heads=("package", "needed by", "licence"), rows=rows).as_markdown(escape=False)
+    page.write_text(f"{_HEAD}{table}\n", encoding="utf-8")
 
 
 def table_of(page: str) -> dict[str, str]:

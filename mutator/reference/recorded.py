@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
+from mutator._common.tables import Table
 from mutator.outcomes.columns import PLAN_COLUMNS, TIMINGS, Column, result_columns
 from mutator.reference.tables import generated
 from mutator.targets.manifest import Channel, TargetManifest
@@ -53,11 +54,9 @@ def _table_of(manifest: TargetManifest) -> Iterator[str]:
 
 
 def _columns(columns: Iterable[Column]) -> Iterator[str]:
-    yield "| column | type | Parquet | unit | meaning |"
-    yield "|---|---|---|---|---|"
-    for column in columns:
-        cells = (f"`{column.name}`", column.type, _ARROW[column.type], column.unit or "-", column.about)
-        yield f"| {' | '.join(cells)} |"
+    heads = ("column", "type", "Parquet", "unit", "meaning")
+    rows = [(f"`{c.name}`", c.type, _ARROW[c.type], c.unit or "-", c.about) for c in columns]
+    yield Table(heads=heads, rows=rows).as_markdown(escape=False)
     yield ""
 
 
@@ -72,9 +71,9 @@ def channels(workspace: Workspace) -> str:
         "tables alone, and stand in the names there\n([units](fault-spec.md#units)).\n",
         "## What triggers can ask\n",
         "Ground truth, the same for every target; `hwt` and `rs` are derived.\n",
-        "| variable | unit | meaning |",
-        "|---|---|---|",
-        *(f"| `{name}` | {OBSERVED[name][0]} | {OBSERVED[name][1]} |" for name in VARIABLES),
+        Table(
+            heads=("variable", "unit", "meaning"), rows=[(f"`{name}`", *OBSERVED[name]) for name in VARIABLES]
+        ).as_markdown(escape=False),
         "",
     ]
     for manifest in manifests:
@@ -88,19 +87,17 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
         f"A trace is an array for each channel in `{manifest.trace_file}`, with a value for each step of "
         f"{manifest.step_s:g} s; `{manifest.time_channel}` is the time in s.\n"
     )
-    yield "| channel | unit | role | meaning |"
-    yield "|---|---|---|---|"
-    yield from (_channel(channel, "compared with golden") for channel in manifest.compared)
-    yield from (_channel(channel, "plotted") for channel in manifest.plotted)
+    rows = [_channel(channel, "compared with golden") for channel in manifest.compared]
+    rows += [_channel(channel, "plotted") for channel in manifest.plotted]
+    yield Table(heads=("channel", "unit", "role", "meaning"), rows=rows).as_markdown(escape=False)
     yield ""
     yield f"Hazards: {', '.join(manifest.hazards)}. Alerts that count: {', '.join(manifest.alerts)}.\n"
-    yield "| change of the scenario | arguments it adds |"
-    yield "|---|---|"
-    yield from (f"| `{name}` | `{' '.join(words)}` |" for name, words in manifest.changes.items())
+    changes = [(f"`{name}`", f"`{' '.join(words)}`") for name, words in manifest.changes.items()]
+    yield Table(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(escape=False)
     yield ""
 
 
-def _channel(channel: Channel, role: str) -> str:
+def _channel(channel: Channel, role: str) -> tuple[str, str, str, str]:
     if channel.tolerance:
         role += f", to {channel.tolerance:g}"
-    return f"| `{channel.name}` | {channel.unit} | {role} | {channel.about or '-'} |"
+    return f"`{channel.name}`", channel.unit, role, channel.about or "-"

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from mutator._common.tables import Table
 from mutator.config.yaml_files import StrictModel
 from mutator.reference.schemas import definitions
 
@@ -85,12 +86,17 @@ class _Tables:
 
     def keys(self, part: dict[str, Any]) -> Iterator[str]:
         """The table of a model's keys."""
-        yield "| key | type | default | meaning |"
-        yield "|---|---|---|---|"
         required = part.get("required", [])
-        for key, value in part["properties"].items():
-            default = "needed" if key in required else _default(value)
-            yield f"| `{key}` | {self._type(value)} | {default} | {value['description']} |"
+        rows = [
+            (
+                f"`{key}`",
+                self._type(value),
+                "needed" if key in required else _default(value),
+                value["description"],
+            )
+            for key, value in part["properties"].items()
+        ]
+        yield Table(heads=("key", "type", "default", "meaning"), rows=rows).as_markdown(escape=False)
         yield ""
 
     def _type(self, value: dict[str, Any]) -> str:

@@ -40,7 +40,7 @@ def engine_summary(folder: RunFolder) -> EngineSummary | None:
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder)
-    table = Table(heads=("how", "experiments"), rows=list(_lines(ways)), right=(1,))
+    table = Table(heads=("how", "experiments"), rows=list(_lines(ways)))
     return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
 
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 from mutator._common.text import counted
 from mutator.model import Outcome
+from mutator.mutants.probe import tag_words
 from mutator.report.browse import Browse
 from mutator.report.panel import Panel, rendered
-from mutator.web import asset
+from mutator.web import asset, plainly_embedded
 
 STYLES = ("base.css", "report.css")
 SCRIPTS = (  # each uses those before it
@@ -64,6 +65,7 @@ def page_html(content: Content) -> str:
     html = rendered(
         asset("report.html"),
         content=content,
+        tags=Markup(plainly_embedded(tag_words(), "tags")),
         outcome_names=[outcome.value for outcome in Outcome],
         styles=[Markup(asset(name)) for name in STYLES],
         scripts=[Markup(asset(name)) for name in SCRIPTS],

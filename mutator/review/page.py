@@ -10,10 +10,11 @@ from markupsafe import Markup
 
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
+from mutator.mutants.probe import tag_words
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Review, State
 from mutator.review.readable_groups import condition_lines, value_table
-from mutator.web import asset, embedded
+from mutator.web import asset, embedded, plainly_embedded
 
 STYLES = ("base.css", "review.css")
 SCRIPTS = ("dom.js", "packed.js", "diff.js", "review.js")
@@ -44,6 +45,7 @@ def render_page(data: dict[str, Any]) -> str:
         target=data["target"],
         count=len(data["groups"]),
         styles=[Markup(asset(name)) for name in STYLES],
+        tags=Markup(plainly_embedded(tag_words(), "tags")),
         data=Markup(embedded(data, "review")),
         scripts=[Markup(asset(name)) for name in SCRIPTS],
     )

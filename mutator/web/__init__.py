@@ -27,6 +27,12 @@ def packed(value: Any) -> str:
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode("ascii")
 
 
+def plainly_embedded(value: Any, name: str) -> str:
+    """A script element with the id `name` that carries `value` as JSON, for scripts that need it at once."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{text}</script>'
+
+
 def embedded(value: Any, name: str) -> str:
     """A script element with the id `name` that carries `value`; `Packed.read(name)` gives it back."""
     return f'<script type="application/octet-stream+gzip" id="{name}">{packed(value)}</script>'

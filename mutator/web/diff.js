@@ -1,16 +1,23 @@
 "use strict";
 // Unified diffs made readable: one column or two, Python in colours, the tags of injected lines dimmed.
 //
-// renderDiff(element, patchText, {mode: "unified" | "split"}) replaces what is in `element`.
+// renderDiff(element, patchText, {mode: "unified" | "split"}) replaces what is in `element`. What tags look like stands
+// in the page's element `tags` (mutants/probe.py: tag_words).
 
 const Diff = (() => {
   const { el } = Dom;
   const KEYWORDS = new Set(
     ("and as assert async await break class continue def del elif else except finally for from global if import in is " +
       "lambda nonlocal not or pass raise return try while with yield True False None self").split(" "));
+  const TAGS = JSON.parse(document.getElementById("tags").textContent);
+  const MARK = TAGS.mark.replace(/[^\w\s]/g, "\\$&");
+  const TAG = new RegExp(`${MARK}\\S+.*$`);
+  // What the probe needs to be called at all is the same in every mutant.
+  const PROBE = new RegExp(`${MARK}(?:${TAGS.probe.join("|")})\\b`);
   // In this order: holes of a shape, the tag of an injected line, comment, strings (whole or to the line's end), number, word.
-  const TOKENS =
-    /(⟨[^⟩]*⟩)|(#\s*fi:\S+.*$)|(#.*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/g;
+  const REST =
+    /(#.*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/;
+  const TOKENS = new RegExp(`(⟨[^⟩]*⟩)|(${TAG.source})|${REST.source}`, "g");
   const CLASSES = [null, "hole", "tag", "comment", "string", "number", "word"];
 
   /** The files of a patch: [{path, isNew, hunks: [{head, lines: [{sign, text, old, new}]}]}]. */
@@ -109,8 +116,7 @@ const Diff = (() => {
     return el(`table.diff.${split ? "split" : "unified"}`, { "aria-label": `Changes of ${path}` }, widths, el("tbody", {}, body));
   }
 
-  // What the probe needs to be called at all is the same in every mutant: it is there, behind a fold.
-  const PROBE = /#\s*fi:(probe|observe)\b/;
+  // The probe's own lines are there, behind a fold.
   const changes = (hunk) => hunk.lines.filter((line) => line.sign !== " ");
   const isProbe = (hunk) => changes(hunk).every((line) => PROBE.test(line.text));
 
@@ -138,7 +144,7 @@ const Diff = (() => {
       path: file.path,
       lines: file.hunks.flatMap((h) => h.lines)
         .filter((l) => l.sign === "+" && !PROBE.test(l.text))
-        .map((l) => l.text.replace(/\s*#\s*fi:\S+\s*$/, "")),
+        .map((l) => l.text.replace(TAG, "").trimEnd()),
     })).filter((file) => file.lines.length);
   }
 

@@ -8,22 +8,14 @@ from mutator.outcomes.rows import Row
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
+_HEADS = ("status", "experiment", "fault", "scenario", "what was said")
 LISTED, PAGE_LISTED = 30, 200  # runs that the Markdown and the page list; the page can find all
 _HTML = """\
 <h2>Runs that did not end well</h2>
 <p>A harness error says nothing about its fault and is in no count.</p>
-<div class="scroll"><table>
-<thead><tr><th>status</th><th>experiment</th><th>fault</th><th>scenario</th>
-<th>what was said</th></tr></thead>
-<tbody>
-{% for row in failed[:listed] %}
-<tr><td><span class="ending {{ row.status.value }}">{{ row.status.value }}</span></td>
-<td><a href="#e={{ row.experiment_id }}"><code>{{ row.experiment_id }}</code></a></td>
-<td>{{ row.fault }}</td><td>{{ row.scenario }}</td><td>{{ row.detail }}</td></tr>
-{% endfor %}
-</tbody></table></div>
-{% if failed | length > listed %}
-<p>{{ failed | length - listed }} more: <a href="#status={{ failings | join(',') }}">all of them</a>.</p>
+{{ table.as_html() }}
+{% if more > 0 %}
+<p>{{ more }} more: <a href="#status={{ failings | join(',') }}">all of them</a>.</p>
 {% endif %}
 """
 
@@ -39,13 +31,25 @@ def failed_panel(run: ReportedRun) -> Panel | None:
         anchor="failed",
         link="Failed runs",
         markdown=f"## Runs that did not end well\n\n{_markdown(failed)}",
-        html=rendered(_HTML, failed=failed, listed=PAGE_LISTED, failings=failings),
+        html=rendered(_HTML, table=_linked(failed), more=len(failed) - PAGE_LISTED, failings=failings),
     )
 
 
 def _markdown(failed: Sequence[Row]) -> str:
     rows = [(r.status.value, r.experiment_id, r.fault, r.scenario, r.detail) for r in failed[:LISTED]]
-    heads = ("status", "experiment", "fault", "scenario", "what was said")
-    table = Table(heads=heads, rows=rows).as_markdown()
+    table = Table(heads=_HEADS, rows=rows).as_markdown()
     more = len(failed) - LISTED
     return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
+
+
+def _linked(failed: Sequence[Row]) -> Table:
+    """The table of the page: each experiment a link that opens it."""
+    from markupsafe import Markup
+
+    ending = Markup('<span class="ending {0}">{0}</span>').format
+    link = Markup('<a href="#e={0}"><code>{0}</code></a>').format
+    rows = [
+        (ending(r.status.value), link(r.experiment_id), r.fault, r.scenario, r.detail)
+        for r in failed[:PAGE_LISTED]
+    ]
+    return Table(heads=_HEADS, rows=rows)

@@ -14,11 +14,7 @@ _HTML = """\
 {{ engines.table.as_html("plain") }}
 {% endif %}
 <h2>Where this comes from</h2>
-<div class="scroll"><table class="plain facts"><tbody>
-{% for name, value in facts %}
-<tr><th scope="row">{{ name }}</th><td>{{ value }}</td></tr>
-{% endfor %}
-</tbody></table></div>
+{{ facts.as_html("plain facts") }}
 """
 
 
@@ -29,7 +25,7 @@ def origin_panel(run: ReportedRun) -> Panel:
     if engines:
         parts += ["## How the experiments were run", engines.proof, engines.table.as_markdown()]
     parts += ["## Where this comes from", Table(heads=("what", "value"), rows=facts).as_markdown()]
-    html = rendered(_HTML, engines=engines, facts=facts)
+    html = rendered(_HTML, engines=engines, facts=Table(heads=("", ""), rows=facts, named=True))
     return Panel(anchor="origin", link="Origin", markdown="\n\n".join(parts), html=html)
 
 

@@ -1,5 +1,7 @@
 """One table, three ways to show it."""
 
+from markupsafe import Markup
+
 from mutator._common.tables import Table
 
 
@@ -43,3 +45,17 @@ def test_html_escapes_texts_and_marks_continued_rows() -> None:
     assert '<th scope="col">&lt;b&gt;</th>' in html
     assert "<tr><td>&lt;i&gt; &amp; {0}</td></tr>" in html
     assert '<tr class="group"><td></td></tr>' in html
+
+
+def test_html_shows_markup_as_it_is() -> None:
+    """A cell may be a link; what a caller did not mark is text."""
+    link = Markup('<a href="#e=1">{}</a>').format("<1>")
+    html = Table(heads=["id", "said"], rows=[[link, "<b>"]]).as_html()
+    assert '<tr><td><a href="#e=1">&lt;1&gt;</a></td><td>&lt;b&gt;</td></tr>' in html
+
+
+def test_html_has_heads_of_rows_and_columns_of_numbers() -> None:
+    """Facts have a head for each row and may have none for the columns; numbers have a class of their own."""
+    html = Table(heads=("", ""), rows=[("runs", "7")], right=(1,), named=True).as_html()
+    assert '<tr><th scope="row">runs</th><td class="number">7</td></tr>' in html
+    assert "<thead>" not in html

@@ -2,6 +2,7 @@
 
 import math
 import random
+import re
 import types
 from typing import Any
 
@@ -299,6 +300,11 @@ def test_reports_are_read(clone: Workspace) -> None:
     assert not contract.was_triggered(None)
 
 
-def test_pages_know_the_tags() -> None:
-    """The script that shows diffs cannot ask the contract, so it must spell the tags as the contract does."""
-    assert f"fi:({contract.IMPORT_TAG}|{contract.OBSERVE_TAG})" in asset("diff.js")
+def test_pages_are_told_the_tags() -> None:
+    """The script that shows diffs spells no tag: the page carries the mark and the probe's own tags."""
+    words = contract.tag_words()
+    for tag in words["probe"]:
+        assert contract.tagged("x", tag) == f"x  {words['mark']}{tag}"
+    assert words["probe"] == [contract.IMPORT_TAG, contract.OBSERVE_TAG]
+    assert "fi:" not in asset("diff.js")
+    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("diff.js"))

@@ -4,6 +4,8 @@ import importlib.util
 import re
 from pathlib import Path
 
+from mutator._common import caches
+
 CLONE = Path(__file__).parents[4]
 PAGE = (CLONE / "docs" / "reference" / "formats.md").read_text(encoding="utf-8")
 BEFORE, RESERVED = PAGE.split("\n## Reserved\n")
@@ -37,6 +39,13 @@ def test_every_module_in_the_page_exists() -> None:
     modules = set(re.findall(r"`((?:mutator|selfdrive)\.[\w.]+)`", PAGE))
     assert len(modules) > 40
     assert sorted(name for name in modules if importlib.util.find_spec(name) is None) == []
+
+
+def test_every_cache_has_a_line() -> None:
+    """The table names the folders that `mutator cache` lists, and no others."""
+    table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
+    folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
+    assert folders == {caches.CHECKS, caches.TARGETS, caches.SHIPPED}
 
 
 def test_every_file_of_a_library_has_a_line() -> None:

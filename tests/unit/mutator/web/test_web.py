@@ -21,6 +21,14 @@ def test_carried_data_come_back_and_are_the_same_each_time() -> None:
     )
 
 
+def test_plain_data_cannot_end_their_element() -> None:
+    """JSON that a script can read at once, whatever is in it."""
+    element = web.plainly_embedded({"text": "</script><!--"}, "here")
+    assert element.count("<") == 2
+    text = element.removeprefix('<script type="application/json" id="here">').removesuffix("</script>")
+    assert json.loads(text) == {"text": "</script><!--"}
+
+
 def test_what_json_does_not_know_is_refused() -> None:
     """A page could not read it: NaN has to be told as something else."""
     with pytest.raises(ValueError, match="JSON"):
