@@ -69,7 +69,9 @@ class RunComparison:
         """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "new-crash")`."""
         known = [gate.value for gate in Gate]
         if strangers := [gate for gate in gates if gate not in known]:
-            raise MutatorError(f"gate '{strangers[0]}'", expected=f"one of {', '.join(known)}")
+            raise MutatorError(
+                f"gate '{strangers[0]}'", argument="gates", expected=f"one of {', '.join(known)}"
+            )
         return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
 
     def write(self, out: str | Path | None = None) -> pages.Written:

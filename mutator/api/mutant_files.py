@@ -52,7 +52,9 @@ def pairs_of_specs(
         faults = bench.faults(FaultChoice(spec=name, seed=seed, reading=reading))
         pairs += [(fault, trigger) for fault in faults for trigger in made]
     if not pairs:
-        raise MutatorError("no spec named", remedy="name specs (`mutator list specs`) or --campaign")
+        raise MutatorError(
+            "no spec named", argument="specs", remedy="name specs (`mutator list specs`), or a `campaign`"
+        )
     return pairs
 
 
@@ -78,7 +80,11 @@ def write_mutants(
     make_folder(out)
     if any(out.iterdir()):
         raise MutatorError(
-            "not empty", where=out, expected="a new or empty folder", remedy="choose another --out"
+            "not empty",
+            where=out,
+            argument="out",
+            expected="a new or empty folder",
+            remedy="choose another `out`",
         )
     (out / "patches").mkdir()
     index: dict[str, dict[str, str]] = {}
@@ -103,7 +109,9 @@ def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
             continue
         hits = fnmatch.filter([s.name for s in workspace.specs()], text)
         if not hits:
-            raise MutatorError(f"no spec matches {text!r}", remedy="see `mutator list specs`")
+            raise MutatorError(
+                f"no spec matches {text!r}", argument="specs", remedy="see `mutator list specs`"
+            )
         yield from hits
 
 

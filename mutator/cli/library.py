@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mutator._common.text import counted
-from mutator.cli.console import Terminal, error_text, short_path
+from mutator.cli.console import Terminal, error_text, short_path, with_options
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -187,7 +187,7 @@ def doctor(as_json: Json = False, *, place: Place) -> None:
         try:
             findings = examine(place.workspace())
         except MutatorError as e:
-            findings = examine(e)
+            findings = examine(with_options(e))
     if as_json:
         terminal.emit(findings)
     terminal.table(

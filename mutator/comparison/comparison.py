@@ -131,7 +131,7 @@ def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:
             f"({len(b.rows)})",
             where=run_b,
             expected="runs of the same faults, scenarios and triggers",
-            remedy="compare runs of one campaign, or widen --only",
+            remedy="compare runs of one campaign, or widen `only`",
         )
     return Comparison(a=a, b=b, matching=matching)
 
