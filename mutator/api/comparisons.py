@@ -12,7 +12,7 @@ from mutator.api.runs import Run
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Finding, Gate
-from mutator.comparison.pairs import Pair
+from mutator.comparison.pairs import Change, Pair
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -42,6 +42,21 @@ class RunComparison:
     def summary(self) -> str:
         """The comparison in a few sentences."""
         return pages.summary(self.comparison)
+
+    @property
+    def files_text(self) -> str:
+        """Which of the target's files differ, in words."""
+        return pages.files_text(self.comparison)
+
+    @property
+    def not_compared(self) -> dict[str, int]:
+        """Why experiments could not be compared, and how many."""
+        return dict(pages.reasons(self.comparison))
+
+    @property
+    def changes(self) -> dict[str, int]:
+        """How many pairs show each kind of change."""
+        return {change.value: len(self.comparison.having(change)) for change in Change}
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":

@@ -130,6 +130,7 @@ def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:
             f"no experiment of {a.name} ({len(a.rows)} with a result) has a partner in {b.name} "
             f"({len(b.rows)})",
             where=run_b,
+            argument="only",
             expected="runs of the same faults, scenarios and triggers",
             remedy="compare runs of one campaign, or widen `only`",
         )
