@@ -10,10 +10,20 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.version import VERSION
 
 if TYPE_CHECKING:
+    from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
     from mutator.api.campaigns import IncompleteRun, plan, run
     from mutator.api.comparisons import RunComparison, compare
     from mutator.api.experiment_results import TraceFrames
+    from mutator.api.libraries import (
+        check_hazard_analysis,
+        check_library,
+        doctor,
+        draw_control_structure,
+        init_library,
+    )
+    from mutator.api.mutant_files import MutantSet
     from mutator.api.mutants import BuiltMutant, build_mutant
+    from mutator.api.reviews import ReviewedGroups, load_review
     from mutator.api.runs import Run, RunExperiment, load_run, merge_runs
     from mutator.api.trials import Trial, try_fault
     from mutator.campaigns.plans import Choices, Plan
@@ -22,6 +32,7 @@ if TYPE_CHECKING:
     from mutator.execution.session import Summary
     from mutator.exports import Format
     from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
+    from mutator.report.film import Shot
     from mutator.store.records import Progress
     from mutator.workspace import Workspace
 
@@ -29,10 +40,20 @@ __version__ = VERSION
 
 # module -> names; pandas, libcst and pytest are not paid for by who only wants the version
 _HOMES = {
+    "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("IncompleteRun", "plan", "run"),
     "mutator.api.comparisons": ("RunComparison", "compare"),
     "mutator.api.experiment_results": ("TraceFrames",),
+    "mutator.api.libraries": (
+        "check_hazard_analysis",
+        "check_library",
+        "doctor",
+        "draw_control_structure",
+        "init_library",
+    ),
+    "mutator.api.mutant_files": ("MutantSet",),
     "mutator.api.mutants": ("BuiltMutant", "build_mutant"),
+    "mutator.api.reviews": ("ReviewedGroups", "load_review"),
     "mutator.api.runs": ("Run", "RunExperiment", "load_run", "merge_runs"),
     "mutator.api.trials": ("Trial", "try_fault"),
     "mutator.campaigns.plans": ("Choices", "Plan"),
@@ -41,6 +62,7 @@ _HOMES = {
     "mutator.execution.session": ("Summary",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
+    "mutator.report.film": ("Shot",),
     "mutator.store.records": ("Progress",),
     "mutator.workspace": ("Workspace",),
 }
@@ -55,14 +77,17 @@ __all__ = [
     "Format",
     "Gate",
     "IncompleteRun",
+    "MutantSet",
     "MutatorError",
     "Outcome",
     "Plan",
     "Progress",
     "Record",
+    "ReviewedGroups",
     "Run",
     "RunComparison",
     "RunExperiment",
+    "Shot",
     "Status",
     "Summary",
     "TraceFrames",
@@ -71,10 +96,20 @@ __all__ = [
     "Workspace",
     "__version__",
     "build_mutant",
+    "cache_entries",
+    "cache_folder",
+    "check_hazard_analysis",
+    "check_library",
+    "clear_caches",
     "compare",
+    "doctor",
+    "draw_control_structure",
+    "init_library",
+    "load_review",
     "load_run",
     "merge_runs",
     "plan",
+    "prune_caches",
     "run",
     "try_fault",
 ]

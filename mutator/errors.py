@@ -12,8 +12,10 @@ EXIT_HARNESS_ERRORS = 3
 class MutatorError(Exception):
     """Something the user can mend: shown in one piece, without a traceback.
 
-    `where` is the file (or option) at fault, `line` its line when known; `got` what was found there
-    and `expected` what would be right; `remedy` what to do.
+    `where` is the file at fault, `line` its line when known; `got` what was found there and `expected` what
+    would be right; `remedy` what to do. `argument` names the argument of the API at fault instead of a file;
+    in the remedy of such an error `names` in backquotes are arguments, too. The command line shows the
+    options that they stand for.
     """
 
     exit_code = EXIT_WRONG_INPUT
@@ -24,19 +26,21 @@ class MutatorError(Exception):
         *,
         where: str | Path | None = None,
         line: int | None = None,
+        argument: str | None = None,
         expected: str | None = None,
         remedy: str | None = None,
     ) -> None:
         self.got = got
         self.where = str(where) if where is not None else None
         self.line = line
+        self.argument = argument
         self.expected = expected
         self.remedy = remedy
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        place = self.where or ""
-        if place and self.line is not None:
+        place = self.where or self.argument or ""
+        if self.where and self.line is not None:
             place += f":{self.line}"
         parts = [self.got]
         if self.expected:
@@ -50,6 +54,7 @@ class MutatorError(Exception):
         state = {
             "where": self.where,
             "line": self.line,
+            "argument": self.argument,
             "expected": self.expected,
             "remedy": self.remedy,
         }

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from mutator._common.arguments import check_whole
 from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, suggestion
@@ -72,14 +73,20 @@ class Workspace:
         its_library = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
         its_templates = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
         its_target = Path(target) if target else _environment("MUTATOR_TARGET")
+        if its_target and not its_target.is_dir():
+            raise MutatorError(
+                f"no folder {its_target}",
+                expected="the target folder",
+                remedy="correct MUTATOR_TARGET, or name another folder of the controller's source",
+            )
         if its_library is None:
             its_library = (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
         if its_templates is None:
             its_templates = (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
-            library=_folder(its_library, _LIBRARY, "--library or MUTATOR_LIBRARY"),
-            templates=_folder(its_templates, _TEMPLATES, "--templates or MUTATOR_TEMPLATES"),
-            target=_folder(its_target, "target", "--target or MUTATOR_TARGET") if its_target else None,
+            library=_folder(its_library, _LIBRARY, "library"),
+            templates=_folder(its_templates, _TEMPLATES, "templates"),
+            target=its_target.resolve() if its_target else None,
         )
 
     def manifest(self, name: str) -> TargetManifest:
@@ -138,6 +145,7 @@ class Workspace:
         path of a spec file. `target` names a manifest; default: the library's only one. MutatorError when
         nothing fits, and for a mistake in a spec.
         """
+        check_whole("seed", seed)
         if str(pattern).endswith((".yaml", ".yml")):
             specs: tuple[FaultSpec, ...] = (self.spec(pattern),)
             glob = "*"
@@ -167,7 +175,7 @@ class Workspace:
         if given is None and len(names) != 1:
             known = ", ".join(names) or "none"
             raise MutatorError(
-                f"{len(names)} targets in the library ({known})", remedy="name one: --manifest NAME"
+                f"{len(names)} targets in the library ({known})", argument="target", remedy="name one"
             )
         return given or names[0]
 
@@ -251,11 +259,12 @@ def _upward(*folders: str) -> Path | None:
     return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None
 
 
-def _folder(path: Path, what: str, option: str) -> Path:
+def _folder(path: Path, what: str, argument: str) -> Path:
     if not path.is_dir():
         raise MutatorError(
             f"no folder {path}",
+            argument=argument,
             expected=f"the {what} folder",
-            remedy=f"correct {option}, --root or MUTATOR_ROOT",
+            remedy=f"correct `{argument}` or MUTATOR_{argument.upper()}, `root` or MUTATOR_ROOT",
         )
     return path.resolve()

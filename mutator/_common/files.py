@@ -54,8 +54,9 @@ def make_folder(path: Path) -> None:
         raise MutatorError(
             f"cannot be written ({err.strerror})",
             where=path,
+            argument="out",
             expected="a folder that you may write to",
-            remedy="choose another --out",
+            remedy="choose another `out`",
         ) from None
 
 

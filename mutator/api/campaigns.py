@@ -3,6 +3,7 @@
 import warnings
 from pathlib import Path
 
+from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.plans import Choices, Plan, freeze, load_plan, make_plan
@@ -65,6 +66,9 @@ def run(
     IncompleteRun warning; the same call then goes on. MutatorError for wrong input; CheckFailed when
     something is not approved, and when the checks before the campaign or the equivalence check fail.
     """
+    check_whole("workers", workers)
+    if choices is not None:
+        check_type("choices", choices, Choices, "mutator.Choices")
     found, place = open_workspace(workspace), Path(out)
     summary = run_campaign(
         found,

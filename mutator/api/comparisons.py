@@ -12,7 +12,7 @@ from mutator.api.runs import Run
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Finding, Gate
-from mutator.comparison.pairs import Pair
+from mutator.comparison.pairs import Change, Pair
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -43,6 +43,21 @@ class RunComparison:
         """The comparison in a few sentences."""
         return pages.summary(self.comparison)
 
+    @property
+    def files_text(self) -> str:
+        """Which of the target's files differ, in words."""
+        return pages.files_text(self.comparison)
+
+    @property
+    def not_compared(self) -> dict[str, int]:
+        """Why experiments could not be compared, and how many."""
+        return dict(pages.reasons(self.comparison))
+
+    @property
+    def changes(self) -> dict[str, int]:
+        """How many pairs show each kind of change."""
+        return {change.value: len(self.comparison.having(change)) for change in Change}
+
     @cached_property
     def pairs(self) -> "pd.DataFrame":
         """A row for each experiment that both runs have; columns of the runs end in `_a` and `_b`.
@@ -69,7 +84,9 @@ class RunComparison:
         """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "new-crash")`."""
         known = [gate.value for gate in Gate]
         if strangers := [gate for gate in gates if gate not in known]:
-            raise MutatorError(f"gate '{strangers[0]}'", expected=f"one of {', '.join(known)}")
+            raise MutatorError(
+                f"gate '{strangers[0]}'", argument="gates", expected=f"one of {', '.join(known)}"
+            )
         return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
 
     def write(self, out: str | Path | None = None) -> pages.Written:

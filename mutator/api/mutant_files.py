@@ -3,11 +3,13 @@
 import csv
 import fnmatch
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import make_folder
+from mutator._common.text import counted
 from mutator.api.mutants import BuiltMutant, built
-from mutator.api.selection import Bench, FaultChoice, context_tables
+from mutator.api.selection import Bench, FaultChoice, WorkspaceLike, context_tables, open_workspace
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
@@ -52,7 +54,9 @@ def pairs_of_specs(
         faults = bench.faults(FaultChoice(spec=name, seed=seed, reading=reading))
         pairs += [(fault, trigger) for fault in faults for trigger in made]
     if not pairs:
-        raise MutatorError("no spec named", remedy="name specs (`mutator list specs`) or --campaign")
+        raise MutatorError(
+            "no spec named", argument="specs", remedy="name specs (`mutator list specs`), or a `campaign`"
+        )
     return pairs
 
 
@@ -60,6 +64,52 @@ def pairs_of_campaign(workspace: Workspace, campaign: str, choices: Choices) -> 
     """The campaign's target, and what is injected when in its experiments."""
     plan = make_plan(workspace, campaign, choices)
     return Bench.of(workspace, plan.campaign.target), [(e.fault, e.trigger) for e in plan.experiments]
+
+
+@dataclass(frozen=True, repr=False)
+class MutantSet:
+    """Faults under triggers for one target, chosen by specs or by a campaign; built when written."""
+
+    bench: Bench
+    pairs: tuple[Pair, ...]
+
+    def __repr__(self) -> str:
+        return f"<MutantSet: {counted(len(self), 'mutant')} of {self.bench.manifest.name}>"
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    @classmethod
+    def of_specs(
+        cls,
+        specs: Iterable[str],
+        triggers: Sequence[str] = (),
+        *,
+        seed: int | None = None,
+        reading: str | None = None,
+        target: str | None = None,
+        workspace: WorkspaceLike = None,
+    ) -> "MutantSet":
+        """Every fault of the specs (names, globs, files) under every trigger; default: all contexts."""
+        bench = Bench.of(workspace, target)
+        return cls(bench, tuple(pairs_of_specs(bench, specs, triggers, seed=seed, reading=reading)))
+
+    @classmethod
+    def of_campaign(
+        cls, campaign: str, *, choices: Choices | None = None, workspace: WorkspaceLike = None
+    ) -> "MutantSet":
+        """What is injected when in the experiments of a campaign."""
+        bench, pairs = pairs_of_campaign(open_workspace(workspace), campaign, choices or Choices())
+        return cls(bench, tuple(pairs))
+
+    def write(
+        self, out: str | Path, *, trees: bool = False, step: Callable[[], None] = lambda: None
+    ) -> list[dict[str, str]]:
+        """Write patches, with `trees` whole trees, and index.csv into a new or empty folder.
+
+        Returns the index: a row for each mutant. `step` is called after each pair.
+        """
+        return write_mutants(self.bench, self.pairs, Path(out), trees=trees, step=step)
 
 
 def write_mutants(
@@ -78,7 +128,11 @@ def write_mutants(
     make_folder(out)
     if any(out.iterdir()):
         raise MutatorError(
-            "not empty", where=out, expected="a new or empty folder", remedy="choose another --out"
+            "not empty",
+            where=out,
+            argument="out",
+            expected="a new or empty folder",
+            remedy="choose another `out`",
         )
     (out / "patches").mkdir()
     index: dict[str, dict[str, str]] = {}
@@ -103,7 +157,9 @@ def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
             continue
         hits = fnmatch.filter([s.name for s in workspace.specs()], text)
         if not hits:
-            raise MutatorError(f"no spec matches {text!r}", remedy="see `mutator list specs`")
+            raise MutatorError(
+                f"no spec matches {text!r}", argument="specs", remedy="see `mutator list specs`"
+            )
         yield from hits
 
 

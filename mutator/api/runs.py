@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.arguments import check_type
 from mutator._common.tables import Table
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
 from mutator.api.html import facts_html, text_html
@@ -28,7 +29,7 @@ from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
 from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
-from mutator.store import plan_file
+from mutator.store import plan_file, run_folder
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
@@ -57,7 +58,8 @@ def newest_run(root: Path) -> Path:
     if not heads:
         raise MutatorError(
             "no run folder in runs/",
-            remedy="name one: --run DIR, or make one: `mutator run quickstart --out runs/first`",
+            argument="run",
+            remedy="name one: `run`, or make one: `mutator run quickstart --out runs/first`",
         )
     newest = max(heads, key=lambda head: (head.stat().st_mtime_ns, str(head)))
     return _from_here(newest.parent)
@@ -69,7 +71,13 @@ def _from_here(path: Path) -> Path:
 
 
 def merge_runs(shards: Sequence[str | Path], out: str | Path) -> "Run":
-    """Merge the shards of a plan into the run folder `out`: the one that a single machine would have made."""
+    """Merge the shards of a plan into the run folder `out`: the one that a single machine would have made.
+
+    MutatorError for shards that are not one plan's, whole and finished; CheckFailed when their fault-free
+    runs differ.
+    """
+    if isinstance(shards, str | Path):
+        raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
     merge([Path(shard) for shard in shards], Path(out))
     return load_run(out)
 
@@ -161,6 +169,7 @@ class Run:
 
     def experiment(self, id: str) -> "RunExperiment":
         """The planned experiment whose id is `id` or starts so; MutatorError for none or several."""
+        check_type("id", id, str, "the id of an experiment, or the start of one")
         wanted = self.folder.find(id)
         return RunExperiment(experiment=self.experiments[wanted], record=self.records.get(wanted), run=self)
 
@@ -203,7 +212,7 @@ class Run:
         `failures` are the endings that JUnit shows as failures.
         """
         if format not in (known := [f.value for f in Format]):
-            raise MutatorError(f"format '{format}'", expected=f"one of {', '.join(known)}")
+            raise MutatorError(f"'{format}'", argument="format", expected=f"one of {', '.join(known)}")
         wanted = Format(format)
         workspace = self.workspace if wanted is Format.MUTATION_ELEMENTS else None
         place = None if out is None else Path(out)
@@ -212,6 +221,10 @@ class Run:
     def check_equivalence(self) -> None:
         """CheckFailed when a sample that was run again on the reference engine gave another result."""
         equivalence.judge(self.folder, read_records(self.path))
+
+    def delete(self) -> None:
+        """Delete the run folder; MutatorError while a command or its workers hold it."""
+        run_folder.clean(self.path)
 
     def _workspace_if_any(self) -> Workspace | None:
         try:

@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
+from mutator._common.arguments import check_number, check_whole
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels
@@ -48,6 +49,7 @@ class FaultChoice:
             names = ", ".join(v.name for v in spec)
             raise MutatorError(f"no variant {self.variant!r}", where=spec.path, expected=f"one of {names}")
         if self.value is not None:
+            check_number("value", self.value)
             variants = tuple(_with_value(spec, v, self.value) for v in variants)
         return dataclasses.replace(spec, variants=variants)
 
@@ -72,6 +74,7 @@ class Bench:
 
     def faults(self, choice: FaultChoice) -> tuple[Fault, ...]:
         """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line."""
+        check_whole("seed", 0 if choice.seed is None else choice.seed)
         spec = choice.narrowed(self.workspace.spec(choice.spec))
         for problem in check_spec(spec, self.models, self.manifest):
             raise problem
@@ -85,6 +88,7 @@ class Bench:
             if value is not None or reading is not None:
                 raise MutatorError(
                     f"{given.label} together with a value or a reading",
+                    argument="fault",
                     expected="a fault as it is, or the name of a spec with them",
                 )
             return given
@@ -97,8 +101,12 @@ class Bench:
 
         Contexts, `always` and conditions count from `armed_after_s` on; default: the manifest's.
         """
+        if armed_after_s is not None:
+            check_number("armed_after_s", armed_after_s, least=0)
         if isinstance(given, Trigger):
             return given
+        if not isinstance(given, str):
+            check_number("trigger", given, least=0)
         armed = self.manifest.armed_after_s if armed_after_s is None else armed_after_s
         return find_trigger(self.workspace, str(given), armed)
 
@@ -128,7 +136,7 @@ def find_trigger(workspace: Workspace, text: str, armed_after_s: float) -> Trigg
     if len(named) > 1:
         known = ", ".join(f"{table.name}/{row}" for table, row in named)
         raise MutatorError(
-            f"context '{text}' in {len(named)} tables", where="--trigger", expected=f"one of {known}"
+            f"context '{text}' in {len(named)} tables", argument="trigger", expected=f"one of {known}"
         )
     if named:
         table, row = named[0]
@@ -138,7 +146,7 @@ def find_trigger(workspace: Workspace, text: str, armed_after_s: float) -> Trigg
     except MutatorError as e:
         contexts = ", ".join(row.id for table in tables for row in table.rows)
         raise MutatorError(
-            e.got, where="--trigger", expected=f"a context ({contexts}), {TYPED}", remedy=e.remedy
+            e.got, argument="trigger", expected=f"a context ({contexts}), {TYPED}", remedy=e.remedy
         ) from e
 
 
@@ -153,7 +161,10 @@ def _split(name: str) -> tuple[str, str | None]:
 def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:
     if variant.draw is None:
         raise MutatorError(
-            f"variant {variant.name!r} takes no value", where=spec.path, remedy="leave --value out"
+            f"variant {variant.name!r} takes no value",
+            where=spec.path,
+            argument="value",
+            remedy="leave `value` out",
         )
     exact = int(value) if float(value).is_integer() else value
     draw = dataclasses.replace(variant.draw, kind="list", ranges=(), values=(exact,))

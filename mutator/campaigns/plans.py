@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.arguments import check_type, check_whole
 from mutator._common.files import is_half_written, make_folder, write_atomic, write_json
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
@@ -21,7 +22,6 @@ from mutator.campaigns.provenance import check_sources, check_version, sources, 
 from mutator.campaigns.sampling import pick, pick_in_proportion
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
-from mutator.faults.readings import Readings
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file
@@ -57,6 +57,16 @@ class Choices:
     exclude: str | None = None
     limit: int | None = None
     shard: str | None = None
+
+    def __post_init__(self) -> None:
+        for name, least in (("seed", 0), ("limit", 1)):
+            if (value := getattr(self, name)) is not None:
+                check_whole(name, value, least=least)
+        for name in ("reading", "only", "exclude", "shard"):
+            if (value := getattr(self, name)) is not None:
+                check_type(name, value, str, "text")
+        if self.shard is not None:
+            Shard.parse(self.shard)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,14 +151,16 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
 
     MutatorError for a choice that does not fit the campaign, and when no experiment is left.
     """
+    choices = Choices() if choices is None else choices
+    check_type("choices", choices, Choices, "mutator.Choices")
     loaded = load_campaign(workspace.campaign(campaign))
-    choices = choices or Choices()
     seed = loaded.seed if choices.seed is None else choices.seed
     readings = workspace.readings()
     check_readings(loaded, readings)
     load_study(loaded)
     reading = choices.reading or loaded.reading or readings.default
-    _check(choices, readings)
+    if choices.reading is not None:
+        readings.check(choices.reading)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
     once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
@@ -157,6 +169,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     if choices.shard is not None and Shard.parse(choices.shard).of > len(chunks):
         raise MutatorError(
             f"shard {choices.shard}",
+            argument="shard",
             expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
             remedy="use fewer shards, or a smaller chunk in the campaign",
         )
@@ -174,15 +187,6 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     )
 
 
-def _check(choices: Choices, readings: Readings) -> None:
-    if choices.reading is not None:
-        readings.check(choices.reading)
-    for name in ("seed", "limit"):
-        value = getattr(choices, name)
-        if value is not None and value < (name == "limit"):
-            raise MutatorError(f"{name} {value}", expected="a positive number", remedy=f"correct --{name}")
-
-
 def _choose(
     experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int
 ) -> tuple[Experiment, ...]:
@@ -198,8 +202,9 @@ def _choose(
         raise MutatorError(
             "no experiment is left",
             where=campaign.path,
+            argument="only",
             expected="at least one",
-            remedy="widen --only, --exclude or the campaign's faults",
+            remedy="widen `only`, `exclude` or the campaign's faults",
         )
     return experiments
 
@@ -237,8 +242,9 @@ def make_run_folder(out: Path) -> None:
             raise MutatorError(
                 f"no run folder, and not empty ({', '.join(sorted(strangers)[:3])})",
                 where=out,
+                argument="out",
                 expected="a run folder, or a new or empty folder",
-                remedy="choose another --out",
+                remedy="choose another `out`",
             )
     make_folder(out)
 

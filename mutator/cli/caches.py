@@ -2,15 +2,18 @@
 
 import re
 from collections.abc import Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mutator._common import caches
+import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json
 from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator._common.caches import Entry
 
 _UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
@@ -49,13 +52,15 @@ def cache(
     if path + clear + (most is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")
     if path:
-        typer.echo(caches.folder())
+        typer.echo(mutator.cache_folder())
         return
     terminal = Terminal(as_json)
-    deleted = caches.clear() if clear else caches.prune(parse_size(most)) if most is not None else None
-    kept = caches.entries()
+    deleted = mutator.clear_caches() if clear else None
+    if most is not None:
+        deleted = mutator.prune_caches(parse_size(most))
+    kept = mutator.cache_entries()
     if as_json:
-        document = {"path": str(caches.folder()), "kept": _facts(kept)}
+        document = {"path": str(mutator.cache_folder()), "kept": _facts(kept)}
         terminal.emit(document if deleted is None else {**document, "deleted": _facts(deleted)})
         return
     if deleted is not None:
@@ -63,7 +68,7 @@ def cache(
     rows = [(what, len(of), _size(of)) for what, of in _by_what(kept).items()]
     rows.append(("total", len(kept), _size(kept)))
     terminal.table(("what", "entries", "size"), rows, right=(1, 2), total=True)
-    terminal.say(f"in {short_path(caches.folder())}")
+    terminal.say(f"in {short_path(mutator.cache_folder())}")
 
 
 def parse_size(text: str) -> int:
@@ -76,18 +81,18 @@ def parse_size(text: str) -> int:
     return int(float(found[1]) * _UNITS[(found[2] or "B").upper()])
 
 
-def _by_what(entries: Sequence[caches.Entry]) -> dict[str, list[caches.Entry]]:
-    groups: dict[str, list[caches.Entry]] = {}
+def _by_what(entries: "Sequence[Entry]") -> "dict[str, list[Entry]]":
+    groups: dict[str, list[Entry]] = {}
     for entry in entries:
         groups.setdefault(entry.what, []).append(entry)
     return groups
 
 
-def _size(entries: Sequence[caches.Entry]) -> str:
+def _size(entries: "Sequence[Entry]") -> str:
     size = sum(entry.size for entry in entries)
     unit = next((unit for unit in ("GB", "MB") if size >= _UNITS[unit]), "KB")
     return f"{size / _UNITS[unit]:.1f} {unit.replace('K', 'k')}"
 
 
-def _facts(entries: Sequence[caches.Entry]) -> list[dict[str, object]]:
+def _facts(entries: "Sequence[Entry]") -> list[dict[str, object]]:
     return [{"what": e.what, "path": str(e.path), "bytes": e.size} for e in entries]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
@@ -68,14 +69,12 @@ def plan(
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
     from mutator.api.campaigns import not_forkable
-    from mutator.api.campaigns import plan as plan_campaign
-    from mutator.campaigns.plans import Choices
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    chosen = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
     with terminal.wait("planning"):
-        made = plan_campaign(campaign, out, choices=chosen, workspace=workspace)
+        made = mutator.plan(campaign, out, choices=chosen, workspace=workspace)
     folder = out.resolve()
     anew = not_forkable(made, workspace)
     cost, groups = made.cost(workers), made.groups()
@@ -152,18 +151,15 @@ def run(
     place: Place,
 ) -> None:
     """Run or resume a campaign; ends with its table and report."""
-    from mutator.api.campaigns import IncompleteRun
-    from mutator.api.campaigns import run as run_campaign
-    from mutator.campaigns.plans import Choices
     from mutator.cli.progress import campaign_progress
 
     terminal = Terminal(as_json)
     workspace = place.workspace()
-    chosen = Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
+    chosen = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     try:
         with campaign_progress(terminal) as notify, warnings.catch_warnings():
-            warnings.simplefilter("ignore", IncompleteRun)  # `_print_end` says it in full
-            made = run_campaign(
+            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_end` says it in full
+            made = mutator.run(
                 campaign,
                 out,
                 choices=chosen,

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Only
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.comparison.comparison import Comparison, Finding, Gate
+    from mutator.comparison.comparison import Comparison, Finding
 
 SHOWN = 4  # tables that the terminal shows: those that are not by fault type, but for the changes
 NAMED = 20  # experiments that the terminal names; the written comparison has all
@@ -52,61 +53,56 @@ def compare(
     Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
     what got better, worse, newly hazardous, with paired statistics; a page, a table and CSV are written.
     """
-    from mutator.api.comparisons import compare as compare_runs
-
     terminal = Terminal(as_json)
     gates = _gates(fail_on or [])
     with terminal.wait("comparing"):
-        compared = compare_runs(run_a, run_b, only=only)
+        compared = mutator.compare(run_a, run_b, only=only)
         written = compared.write(out)
     found, failing = compared.comparison, compared.findings(gates)
     if as_json:
-        terminal.emit(_as_json(found, failing) | {"page": str(written.page), "pairs_csv": str(written.pairs)})
+        terminal.emit(
+            _as_json(compared, failing) | {"page": str(written.page), "pairs_csv": str(written.pairs)}
+        )
     else:
-        _show(terminal, found)
+        _show(terminal, compared)
         terminal.say(f"comparison: {short_path(written.markdown)} and {short_path(written.page)}")
     _judge(terminal, found, gates, failing)
 
 
-def _gates(texts: list[str]) -> "list[Gate]":
-    from mutator.comparison.comparison import Gate
-
+def _gates(texts: list[str]) -> "list[mutator.Gate]":
     names = [name.strip() for text in texts for name in text.split(",")]
-    known = [gate.value for gate in Gate]
+    known = [gate.value for gate in mutator.Gate]
     if strangers := [name for name in names if name not in known]:
         raise MutatorError(f"'{strangers[0]}'", where="--fail-on", expected=f"one of {', '.join(known)}")
-    return [Gate(name) for name in dict.fromkeys(names)]
+    return [mutator.Gate(name) for name in dict.fromkeys(names)]
 
 
-def _show(terminal: Terminal, found: "Comparison") -> None:
-    from mutator.comparison import pages
-
+def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
+    found = compared.comparison
     differing = [(f.name, f.a, f.b) for f in found.facts if f.differs]
     if differing:
         terminal.table(["what differs", found.names.a, found.names.b], differing)
-        terminal.say(pages.files_text(found))
+        terminal.say(compared.files_text)
         terminal.say()
     for sheet in found.sheets[:SHOWN]:
         terminal.say(sheet.title, style="bold")
         heads, lines = list(sheet.heads), sheet.table().rows
         terminal.table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")
         terminal.say()
-    terminal.say(pages.summary(found))
+    terminal.say(compared.summary)
     for remark in found.remarks:
         terminal.say(remark)
 
 
-def _as_json(found: "Comparison", failing: "tuple[Finding, ...]") -> dict[str, object]:
-    from mutator.comparison import pages
-    from mutator.comparison.pairs import Change
-
+def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") -> dict[str, object]:
+    found = compared.comparison
     return {
         "run_a": str(found.a.folder.path),
         "run_b": str(found.b.folder.path),
         "pairs": len(found.pairs),
         "changed": len(found.changed),
-        "changes": {change.value: len(found.having(change)) for change in Change},
-        "not_compared": dict(pages.reasons(found)),
+        "changes": compared.changes,
+        "not_compared": compared.not_compared,
         "differs": [fact for fact in found.facts if fact.differs],
         "files": found.files,
         "remarks": list(found.remarks),
@@ -116,7 +112,7 @@ def _as_json(found: "Comparison", failing: "tuple[Finding, ...]") -> dict[str, o
 
 
 def _judge(
-    terminal: Terminal, found: "Comparison", gates: "list[Gate]", failing: "tuple[Finding, ...]"
+    terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[Finding, ...]"
 ) -> None:
     """The gate: exit 1 at what it fails on, 3 when results are missing."""
     for finding in failing[:NAMED]:

@@ -5,6 +5,7 @@ Rich is imported when the first line is printed, so `--help` and shell completio
 
 import json
 import math
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -131,9 +132,37 @@ class Terminal:
             yield lambda: progress.advance(task)
 
 
+# options that are not named like the argument of the API that they stand for
+_OPTIONS = {
+    "armed_after_s": "--armed-after",
+    "gates": "--fail-on",
+    "reviewed": "--require-reviewed",
+    "specs": "SPEC",
+    "shards": "DIR",
+    "fault": "SPEC",
+    "id": "EXPERIMENT",
+    "target": "--manifest",
+    "triggers": "--trigger",
+}
+
+
+def option(argument: str) -> str:
+    """The option of the command line that stands for an argument of the API."""
+    return _OPTIONS.get(argument) or "--" + argument.replace("_", "-")
+
+
+def with_options(error: MutatorError) -> MutatorError:
+    """The error as the command line says it: options where the API names its arguments."""
+    if error.argument is None:
+        return error
+    remedy = error.remedy and re.sub(r"`([a-z_]+)`", lambda found: option(found[1]), error.remedy)
+    place = error.where or option(error.argument)
+    return MutatorError(error.got, where=place, line=error.line, expected=error.expected, remedy=remedy)
+
+
 def show_error(error: MutatorError) -> None:
     """An error of the user's, in one piece: place, what was got, expected, what to do."""
-    terminal = Terminal()
+    terminal, error = Terminal(), with_options(error)
     place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
     terminal.complain(f"{place}: {error.got}" if place else error.got)
     if error.expected:
@@ -144,6 +173,7 @@ def show_error(error: MutatorError) -> None:
 
 def error_text(error: MutatorError) -> str:
     """An error as one of several: one line, its file as the user would type it."""
+    error = with_options(error)
     where = short_path(error.where) or None
     return str(
         MutatorError(error.got, where=where, line=error.line, expected=error.expected, remedy=error.remedy)

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import mutator
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
     from mutator.api.runs import RunExperiment
-    from mutator.report.film import Shot
 
 DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 
@@ -91,10 +91,8 @@ def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
 
 def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills: list[str]) -> list[Path]:
     """Write the video and the stills that are wanted; returns their paths."""
-    from mutator.report.film import Shot
-
     shots = [_still(text, found) for text in stills]
-    shots += [Shot(out=video)] if video else []
+    shots += [mutator.Shot(out=video)] if video else []
     if not shots:
         return []
     with terminal.wait("driving it again with a film"):
@@ -104,10 +102,8 @@ def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills
     return [shot.out for shot in shots]
 
 
-def _still(text: str, found: "RunExperiment") -> "Shot":
+def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
     """The still of `T=FILE`, or of `T` alone: it is kept beside the plots, where the report finds it."""
-    from mutator.report.film import Shot
-
     t, named, name = text.partition("=")
     try:
         time = float(t)
@@ -118,7 +114,7 @@ def _still(text: str, found: "RunExperiment") -> "Shot":
             f"'{text}'", where="--still", expected="a time in s, alone or with a file: 14.5 or 14.5=early.png"
         )
     kept = found.plot_file.with_name(f"{found.id}-{time:.2f}s.jpg")
-    return Shot(out=Path(name) if name else kept, t=time)
+    return mutator.Shot(out=Path(name) if name else kept, t=time)
 
 
 RERUN_EXAMPLES = """\b

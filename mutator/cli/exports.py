@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+import mutator
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place
 from mutator.exports import Format
@@ -44,13 +45,11 @@ def export(
     place: Place,
 ) -> None:
     """Write a run for other tools: mutation report, JUnit, CSV, Parquet."""
-    from mutator.api.runs import load_run
-
     terminal = Terminal(as_json)
     workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None
     endings = [name.strip() for name in failures.split(",")] if failures else []
     with terminal.wait("writing"):
-        written = load_run(run, workspace=workspace).export(format, out, failures=endings)
+        written = mutator.load_run(run, workspace=workspace).export(format, out, failures=endings)
     if as_json:
         terminal.emit({"format": format.value, "file": str(written)})
     terminal.say(f"{format.value}: {short_path(written)}")

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
@@ -70,9 +71,7 @@ def try_spec(
     The spec need not be in the library: a file will do.
     """
     from mutator.api.selection import Bench, FaultChoice, one_of_each_variant
-    from mutator.api.trials import try_fault
     from mutator.cli.experiment_view import show_trial
-    from mutator.model import Status
 
     terminal = Terminal(as_json)
     bench = Bench.of(place.workspace(), manifest)
@@ -83,11 +82,11 @@ def try_spec(
         terminal.note(f"{fault.label}, one of {len(faults)} (choose by --variant, --value)")
     when = bench.trigger(trigger, armed_after)
     with terminal.wait(f"driving {scenario}, fault-free and faulty"):
-        trial = try_fault(
+        trial = mutator.try_fault(
             fault, scenario, when, seed=seed or 0, target=manifest, workspace=bench.workspace, out=out
         )
     show_trial(terminal, trial)
-    if trial.status is Status.HARNESS_ERROR:
+    if trial.status is mutator.Status.HARNESS_ERROR:
         raise typer.Exit(EXIT_HARNESS_ERRORS)
 
 
@@ -188,10 +187,6 @@ def generate(
     place: Place,
 ) -> None:
     """Write mutants as patches or trees, with an index."""
-    from mutator.api.mutant_files import pairs_of_campaign, pairs_of_specs, write_mutants
-    from mutator.api.selection import Bench
-    from mutator.campaigns.plans import Choices
-
     terminal = Terminal(as_json)
     workspace = place.workspace()
     if campaign and (specs or triggers):
@@ -199,14 +194,21 @@ def generate(
             "--campaign together with specs or --trigger", expected="one or the other", where="generate"
         )
     if campaign:
-        bench, pairs = pairs_of_campaign(workspace, campaign, Choices(seed=seed, reading=reading))
+        choices = mutator.Choices(seed=seed, reading=reading)
+        mutants = mutator.MutantSet.of_campaign(campaign, choices=choices, workspace=workspace)
     else:
-        bench = Bench.of(workspace, manifest)
-        pairs = pairs_of_specs(bench, specs or (), triggers or (), seed=seed, reading=reading)
-    with terminal.count(len(pairs), "mutants") as step:
-        index = write_mutants(bench, pairs, out, trees=trees, step=step)
+        mutants = mutator.MutantSet.of_specs(
+            specs or (),
+            triggers or (),
+            seed=seed,
+            reading=reading,
+            target=manifest,
+            workspace=workspace,
+        )
+    with terminal.count(len(mutants), "mutants") as step:
+        index = mutants.write(out, trees=trees, step=step)
     if as_json:
         terminal.emit(index)
     terminal.say(f"{counted(len(index), 'mutant')} in {out}; the list of them is {out / 'index.csv'}")
     first = out / index[0]["patch"]
-    terminal.say(f"apply one: patch -p1 -d {short_path(bench.manifest.root)} < {first}")
+    terminal.say(f"apply one: patch -p1 -d {short_path(mutants.bench.manifest.root)} < {first}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
@@ -42,23 +43,13 @@ def stpa(
 
     Exit code 1 if it has a gap or a contradiction; each is shown with its file and line.
     """
-    from mutator.stpa.checks import check_analysis
-    from mutator.stpa.drawing import draw
-
     terminal = Terminal(as_json)
     workspace = place.workspace()
+    problems = mutator.check_hazard_analysis(workspace, target=manifest)
     analysis = workspace.analysis()
-    if analysis is None:
-        raise MutatorError(
-            "no control_structure.yaml",
-            where=workspace.library / "stpa",
-            expected="a hazard analysis",
-            remedy="write one, as docs/explanation/hazard-analysis.md says; campaigns need none",
-        )
-    target = workspace.manifest(workspace.target_name(manifest))
-    problems = check_analysis(analysis, workspace.specs(), target)
+    assert analysis is not None  # it has just been checked
     if svg:
-        _write(svg, draw(analysis))
+        _write(svg, mutator.draw_control_structure(workspace))
     if as_json:
         found = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
         terminal.emit(_data(analysis) | {"problems": found})

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import mutator
 from mutator._common.text import counted
-from mutator.cli.console import Terminal, error_text, short_path
+from mutator.cli.console import Terminal, error_text, short_path, with_options
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
@@ -149,12 +150,10 @@ def check(
 
     Exit code 1 if anything is wrong; each problem is shown with its file and line.
     """
-    from mutator.verification.library import check_library
-
     terminal = Terminal(as_json)
     workspace = place.workspace()
     with terminal.wait("checking every spec in every reading"):
-        problems = check_library(workspace, workspace.target_name(manifest))
+        problems = mutator.check_library(workspace, target=manifest)
     if as_json:
         terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
     for problem in problems:
@@ -180,20 +179,18 @@ def doctor(as_json: Json = False, *, place: Place) -> None:
 
     Looks at interpreter, packages, machine, library and target; exit code 1 if a campaign could not run.
     """
-    from mutator.verification.doctor import Level, examine
-
     terminal = Terminal(as_json)
     with terminal.wait("looking around"):
         try:
-            findings = examine(place.workspace())
+            findings = mutator.doctor(place.workspace())
         except MutatorError as e:
-            findings = examine(e)
+            findings = mutator.doctor(with_options(e))
     if as_json:
         terminal.emit(findings)
     terminal.table(
         ["what", "state", "found", "to do"], [(f.name, f.level.value, f.found, f.remedy) for f in findings]
     )
-    bad = [f.name for f in findings if f.level is Level.FAIL]
+    bad = [f.name for f in findings if f.level == "failed"]
     if bad:
         terminal.say(f"not ready: {', '.join(bad)}", style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)

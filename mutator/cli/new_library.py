@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+import mutator
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json
 
@@ -28,10 +29,8 @@ def init(
     They are copies of what ships with mutator, with a README. In DIR and below, mutator uses them; the
     controller under test stays the one that ships, unless the manifest in DIR or --target names another.
     """
-    from mutator._common.shipped import write_library
-
     terminal = Terminal(as_json)
-    write_library(folder)
+    mutator.init_library(folder)
     if as_json:
         terminal.emit({"folder": str(folder)})
     terminal.say(f"{short_path(folder)}: fault_library/, templates/ and a README.md that says how to go on")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import mutator
 from mutator.engines.kinds import ENGINES, FORK
 
 if TYPE_CHECKING:
@@ -66,9 +67,7 @@ class Place:
 
     def workspace(self) -> "Workspace":
         """The workspace found from here; MutatorError that tells how to name one."""
-        from mutator.workspace import Workspace
-
-        return Workspace.find(self.root, self.library, self.templates, self.target)
+        return mutator.Workspace.find(self.root, self.library, self.templates, self.target)
 
     def over(self, other: "Place") -> "Place":
         """This place, its gaps filled from `other`."""

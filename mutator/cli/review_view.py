@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.text import counted
 from mutator.cli.console import Terminal
-from mutator.cli.review_choice import columns
 
 if TYPE_CHECKING:
     from mutator.review.catalogue import Group
@@ -20,10 +19,11 @@ CONDITIONS = 6
 
 def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
     """A group for a program; `whole`: with its diff and values."""
+    from mutator.api.reviews import facts as known
     from mutator.review.readable_groups import value_table
 
     decision = review.decisions.get(group.id)
-    facts = {**columns(review, group), "what": group.what, "injections": group.injections}
+    facts = {**known(review, group), "what": group.what, "injections": group.injections}
     facts |= {"remark": decision.remark if decision else None}
     facts |= {"changed": decision.changed(group) if decision else [], "bound": asdict(group.bound)}
     if not whole:

@@ -11,18 +11,16 @@ from mutator.cli.console import Terminal, short_path
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator.cli.review_choice import Loaded
+    import mutator
 
 KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 
 
-def walk_through(terminal: Terminal, load: Callable[[], "Loaded"], by: str) -> None:
+def walk_through(terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], by: str) -> None:
     """Show every group that is new or changed and do what is answered; each decision is kept at once.
 
     MutatorError, before anything is made, when there is nobody to answer.
     """
-    from mutator.review.decisions import State, Verdict
-
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise MutatorError(
             "no terminal to ask in",
@@ -30,20 +28,19 @@ def walk_through(terminal: Terminal, load: Callable[[], "Loaded"], by: str) -> N
             remedy="decide by `mutator review approve GROUP... --by NAME`, or `reject`",
         )
     found = load()
-    review = found.review
-    left = [g for g in found.groups if review.state(g) in (State.NEW, State.CHANGED)]
+    left = found.undecided
     for number, group in enumerate(left, start=1):
-        review_view.print_group(terminal, review, group)
+        review_view.print_group(terminal, found.review, group)
         key = _asked(terminal, f"{number} of {len(left)}")
         if key == "q":
             break
         if key == "s":
             continue
         remark = typer.prompt("remark (Enter: none)", default="", show_default=False)
-        verdict = Verdict.APPROVED if key == "a" else Verdict.REJECTED
-        review = review.decided([group], verdict, by, remark)
-        review.write()
-        terminal.say(f"{group.id} {review.describe(group)}", style=review_view.STYLES[verdict.value])
+        found = (found.approve if key == "a" else found.reject)([group], by, remark)
+        style = review_view.STYLES[found.review.state(group).value]
+        terminal.say(f"{group.id} {found.review.describe(group)}", style=style)
+    review = found.review
     terminal.say(f"{short_path(review.path)}: {review_view.counts(review, found.groups)}")
 
 

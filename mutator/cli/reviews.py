@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+import mutator
 from mutator._common.text import counted
 from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
-from mutator.cli.review_choice import COLUMNS, Wanted
+from mutator.errors import MutatorError
+from mutator.review.columns import COLUMNS
 
 if TYPE_CHECKING:
-    from mutator.review.decisions import Verdict
+    from mutator.review.catalogue import Group
 
 Campaign = Annotated[
     str | None,
@@ -100,8 +102,7 @@ def list_groups(
 ) -> None:
     """List groups, new and changed ones first (what `review` alone does)."""
     terminal = Terminal(as_json)
-    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
-    found = wanted.load(terminal).matching(only, exclude)
+    found = _load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
     review_view.print_list(terminal, found.review, found.groups)
 
 
@@ -119,7 +120,7 @@ def show(
 ) -> None:
     """Show a group: its diff with holes, and the values that fill them."""
     terminal = Terminal(as_json)
-    found = _wanted(place, campaign, specs, reading, seed, manifest).load(terminal)
+    found = _load(terminal, place, campaign, specs, reading, seed, manifest)
     shown = found.find(groups)
     if as_json:
         terminal.emit([review_view.data(found.review, group, whole=True) for group in shown])
@@ -143,10 +144,10 @@ def approve(
     place: Place,
 ) -> None:
     """Approve groups as they are now."""
-    from mutator.review.decisions import Verdict
-
-    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
-    _decide(Terminal(as_json), wanted, groups, Verdict.APPROVED, by, remark)
+    terminal = Terminal(as_json)
+    found = _load(terminal, place, campaign, specs, reading, seed, manifest)
+    chosen = found.find(groups)
+    _print_decided(terminal, found.approve(chosen, by, remark), chosen)
 
 
 @with_place
@@ -164,23 +165,20 @@ def reject(
     place: Place,
 ) -> None:
     """Reject groups as they are now: `run --require-reviewed` does not run them."""
-    from mutator.review.decisions import Verdict
+    terminal = Terminal(as_json)
+    found = _load(terminal, place, campaign, specs, reading, seed, manifest)
+    chosen = found.find(groups)
+    _print_decided(terminal, found.reject(chosen, by, remark), chosen)
 
-    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
-    _decide(Terminal(as_json), wanted, groups, Verdict.REJECTED, by, remark)
 
-
-def _decide(
-    terminal: Terminal, wanted: Wanted, starts: Sequence[str], verdict: "Verdict", by: str, remark: str
-) -> None:
-    found = wanted.load(terminal)
-    groups = found.find(starts)
-    decided = found.review.decided(groups, verdict, by, remark)
-    decided.write()
+def _print_decided(terminal: Terminal, found: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
+    decided = found.review
     if terminal.as_json:
         terminal.emit([review_view.data(decided, group) for group in groups])
     for group in groups:
-        terminal.say(f"{group.id} {decided.describe(group)}", style=review_view.STYLES[verdict.value])
+        terminal.say(
+            f"{group.id} {decided.describe(group)}", style=review_view.STYLES[decided.state(group).value]
+        )
     terminal.say(f"{short_path(decided.path)}: {review_view.counts(decided, found.groups)}")
 
 
@@ -201,8 +199,12 @@ def walk(
     from mutator.cli.review_walk import walk_through
 
     terminal = Terminal()
-    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
-    walk_through(terminal, lambda: wanted.load(terminal).matching(only, exclude), by)
+
+    def load() -> "mutator.ReviewedGroups":
+        found = _load(terminal, place, campaign, specs, reading, seed, manifest)
+        return found.matching(only, exclude)
+
+    walk_through(terminal, load, by)
 
 
 @with_place
@@ -220,12 +222,9 @@ def page(
     place: Place,
 ) -> None:
     """Write a page of all groups, complete in itself, to look at and to copy commands from."""
-    from mutator.review.page import write_page
-
     terminal = Terminal(as_json)
-    wanted = _wanted(place, campaign, specs, reading, seed, manifest)
-    found = wanted.load(terminal).matching(only, exclude)
-    write_page(out, found.review, found.groups, found.options)
+    found = _load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
+    found.write_page(out)
     if as_json:
         terminal.emit({"page": str(out), "groups": len(found.groups)})
     terminal.say(
@@ -233,19 +232,24 @@ def page(
     )
 
 
-def _wanted(
+def _load(
+    terminal: Terminal,
     place: Place,
     campaign: str | None,
     specs: Sequence[str] | None,
     reading: str | None,
     seed: int | None,
     manifest: str | None,
-) -> Wanted:
-    return Wanted(
-        place=place,
-        campaign=campaign,
-        specs=tuple(specs or ()),
-        reading=reading,
-        seed=seed,
-        manifest=manifest,
-    )
+) -> "mutator.ReviewedGroups":
+    if campaign and specs:
+        raise MutatorError("--campaign together with --spec", expected="one or the other")
+    workspace = place.workspace()
+    with terminal.wait("making the mutants"):
+        return mutator.load_review(
+            campaign=campaign,
+            specs=tuple(specs or ()),
+            reading=reading,
+            seed=seed,
+            target=manifest,
+            workspace=workspace,
+        )

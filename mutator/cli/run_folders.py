@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, OutRun, Place, with_place
@@ -46,17 +47,13 @@ def merge(
 
     It is the one that a single machine would have made: the same results, byte for byte.
     """
-    from mutator.api.runs import merge_runs
-    from mutator.outcomes.results import CSV
-
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
-        planned = merge_runs(shards, out).folder.planned
+        planned = mutator.merge_runs(shards, out).folder.planned
     if as_json:
         terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
-    terminal.say(
-        f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {short_path(out / CSV)}"
-    )
+    results = short_path(out / "results.csv")
+    terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
     terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
 
 
@@ -79,10 +76,8 @@ def report(
     An unfinished run gets a report of what it has so far. What was published stands beside the results if
     a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
     """
-    from mutator.api.runs import load_run
-
     terminal = Terminal(as_json)
-    loaded = load_run(run, workspace=_library(place))
+    loaded = mutator.load_run(run, workspace=_library(place))
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = loaded.report(anew=True)
     if as_json:
@@ -117,15 +112,13 @@ def clean(
 
     Anything that is no run folder, and a run under way, is left alone.
     """
-    from mutator.store import run_folder
-
     terminal = Terminal()
-    folders = [run_folder.RunFolder.open(path).path for path in runs]
+    found = [mutator.load_run(path) for path in runs]
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
-        if not typer.confirm(f"delete {', '.join(map(short_path, folders))}?"):
+        if not typer.confirm(f"delete {', '.join(short_path(run.path) for run in found)}?"):
             return
-    for folder in folders:
-        run_folder.clean(folder)
-        terminal.say(f"deleted {short_path(folder)}")
+    for folder in found:
+        folder.delete()
+        terminal.say(f"deleted {short_path(folder.path)}")

@@ -130,8 +130,9 @@ def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:
             f"no experiment of {a.name} ({len(a.rows)} with a result) has a partner in {b.name} "
             f"({len(b.rows)})",
             where=run_b,
+            argument="only",
             expected="runs of the same faults, scenarios and triggers",
-            remedy="compare runs of one campaign, or widen --only",
+            remedy="compare runs of one campaign, or widen `only`",
         )
     return Comparison(a=a, b=b, matching=matching)
 

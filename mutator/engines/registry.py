@@ -21,9 +21,9 @@ def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int)
     if asked is None:
         return REFERENCE if why or experiments < _WORTH_IT else FORK
     if asked not in ENGINES:
-        raise MutatorError(f"engine '{asked}'", expected=f"one of {', '.join(ENGINES)}")
+        raise MutatorError(f"engine '{asked}'", argument="engine", expected=f"one of {', '.join(ENGINES)}")
     if ENGINES[asked].forks and why:
-        raise MutatorError(f"engine '{asked}': {why}", remedy=f"use --engine {REFERENCE}")
+        raise MutatorError(f"engine '{asked}': {why}", argument="engine", remedy=f"use {REFERENCE}")
     return asked
 
 

@@ -32,7 +32,15 @@ def merge(shards: Sequence[Path], out: Path) -> Path:
     machines are not alike.
     """
     if RunFolder.exists(out):
-        raise MutatorError("holds a run", where=out, expected="a new folder", remedy="choose another --out")
+        raise MutatorError(
+            "holds a run",
+            where=out,
+            argument="out",
+            expected="a new folder",
+            remedy="choose another `out`",
+        )
+    if not shards:
+        raise MutatorError("no run folder", argument="shards", remedy=_REMEDY)
     folders = [RunFolder.open(path) for path in shards]
     _check_plans(folders)
     _check_numbers(folders)
@@ -74,7 +82,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
         shard = folder.shard
         if shard is None:
             raise MutatorError(
-                "a whole run, no shard", where=folder.path, expected="a run with --shard", remedy=_REMEDY
+                "a whole run, no shard", where=folder.path, expected="the run of a shard", remedy=_REMEDY
             )
         of = of or shard.of
         if shard.of != of:

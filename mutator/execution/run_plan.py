@@ -52,11 +52,12 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
             frozen = head[name]
         if value is not None and value != frozen:
             raise MutatorError(
-                f"--{name} {value}",
+                f"{name} {value}",
                 where=out,
                 expected="what this run was planned with: "
-                + (f"no --{name}" if frozen is None else f"--{name} {frozen}"),
-                remedy=f"omit --{name}, or use another folder",
+                + (f"no {name}" if frozen is None else f"{name} {frozen}"),
+                argument=name,
+                remedy=f"leave out `{name}`, or use another folder",
             )
     scenarios = {scenario for scenario, _ in head["goldens"]}
     check_sources(out, head["sources"], sources(workspace, workspace.manifest(head["target"]), scenarios))

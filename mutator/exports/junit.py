@@ -25,7 +25,7 @@ def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
     """The XML, the same bytes each time. MutatorError for an ending that cannot be a failure."""
     known = [ending.value for ending in ENDINGS]
     if strangers := [name for name in failures if name not in known]:
-        raise MutatorError(f"'{strangers[0]}'", where="--failures", expected=f"one of {', '.join(known)}")
+        raise MutatorError(f"'{strangers[0]}'", argument="failures", expected=f"one of {', '.join(known)}")
     rows = {row.experiment_id: row for row in Results.up_to_date(folder.path).rows()}
     suites: dict[str, list[Experiment]] = {}
     for experiment in read_all(folder.path):

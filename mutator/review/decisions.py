@@ -110,9 +110,9 @@ class Review:
 
     def decided(self, groups: Iterable[Group], verdict: Verdict, by: str, remark: str) -> "Review":
         """The review with this decision about `groups`; MutatorError for an unusable name or remark."""
-        by, remark = _line(by, "--by"), _line(remark, "--remark")
+        by, remark = _line(by, "by"), _line(remark, "remark")
         if not by:
-            raise MutatorError("no name", where="--by", expected="who has reviewed", remedy="give a name")
+            raise MutatorError("no name", argument="by", expected="who has reviewed", remedy="give a name")
         made = {
             group.id: Decision(
                 group=group.id, what=group.what, verdict=verdict, by=by, remark=remark, bound=group.bound
@@ -177,9 +177,11 @@ def _block(decision: Decision) -> str:
     return "  - " + "    ".join(lines)
 
 
-def _line(text: str, option: str) -> str:
+def _line(text: str, argument: str) -> str:
     """Text as one line; MutatorError for characters that YAML cannot hold."""
     line = " ".join(text.split())
     if not line.isprintable():
-        raise MutatorError(f"{line!r}", where=option, expected="plain text", remedy="leave out what is not")
+        raise MutatorError(
+            f"{line!r}", argument=argument, expected="plain text", remedy="leave out what is not"
+        )
     return line

@@ -19,9 +19,9 @@ class Shard:
         found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
         if not found or int(found[1]) > int(found[2]):
             raise MutatorError(
-                f"shard '{text}'",
+                repr(text),
+                argument="shard",
                 expected="k/n, the k-th of n shares, such as 1/3",
-                remedy="correct --shard",
             )
         return cls(int(found[1]), int(found[2]))
 

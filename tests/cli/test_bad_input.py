@@ -159,3 +159,31 @@ def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> N
         assert "run/999" in answer.err
         assert "newer" in answer.err
     assert head.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["diff", "own.yaml", "--trigger", "near >"], "error: --trigger: "),
+        (["plan", "toy", "--out", "own.yaml"], "to do: choose another --out"),
+        (["plan", "toy", "--out", "p", "--only", "value > 1e9"], "to do: widen --only, --exclude or"),
+        (["run", "toy", "--out", "p", "--shard", "3/2"], "error: --shard: '3/2'"),
+        (["list", "--library", "gone"], "to do: correct --library or MUTATOR_LIBRARY, --root or"),
+    ],
+)
+def test_the_command_line_names_its_options(
+    cli: Cli, own: Path, root: Path, words: list[str], said: str
+) -> None:
+    """Where the API names an argument, the command line names the option that stands for it."""
+    answer = cli(*words)
+    assert answer.code == 2, answer.err
+    assert said in answer.err
+    assert "`" not in answer.err.partition("to do")[2]
+
+
+def test_two_targets_are_told_apart_by_an_option(cli: Cli, own: Path, root: Path) -> None:
+    """The argument `target` is the option --manifest, since --target is the controller's source."""
+    targets = root / "fault_library" / "targets"
+    (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())
+    answer = cli("diff", "own.yaml")
+    assert answer.err.startswith("error: --manifest: 2 targets in the library (other, toycar)")

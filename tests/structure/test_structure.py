@@ -174,3 +174,31 @@ def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
     with (tmp_path / file).open("a", encoding="utf-8") as module:
         module.write(f"\n{line}\n")
     assert not is_clean(tmp_path)
+
+
+# vocabulary of options and help texts, and how data are shown: no verb does its work by them
+SHOWN_BY_THE_COMMAND_LINE = {
+    "mutator.config.yaml_files",
+    "mutator.engines.kinds",
+    "mutator.exports",
+    "mutator.mutants.readable_diffs",
+    "mutator.review.columns",
+    "mutator.review.readable_groups",
+}
+
+
+def test_the_command_line_calls_the_api() -> None:
+    """What a verb does is a call of the public API: the command line imports no package behind it."""
+    own = ("mutator.api.", "mutator.cli", "mutator._common.", "mutator.errors")
+    for path in (CLONE / "mutator" / "cli").glob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        types = {
+            node
+            for block in ast.walk(tree)
+            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+            for node in ast.walk(block)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.module and node not in types:
+                inside = node.module.startswith("mutator.") and not node.module.startswith(own)
+                assert not inside or node.module in SHOWN_BY_THE_COMMAND_LINE, f"{path}: {node.module}"

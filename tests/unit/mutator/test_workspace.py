@@ -69,7 +69,7 @@ def test_a_library_without_templates_uses_those_that_ship(elsewhere: Path) -> No
 
 def test_a_named_folder_must_be_there(elsewhere: Path) -> None:
     """What ships never stands in for a folder that was named: the message says what to correct."""
-    with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*--library"):
+    with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*`library`"):
         Workspace.find(library=elsewhere / "none", templates=elsewhere)
 
 

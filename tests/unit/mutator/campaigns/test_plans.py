@@ -129,8 +129,8 @@ def test_filters_and_limit(whole: Workspace) -> None:
     [
         ({"only": "t_h1 > 2"}, "unknown column `t_h1`"),
         ({"exclude": "value >"}, "not an expression"),
-        ({"limit": 0}, "limit 0"),
-        ({"seed": -1}, "seed -1"),
+        ({"limit": 0}, "limit: 0; expected a positive number"),
+        ({"seed": -1}, "seed: -1; expected a whole number"),
         ({"reading": "as_dreamt"}, "as_dreamt"),
     ],
 )

@@ -1,0 +1,78 @@
+"""A library made, checked and analysed, and the machine that is to use it."""
+
+from os import PathLike
+from pathlib import Path
+
+from mutator._common.shipped import write_library
+from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.errors import MutatorError
+from mutator.stpa.analysis import Analysis
+from mutator.stpa.checks import check_analysis
+from mutator.stpa.drawing import draw
+from mutator.verification import library
+from mutator.verification.doctor import Finding, examine
+from mutator.workspace import Workspace
+
+
+def init_library(folder: str | Path) -> Path:
+    """Write a fault library and templates to edit into a new or empty folder, which is returned.
+
+    They are copies of what ships with mutator, with a README. MutatorError for a folder that holds anything.
+    """
+    write_library(Path(folder))
+    return Path(folder)
+
+
+def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:
+    """Every problem of library, templates and target, in the order of the files; empty when all is well.
+
+    `target` names a manifest; default: the library's only one.
+    """
+    found = open_workspace(workspace)
+    return library.check_library(found, found.target_name(target))
+
+
+def check_hazard_analysis(
+    workspace: WorkspaceLike = None, *, target: str | None = None
+) -> list[MutatorError]:
+    """Every gap and contradiction of the hazard analysis, in the order of the files; empty: all is well.
+
+    `target` names a manifest; default: the library's only one. MutatorError for a library without analysis.
+    """
+    found = open_workspace(workspace)
+    analysis = _analysis(found)
+    manifest = found.manifest(found.target_name(target))
+    return check_analysis(analysis, found.specs(), manifest)
+
+
+def draw_control_structure(workspace: WorkspaceLike = None) -> str:
+    """The control structure of the hazard analysis as SVG. MutatorError for a library without analysis."""
+    return draw(_analysis(workspace))
+
+
+def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = None) -> list[Finding]:
+    """Can this machine run campaigns? Looks at interpreter, packages, machine, library and target.
+
+    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found` and `remedy`. That no library is
+    found is one of them; `workspace` may be the error that looking for it gave.
+    """
+    if isinstance(workspace, MutatorError):
+        return examine(workspace)
+    try:
+        found = open_workspace(workspace)
+    except MutatorError as error:
+        return examine(error)
+    return examine(found)
+
+
+def _analysis(workspace: WorkspaceLike) -> Analysis:
+    found = open_workspace(workspace)
+    analysis = found.analysis()
+    if analysis is None:
+        raise MutatorError(
+            "no control_structure.yaml",
+            where=found.library / "stpa",
+            expected="a hazard analysis",
+            remedy="write one, as docs/explanation/hazard-analysis.md says; campaigns need none",
+        )
+    return analysis

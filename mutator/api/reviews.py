@@ -1,0 +1,124 @@
+"""Groups of mutants that differ only in values, and what reviewers decided about them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.plans import Choices, make_plan
+from mutator.errors import MutatorError
+from mutator.review import catalogue
+from mutator.review.catalogue import Group
+from mutator.review.columns import COLUMNS
+from mutator.review.decisions import Review, State, Verdict
+from mutator.review.decisions import load_review as load_decisions
+from mutator.review.page import write_page
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReviewedGroups:
+    """Groups of mutants, new and changed ones first, and the decisions about them (`review`).
+
+    `options` of `mutator review` mean the same groups; the commands on a written page have them.
+    """
+
+    review: Review
+    groups: tuple[Group, ...]
+    options: tuple[str, ...] = ()
+
+    @property
+    def undecided(self) -> tuple[Group, ...]:
+        """The groups that are new, or have changed since the decision about them."""
+        return tuple(g for g in self.groups if self.review.state(g) in (State.NEW, State.CHANGED))
+
+    def matching(self, only: str | None = None, exclude: str | None = None) -> "ReviewedGroups":
+        """Those for which the filters hold: expressions over what `facts` gives."""
+        groups = self.groups
+        for text, wanted in ((only, True), (exclude, False)):
+            if text is not None:
+                accepts = compile_filter(text, COLUMNS)
+                groups = tuple(g for g in groups if accepts(facts(self.review, g)) is wanted)
+        return replace(self, groups=groups)
+
+    def find(self, starts: Sequence[str]) -> list[Group]:
+        """The groups whose ids start so, each once; MutatorError for none or several of a start."""
+        found: dict[str, Group] = {}
+        for start in starts:
+            hits = [group for group in self.groups if group.id.startswith(start)]
+            if len(hits) != 1 or not start:
+                raise MutatorError(
+                    f"{len(hits)} groups start with '{start}'" if hits else f"no group '{start}'",
+                    expected="an id of `mutator review`, or the beginning of just one",
+                    remedy="give more of it" if hits else "name the campaign or the spec that it is of",
+                )
+            found[hits[0].id] = hits[0]
+        return list(found.values())
+
+    def approve(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
+        """Approve groups as they are now; the decision is written into the library."""
+        return self._decide(groups, Verdict.APPROVED, by, remark)
+
+    def reject(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
+        """Reject groups as they are now; the decision is written into the library."""
+        return self._decide(groups, Verdict.REJECTED, by, remark)
+
+    def write_page(self, out: str | Path) -> Path:
+        """Write a page of all groups, complete in itself."""
+        write_page(Path(out), self.review, self.groups, self.options)
+        return Path(out)
+
+    def _decide(self, groups: Sequence[Group], verdict: Verdict, by: str, remark: str) -> "ReviewedGroups":
+        decided = self.review.decided(groups, verdict, by, remark)
+        decided.write()
+        return replace(self, review=decided)
+
+
+def load_review(
+    *,
+    campaign: str | None = None,
+    specs: Sequence[str] = (),
+    reading: str | None = None,
+    seed: int | None = None,
+    target: str | None = None,
+    workspace: WorkspaceLike = None,
+) -> ReviewedGroups:
+    """The groups of mutants of a campaign, of specs (names, globs, files), or of all the library.
+
+    Every mutant is built, none is run. `target` names a manifest; default: the library's only one, and a
+    campaign's own. MutatorError for a campaign together with specs, and for a mistake in any of them.
+    """
+    if campaign and specs:
+        raise MutatorError("together with specs", argument="campaign", expected="one or the other")
+    found = open_workspace(workspace)
+    if campaign:
+        plan = make_plan(found, campaign, Choices(seed=seed, reading=reading))
+        manifest = found.manifest(plan.campaign.target)
+        groups = catalogue.of_plan(found, plan)
+    else:
+        manifest = found.manifest(found.target_name(target))
+        groups = catalogue.of_library(found, manifest, specs=specs, reading=reading, seed=seed or 0)
+    review = load_decisions(found, manifest.name)
+    given = {"--campaign": campaign, "--reading": reading, "--manifest": target}
+    words = [word for name, value in given.items() if value for word in (name, value)]
+    words += ["--seed", str(seed)] if seed is not None else []
+    words += [word for spec in specs for word in ("--spec", spec)]
+    return ReviewedGroups(review=review, groups=tuple(review.in_turn(groups)), options=tuple(words))
+
+
+def facts(review: Review, group: Group) -> dict[str, object]:
+    """What the filters know of a group; several of one kind stand with commas between them."""
+    decision = review.decisions.get(group.id)
+    return {
+        "group": group.id,
+        "state": review.state(group).value,
+        "by": decision.by if decision else None,
+        "file": ", ".join(group.files),
+        "function": ", ".join(group.functions),
+        "model": ", ".join(group.models),
+        "trigger": group.trigger,
+        "hold": group.hold,
+        "spec": ", ".join(group.specs),
+        "faults": len(group.faults),
+        "runs": group.runs,
+    }

@@ -1,0 +1,40 @@
+"""Libraries made and checked from Python."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.errors import MutatorError
+from mutator.workspace import Workspace
+
+
+def test_a_library_is_made_once(tmp_path: Path) -> None:
+    """The new folder is a workspace; a second library is not written over it."""
+    folder = mutator.init_library(tmp_path / "own")
+    assert mutator.Workspace.find(folder).campaigns
+    with pytest.raises(MutatorError, match="not empty"):
+        mutator.init_library(folder)
+
+
+def test_problems_of_a_library_are_a_list(toycar: Workspace) -> None:
+    """A spec that is broken is one problem more, with its file."""
+    before = {problem.where for problem in mutator.check_library(toycar)}
+    spec = toycar.spec("sensor/lane").path
+    spec.write_text("nonsense: true\n")
+    assert {problem.where for problem in mutator.check_library(toycar)} - before == {str(spec)}
+
+
+def test_the_doctor_knows_a_library_that_is_missing(toycar: Workspace, tmp_path: Path) -> None:
+    """That no library is found is a finding, no error."""
+    found = {f.name: f.level for f in mutator.doctor(tmp_path / "none")}
+    assert found["library"] == "failed"
+    assert {f.name for f in mutator.doctor(toycar)} >= {"library"}
+
+
+def test_an_analysis_is_asked_for(toycar: Workspace, tmp_path: Path) -> None:
+    """Without a hazard analysis there is nothing to check or draw, and that is said."""
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(MutatorError, match=r"no control_structure\.yaml"):
+        mutator.draw_control_structure(replace(toycar, library=tmp_path / "empty"))
