@@ -168,7 +168,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     chunks = cut_runs(once, loaded.chunk)
     if choices.shard is not None and Shard.parse(choices.shard).of > len(chunks):
         raise MutatorError(
-            f"shard {choices.shard}",
+            choices.shard,
             argument="shard",
             expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
             remedy="use fewer shards, or a smaller chunk in the campaign",

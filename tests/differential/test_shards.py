@@ -188,7 +188,7 @@ def fail(run: Path) -> Path:
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/7"])
 def test_a_shard_that_cannot_be(toy: Workspace, shard: str) -> None:
     """A share that is none, or more shares than chunks, is refused before anything runs."""
-    with pytest.raises(MutatorError, match=f"shard '?{shard}"):
+    with pytest.raises(MutatorError, match=f"shard:? '?{shard}"):
         make_plan(toy, "small", Choices(shard=shard))
 
 

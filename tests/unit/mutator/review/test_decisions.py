@@ -116,13 +116,13 @@ def test_hand_edits_are_checked(toycar: Workspace, old: str, new: str, line: int
 
 
 @pytest.mark.parametrize(
-    ("by", "remark", "option"), [("", "", "--by"), (" \n", "", "--by"), ("J", "a\0b", "--remark")]
+    ("by", "remark", "argument"), [("", "", "by"), (" \n", "", "by"), ("J", "a\0b", "remark")]
 )
-def test_no_name_or_no_text(toycar: Workspace, by: str, remark: str, option: str) -> None:
+def test_no_name_or_no_text(toycar: Workspace, by: str, remark: str, argument: str) -> None:
     """A decision has somebody's name, and what is kept of it is text."""
     with pytest.raises(MutatorError) as caught:
         load_review(toycar, "toycar").decided([group("a")], Verdict.APPROVED, by, remark)
-    assert caught.value.where == option
+    assert caught.value.argument == argument
 
 
 def test_a_remark_is_one_line(toycar: Workspace) -> None:
