@@ -151,7 +151,7 @@ def test_the_shipped_library_takes_no_decisions(
 ) -> None:
     """Decisions about the library that came with a wheel are refused before anything is written."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "cache"))
     path = tmp_path / "cache" / "mutator" / "shipped" / "0" / "reviews" / "toycar.yaml"
     with pytest.raises(MutatorError, match=r"reviews/toycar.yaml: .*ships with mutator.*mutator init DIR"):
         dataclasses.replace(review(toycar, "a"), path=path).write()
