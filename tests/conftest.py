@@ -36,22 +36,33 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """What fixtures of modules and sessions cache is not the user's."""
+    folder = tmp_path_factory.mktemp("caches")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("caches")))
-        yield
+        patch.setenv("XDG_CACHE_HOME", str(folder))
+        yield folder
 
 
 @pytest.fixture(autouse=True)
 def _cache(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _caches: None
-) -> Iterator[None]:
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _caches: Path
+) -> Iterator[Path]:
     """A test finds nothing that an earlier one cached, and leaves nothing: pictures take 184 MB."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
-    yield
+    yield folder
     shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def kept_checks(_cache: Path, _caches: Path) -> None:
+    """Checks that passed in an earlier test of these very sources are known, as on anyone's machine: they
+    take as long as a small campaign."""
+    kept = _caches / "mutator" / "checks"
+    kept.mkdir(parents=True, exist_ok=True)
+    (_cache / "mutator").mkdir()
+    (_cache / "mutator" / "checks").symlink_to(kept)
 
 
 @pytest.fixture

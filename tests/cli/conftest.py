@@ -45,8 +45,9 @@ def cli(capfd: pytest.CaptureFixture[str]) -> Cli:
 
 
 @pytest.fixture
-def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The toy's root, named by the environment, without what is broken on purpose; one works elsewhere."""
+def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept_checks: None) -> Path:
+    """The toy's root, named by the environment, without what is broken on purpose; one works elsewhere, and
+    its checks are known."""
     root = toy.library.parent
     shutil.rmtree(toy.library / "faults" / "hostile")
     for template in (TOY / "templates").iterdir():

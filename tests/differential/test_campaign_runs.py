@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -17,14 +18,26 @@ from .command import DERIVED, Bytes, Command, pytest_words, results
 CopyToycar = Callable[[Path], Workspace]
 
 
+@pytest.fixture
+def toy(toy: Workspace, kept_checks: None) -> Workspace:
+    """The toy, whose checks are known."""
+    return toy
+
+
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Bytes:
-    """What the small campaign gives when it is run in one process, in one go."""
+def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
+    """The small campaign, run in one process, in one go; no test may write to its folder."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run")
     assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
     assert {"hazard", "sdc", "not_activated"} <= set(summary.outcomes)
-    return results(folder / "run")
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def undisturbed(whole: Path) -> Bytes:
+    """What it gives."""
+    return results(whole)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -71,11 +84,10 @@ def test_one_by_one(
     assert results(tmp_path / "run") == undisturbed
 
 
-def test_lost_records_run_again(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """Lines lost at the end of a records file are run again, what is in the others is not."""
-    out = tmp_path / "run"
-    run_campaign(toy, "small", out, workers=2)
-    path = max((out / "records").iterdir(), key=lambda p: p.stat().st_size)
+def test_lost_records_run_again(toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes) -> None:
+    """Lines lost at the end of a records file are run again, and no others."""
+    out = shutil.copytree(whole, tmp_path / "run")
+    [path] = (out / "records").iterdir()
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-3]) + lines[-3][:25])
     summary = run_campaign(toy, "small", out)
@@ -83,10 +95,11 @@ def test_lost_records_run_again(toy: Workspace, tmp_path: Path, undisturbed: Byt
     assert results(out) == undisturbed
 
 
-def test_derived_files_can_be_made_again(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+def test_derived_files_can_be_made_again(
+    toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes
+) -> None:
     """Tables deleted from a complete run come back from its records, byte for byte."""
-    out = tmp_path / "run"
-    run_campaign(toy, "small", out)
+    out = shutil.copytree(whole, tmp_path / "run")
     for name in DERIVED:
         (out / name).unlink()
     summary = run_campaign(toy, "small", out)
@@ -115,14 +128,14 @@ def test_killed_and_resumed(
     assert results(out) == undisturbed
 
 
-def test_killed_during_the_checks(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """Killed before its first experiment, the command begins anew and gives the same bytes."""
     out = tmp_path / "run"
-    command = Command(toy, out, *pytest_words(out))
+    command = Command(toycar, out, *pytest_words(out))
     command.wait_for(out / "work" / "checks")
     command.process.kill()
     command.end()
-    assert run_campaign(toy, "small", out).exit_code == 0
+    assert run_campaign(toycar, "small", out).exit_code == 0
     assert results(out) == undisturbed
 
 

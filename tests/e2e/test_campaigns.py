@@ -34,6 +34,12 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
+@pytest.fixture
+def toy(toy: Workspace, kept_checks: None) -> Workspace:
+    """The toy, whose checks are known."""
+    return toy
+
+
 @pytest.fixture(scope="module")
 def finished_once(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
     folder = tmp_path_factory.mktemp("finished")
@@ -63,13 +69,13 @@ def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
     }
 
 
-def test_a_run_leaves_what_it_should(toy: Workspace, tmp_path: Path) -> None:
+def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
     """Plan, goldens, patches, records, tables; no scratch; and the target's tree is what it was."""
-    tree = toy.library.parent / "tree"
+    tree = toycar.library.parent / "tree"
     before = contents(tree)
     out = tmp_path / "run"
     told: list[Progress] = []
-    summary = run_campaign(toy, "small", out, workers=2, notify=told.append)
+    summary = run_campaign(toycar, "small", out, workers=2, notify=told.append)
     assert contents(tree) == before
     assert {stage.stage for stage in told} == {"plan", "checks", "experiments", "results"}
     assert told[-2].done == 12

@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import shutil
 from collections.abc import Callable
 from html import unescape
 from pathlib import Path
@@ -79,24 +80,37 @@ def test_it_says_what_it_is(run: Run) -> None:
     assert list(run.experiments) == list(plan_file.ids(run.path))
 
 
-@pytest.fixture
-def driven(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Run:
+@pytest.fixture(scope="module")
+def driven_once(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+) -> Path:
     """A run of one experiment that was really driven, with golden run, patch and record, and no trace."""
+    root = tmp_path_factory.mktemp("driven")
+    toycar = copy_toycar(root)
     folder = RunFolder.open(
-        write_run(toycar, tmp_path / "runs" / "first", lambda e: None, campaign="small", only=LANE, limit=1)
+        write_run(toycar, root / "run", lambda e: None, campaign="small", only=LANE, limit=1)
     )
     [experiment] = plan_file.read_all(folder.path)
-    single = run_single(toycar, toycar.manifest("toycar"), experiment, tmp_path / "single")
+    single = run_single(toycar, toycar.manifest("toycar"), experiment, root / "single")
     golden = folder.golden(experiment.scenario, experiment.changes)
     golden.parent.mkdir()
     single.golden.rename(golden)
     patch = folder.patch(experiment.id)
     patch.parent.mkdir(parents=True)
-    (tmp_path / "single" / "mutant.patch").rename(patch)
+    (root / "single" / "mutant.patch").rename(patch)
     lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA})
     lines.append(dataclasses.asdict(single.record))
     lines.close()
-    return mutator.load_run(folder.path, workspace=toycar)
+    return folder.path
+
+
+@pytest.fixture
+def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
+    """A copy of it in runs/first that a test may add to."""
+    run = shutil.copytree(driven_once, tmp_path / "runs" / "first")
+    return mutator.load_run(run, workspace=toycar)
 
 
 def test_traces_are_driven_when_asked_for(driven: Run) -> None:

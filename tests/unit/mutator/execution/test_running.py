@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.execution.worker import Assignment, Worker
@@ -30,6 +32,7 @@ class Idle:
         session.problem = "no machine answered"
 
 
+@pytest.mark.usefixtures("kept_checks")
 def test_another_distributor_gives_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
     """Who deals out the work changes no byte of the results, and resume takes over what another one left."""
     assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
