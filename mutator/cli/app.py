@@ -123,10 +123,21 @@ for module in (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
     try:
+        code = _answer(sys.argv[1:] if argv is None else argv)
+        sys.stdout.flush()  # now, for at the interpreter's end a closed pipe would be an error
+    except BrokenPipeError:
+        # Who read the output has seen enough; what is still buffered goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_OK
+    return code
+
+
+def _answer(words: Sequence[str]) -> int:
+    """Run one command line, and show what ends it early; BrokenPipeError when nobody reads its output."""
+    try:
         # Not `app()`: it would answer errors, interruptions and closed pipes in its own way.
         command = get_command(app)
-        words = list(sys.argv[1:] if argv is None else argv)
-        with terminable(), command.make_context("mutator", words or ["--help"]) as ctx:
+        with terminable(), command.make_context("mutator", [*words] or ["--help"]) as ctx:
             command.invoke(ctx)
         return EXIT_OK
     except typer.Exit as e:
@@ -140,9 +151,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _say(str(e) or "interrupted")
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Who read the output has seen enough; what is still buffered goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_OK
+        raise
     except OSError as e:
         if e.errno not in THE_MACHINE_SAYS_NO:
             return _defect()

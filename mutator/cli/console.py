@@ -212,7 +212,13 @@ def short_path(where: str | Path | None) -> str:
 def _console(*, stderr: bool) -> "Console":
     from rich.console import Console
 
-    return Console(stderr=stderr, highlight=False, emoji=False)  # `:x:` in a text is no picture
+    class Piped(Console):
+        """Says when nobody reads any more, as other files do, instead of leaving with 1."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Piped(stderr=stderr, highlight=False, emoji=False)  # `:x:` in a text is no picture
 
 
 def _cell(value: object) -> str:
