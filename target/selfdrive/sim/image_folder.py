@@ -162,10 +162,15 @@ def _listed(folder: Path, root: Section) -> list[Path]:
         "files below the folder",
         "put them there",
     )
-    try:
-        files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
-    except ValueError as error:
-        root.check("files", False, "a pattern such as *.png, */*.png or **/*.png", str(error))
+    *folders, name = pattern.split("/")
+    # Other uses of `**` mean different things in different versions of Python.
+    root.check(
+        "files",
+        bool(name) and "**" not in name and all(part == "**" or "**" not in part for part in folders),
+        "a pattern such as *.png, */*.png or **/*.png",
+        "correct the pattern",
+    )
+    files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
     root.check("files", bool(files), f"the name of a file in {folder}", "no file is called so")
     for missing in _gaps(files):
         raise ConfigError(
