@@ -62,7 +62,7 @@ def test_an_example_that_does_not_hold(folder: Path) -> None:
     path.write_text(path.read_text().replace(" * ", " / "))
     (problem,) = check_examples(load_fault_models(folder))
     assert problem.where == str(folder / "scale.yaml") and problem.line == 9
-    assert "self.yaw_rate / -0.5" in str(problem) and "self.yaw_rate * -0.5" in str(problem)
+    assert all(f"self.yaw_rate {sign} _fi.like(" in str(problem) for sign in "*/")
 
 
 def test_an_example_that_fails(folder: Path) -> None:
@@ -91,7 +91,7 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
         ("scale.yaml", "kind: insert", "kind: wrap", "3: 'wrap' for 'kind'; expected one of 'insert' or"),
         ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
         ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
-        ("offset.yaml", "unit: target", "unit: feet", "7: 'feet'; expected target or one of m, mps"),
+        ("offset.yaml", "unit: target", "unit: feet", "8: 'feet'; expected target or one of m, mps"),
         ("scale.yaml", "examples:", "samples:", "8: unknown key 'samples'"),
         (
             "scale.yaml",
