@@ -56,6 +56,19 @@ def test_examples_hold(clone: Workspace, name: str) -> None:
         assert run_example(model, models, example) == example.after
 
 
+def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> None:
+    """Verdicts depend on which models are there to raise, so the digest does, too; none that ships is."""
+    known = clone.fault_models()
+    assert not any(model.raises for model in known)
+    path = folder / "scale.yaml"
+    path.write_text(path.read_text().replace("kind: insert\n", "kind: insert\nraises: false\n"))
+    assert load_fault_models(folder).digest == known.digest
+    path.write_text(path.read_text().replace("raises: false\n", "raises: true\n"))
+    models = load_fault_models(folder)
+    assert [model.name for model in models if model.raises] == ["scale"]
+    assert models.digest != known.digest
+
+
 def test_an_example_that_does_not_hold(folder: Path) -> None:
     """A template that gives something else than its example says is a problem with file and line."""
     path = folder / "scale.py.j2"
