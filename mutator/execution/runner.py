@@ -15,7 +15,7 @@ from mutator.model import Activation, Experiment, Record, Status
 from mutator.mutants.building import InvalidMutant, Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
-from mutator.outcomes.blame import blame, error_of
+from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
 from mutator.outcomes.verdicts import first_events, judge
 from mutator.targets.manifest import TargetManifest
@@ -147,7 +147,7 @@ class Runner:
 
     def _record(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
         if execution.status is not Status.OK or execution.probe is None:
-            status, detail = blame(execution, built.files, self._raising(experiment, built))
+            status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
             # a time-out's count depends on the machine's speed, a crash's does not
             crashed = status is Status.CRASHED
             activation = activation_of(execution.probe or {}) if crashed else None

@@ -24,7 +24,9 @@ class _Source:
     tag: Tag | None = None
 
 
-def blame(execution: Execution, files: Mapping[str, bytes], raising: Collection[str]) -> tuple[Status, str]:
+def assign_blame(
+    execution: Execution, files: Mapping[str, bytes], raising: Collection[str]
+) -> tuple[Status, str]:
     """Status and detail of a run that did not end well, of a mutant with these changed files.
 
     `raising` are the ids of the injections whose fault models declare that they raise.

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.engines.jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
-from mutator.outcomes.blame import blame, error_of
+from mutator.outcomes.blame import assign_blame, error_of
 
 FILES = {
     "car/radar.py": b"""from car import _fi  # fi:probe
@@ -62,12 +62,14 @@ def execution(
 def test_what_was_on_the_stack(stack: Stack, status: Status) -> None:
     """The target's own code crashes. What an injected line was doing, itself, in a helper of the probe or in
     the target, makes the mutant invalid. To observe and to ask the probe is not the target's doing."""
-    assert blame(execution(stack), FILES, ())[0] is status
+    assert assign_blame(execution(stack), FILES, ())[0] is status
 
 
 def test_words() -> None:
     """Who is to blame is said with the line or the reason."""
-    told = [blame(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))]
+    told = [
+        assign_blame(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
+    ]
     assert [detail for _, detail in told] == [
         "ValueError: no (car/radar.py:6)",
         "car/radar.py:5: the injected `d_rel = _fi.flip_bit(d_rel, 3)` ended the run: "
@@ -78,16 +80,16 @@ def test_words() -> None:
 
 def test_a_model_may_raise() -> None:
     """Of an injection that is there to raise an exception is a crash; it does not excuse another one."""
-    assert blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
-    assert blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
-    assert blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
+    assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
+    assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
+    assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 @pytest.mark.parametrize("stacks", [(), ((TARGET,),), ((INJECTED,),)])
 def test_before_the_activation(status: Status, stacks: tuple[Stack, ...]) -> None:
     """Whatever ended the run, it was not the fault if that was never active."""
-    told = blame(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
+    told = assign_blame(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
     assert told[0] is Status.HARNESS_ERROR
     assert told[1].endswith(", before the fault was active")
 
@@ -95,31 +97,31 @@ def test_before_the_activation(status: Status, stacks: tuple[Stack, ...]) -> Non
 def test_what_has_no_exception() -> None:
     """A time-out or a silent end after the activation is what it is, as is a harness error at any time."""
     for status in (Status.CRASHED, Status.TIMEOUT):
-        assert blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
-    told = blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
+        assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
+    told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
     assert told == (Status.HARNESS_ERROR, "why")
 
 
 def test_what_an_exception_came_of_counts() -> None:
     """The target may catch what an injected line or the probe raised, and raise something else. The probe
     goes first."""
-    assert blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
-    assert blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
-    assert blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
+    assert assign_blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
+    assert assign_blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
+    assert assign_blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
 
 
 def test_which_call_was_one_too_many_is_chance() -> None:
     """A target that recurses for ever is to blame, even if the last call was one of an injected line."""
     for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
         deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
-        assert blame(deep, FILES, ())[0] is Status.CRASHED
+        assert assign_blame(deep, FILES, ())[0] is Status.CRASHED
     inside = execution((TARGET, INJECTED, ELSEWHERE), kind="RecursionError")
-    assert blame(inside, FILES, ())[0] is Status.INVALID_MUTANT
+    assert assign_blame(inside, FILES, ())[0] is Status.INVALID_MUTANT
 
 
 def test_a_probe_that_cannot_report_failed() -> None:
     """An exception without a report of the probe is the one that the probe had to tell."""
-    assert blame(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
+    assert assign_blame(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
 
 
 def test_records_keep_type_text_and_place() -> None:
