@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from mutator._common.hashing import added_values, content_id
+from mutator._common.hashing import added, added_values, content_id
 
 Value = int | float | str | bool | None
 
@@ -207,11 +207,22 @@ class Activation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RunError:
+    """An exception that ended a run: its type, its text, and the innermost line of the target, `file:line` in
+    the tree that ran (empty if it passed none)."""
+
+    kind: str
+    message: str
+    place: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
     """All that is kept of one experiment. Times are seconds of simulation; None: did not happen.
 
-    `hazards` and `alerts` are (name, first time) pairs sorted by time; only what came at or after the
-    activation is kept. `max_dev` and `t_manifest` refer to the manifest's compared channels.
+    `error` is the exception that ended the run, if one did, whoever is to blame. `hazards` and `alerts` are
+    (name, first time) pairs sorted by time; only what came at or after the activation is kept. `max_dev` and
+    `t_manifest` refer to the manifest's compared channels.
     """
 
     experiment_id: str
@@ -225,3 +236,4 @@ class Record:
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[tuple[str, float], ...]
     trace_digest: str
+    error: RunError | None = added(None)

@@ -1,7 +1,7 @@
 """One experiment to look at: what was injected, what became of it, golden against faulty."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from mutator.api.html import diff_html, facts_html, text_html
@@ -54,7 +54,8 @@ class ExperimentResult(ABC):
     def _facts(self) -> list[tuple[str, object]]:
         facts = describe(self.experiment) | (verdict(self.record) if self.record else {"status": "not run"})
         texts = {
-            name: ", ".join(f"{k} {v:.4g}" for k, v in value.items()) or None
+            name: ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in value.items())
+            or None
             for name, value in facts.items()
             if isinstance(value, dict)
         }
@@ -159,6 +160,7 @@ def verdict(record: Record) -> dict[str, Any]:
         "status": record.status.value,
         "outcome": record.outcome.value if record.outcome else None,
         "detail": record.detail,
+        "error": asdict(record.error) if record.error else None,
         "activated_s": activation.first if activation else None,
         "active_until_s": activation.last if activation else None,
         "activations": activation.count if activation else 0,

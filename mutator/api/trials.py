@@ -11,7 +11,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
-from mutator.outcomes.golden import Trace, load_trace
+from mutator.outcomes.golden import Trace, hazards_of, load_record, load_trace
 from mutator.targets.manifest import TargetManifest
 
 
@@ -48,6 +48,13 @@ class Trial(ExperimentResult):
     def has_trace(self) -> bool:
         """Whether the faulty run left a trace."""
         return (self.single.faulty / self.manifest.trace_file).is_file()
+
+    @property
+    def golden_hazards(self) -> tuple[tuple[str, float], ...]:
+        """Hazards (name, time in s) that the fault-free run reaches itself, so that they are not the fault's
+        doing; a campaign would refuse such a scenario. MutatorError when its record cannot be read."""
+        found = hazards_of(load_record(self.manifest, self.single.golden), self.manifest.hazards)
+        return tuple(sorted(found, key=lambda hazard: hazard[1]))
 
     def traces(self) -> TraceFrames:
         """Golden and faulty run as pandas frames; MutatorError when the faulty run left no trace."""

@@ -74,10 +74,14 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
         drawn = trial.save_plot(trial.folder / "plot.svg")
     if terminal.as_json:
         facts = {**describe(trial.experiment), **verdict(trial.record), "patch": trial.patch}
+        facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
         terminal.emit(facts | {"traces": str(trial.single.faulty), "plot": str(drawn) if drawn else None})
         return
     print_experiment(terminal, trial.experiment, trial.patch)
     print_verdict(terminal, trial.record)
+    if trial.golden_hazards:
+        reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)
+        terminal.say(f"the fault-free run reaches {reached} itself: that need not be the fault's doing")
     if trial.log.strip() and trial.record.detail:
         terminal.say("last lines of the run:")
         terminal.say(trial.log.strip())

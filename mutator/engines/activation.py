@@ -37,11 +37,12 @@ class Observed:
 class Start:
     """Where a mutant leaves the golden run: before this step, after `observed` observations.
 
-    The last of them was at time `t` (s); None: there was none.
+    The run began with one at time `began` (s), and the last of them was at `t`; None: there was none.
     """
 
     step: int
     observed: int
+    began: float | None
     t: float | None
 
 
@@ -62,5 +63,7 @@ def _first_active(probe: CodeType, seen: Observed) -> Start | None:
         if values[0] >= armed_t and holds(*values):
             step = seen.step_of(number)
             done = seen.before[step]
-            return Start(step=step, observed=done, t=seen.values[done - 1][0] if done else None)
+            times = [t for t, *_ in seen.values[:done]]  # a run that starts again does so no later
+            last = times[-1] if done else None
+            return Start(step=step, observed=done, began=min(times, default=None), t=last)
     return None

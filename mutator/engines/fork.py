@@ -19,11 +19,20 @@ from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
 from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting
 from mutator.engines.jobs import Execution, Job, RunMode, Setting
-from mutator.engines.processes import Ended, is_full, judge_report, judge_silent, read_report, tail
+from mutator.engines.processes import (
+    Ended,
+    inactive,
+    is_full,
+    judge_report,
+    judge_silent,
+    read_report,
+    tail,
+    was_active,
+)
 from mutator.engines.reference import ReferenceEngine
 from mutator.model import Limits, Status
 from mutator.mutants.building import build
-from mutator.mutants.probe import mutant_of, probe_module, silent_report, state_after
+from mutator.mutants.probe import probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import OBSERVED
 from mutator.triggers.kinds import always
@@ -130,11 +139,13 @@ class ForkEngine:
         """Have a waiting process fork a child that finishes the run as the mutant."""
         out = folder / "out"
         out.mkdir(parents=True)
+        inactive(folder).touch()
         request = {
             "home": str(folder),
             "out": str(out),
             "log": str(folder / "log"),
             "report": str(folder / "report.json"),
+            "inactive": str(inactive(folder)),
             "args": self._arguments(job, self._running().home if watch else out),  # begun as waiting ones are
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
@@ -142,7 +153,7 @@ class ForkEngine:
             "probe_name": probe_module(self._manifest.package),
             "probe": swap.probe,
             "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
-            "probe_state": state_after(start.observed, start.t),
+            "probe_state": state_after(start.observed, start.began, start.t),
             "watch": OBSERVED if watch else (),
         }
         asked = {"do": "mutant", "job": marshal.dumps(request), "wall_s": self._limits.wall_s}
@@ -173,6 +184,7 @@ class ForkEngine:
             probe=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
+            active=was_active(folder),
             log=tail(folder / "log"),
             mode=RunMode.WARM if self._warm else RunMode.FORK,
         )
@@ -180,7 +192,7 @@ class ForkEngine:
     def _check(self, job: Job, report: dict[str, Any]) -> None:
         """Refused unless the child was the job's mutant and left the server as it was."""
         if report["ended"] == "swap refused":
-            raise Refused(report["error"])
+            raise Refused(report["why"])
         if report["touched"]:
             self.close()
             raise Refused("it writes into its own tree")
@@ -188,8 +200,8 @@ class ForkEngine:
             raise Refused(f"the package was also imported from {', '.join(report['outside'])}")
         if report["threads"] != 1:
             raise Refused("it leaves threads behind")
-        if job.mutant not in (None, mutant_of(report["probe"])):
-            raise Refused("the probe that ran is not the one of this mutant")
+        if report["ended"] == "ok" and (problem := job.problem_of(report["probe"])):
+            raise Refused(problem)
 
     def _observed(self, job: Job, golden: Path) -> Observed:
         """What a probe observes in the golden run of a job, which is driven once to know it."""
@@ -241,7 +253,7 @@ class ForkEngine:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-_FROM_THE_START = Start(step=0, observed=0, t=None)
+_FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
 
 
 def _needed(swap: CodeSwap) -> list[str]:

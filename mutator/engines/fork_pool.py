@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.hashing import digest
-from mutator.engines.processes import environment
+from mutator.engines.processes import environment, raised_in
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
@@ -148,7 +148,7 @@ class Pool:
     def _welcome(self, manifest: TargetManifest) -> None:
         said, _ = self.first.reply(_START_S)
         if "failed" in said:
-            raise Refused(f"it cannot be loaded: {said['failed']}")
+            raise Refused(f"it cannot be loaded: {_why(said['failed'])}")
         if said["threads"] != 1:
             raise Refused(f"it has {said['threads']} threads once it is loaded, and only one can be forked")
         pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
@@ -188,7 +188,7 @@ class Pool:
         reply, _ = made.reply(patience_s)
         if "failed" in reply:
             made.close()
-            raise Refused(f"its golden run cannot be driven step by step: {reply['failed']}")
+            raise Refused(f"its golden run cannot be driven step by step: {_why(reply['failed'])}")
         made.step = reply["step"]
         self._waiting.append(made)
         return made
@@ -203,3 +203,9 @@ class Pool:
             self._process.kill()
             self._process.wait()
         shutil.rmtree(self.home, ignore_errors=True)
+
+
+def _why(failed: dict[str, Any]) -> str:
+    """What a process of the server ran into, in words."""
+    raised = raised_in(failed)
+    return raised.text if raised else ""

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
+from mutator.mutants.probe import is_probe, report_problem
 from mutator.targets.manifest import TargetManifest
 
 
@@ -30,17 +31,53 @@ class Job:
     changes: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     mutant: str | None = None  # id that the probe must report; None: a tree without probe
+    injections: tuple[str, ...] = ()  # ids that it must report on
     hash_seed: int = 0
     golden: Path | None = None  # output folder of the run without the fault, where it is known
+
+    def problem_of(self, report: object) -> str:
+        """What is wrong with what its probe reported; empty if nothing is, or if it has no probe."""
+        return "" if self.mutant is None else report_problem(report, self.mutant, self.injections)
+
+
+Stack = tuple[tuple[str, int], ...]  # (file, line) in the tree, innermost first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Raised:
+    """The exception that ended a run: its type, its text, and where it passed the tree on its way out.
+
+    `stacks[0]` is its own; the others are those of the exceptions that it came of or that are in it.
+    """
+
+    kind: str
+    message: str
+    stacks: tuple[Stack, ...]
+
+    @property
+    def place(self) -> str:
+        """`file:line` of the innermost line of the target (the probe is none); empty if there is none."""
+        return next((f"{path}:{line}" for path, line in self.stacks[0] if not is_probe(path)), "")
+
+    @property
+    def text(self) -> str:
+        """Type, text and place, for people."""
+        if self.kind == SystemExit.__name__:
+            what = f"exit status {self.message}"
+        else:
+            what = f"{self.kind}: {self.message}" if self.message else self.kind
+        return f"{what} ({self.place})" if self.place else what
 
 
 @dataclass(frozen=True, kw_only=True)
 class Execution:
     """The result of a job. `out` holds the target's trace and record when status is ok.
 
-    `probe` is the probe's report if the tree has one; `log` the tail of what the run printed. `mode`
-    says how it was carried out, and `why` another engine did it than the one that was asked; `start` is the
-    step before which the golden run did its work.
+    The status says how the run ended; whose doing that is, `outcomes.blame` decides. `raised` is the
+    exception that ended it, and `active` says whether an injection was active in it. `probe` is the probe's
+    report if the tree has one; `log` the tail of what the run printed. `mode` says how it was carried out,
+    and `why` another engine did it than the one that was asked; `start` is the step before which the golden
+    run did its work.
     """
 
     status: Status
@@ -49,6 +86,8 @@ class Execution:
     probe: dict[str, Any] | None
     cpu_s: float
     wall_s: float
+    raised: Raised | None = None
+    active: bool = False
     log: str = ""
     mode: RunMode = RunMode.REFERENCE
     why: str = ""

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator.engines.jobs import Raised
 from mutator.model import Limits, Status
 
+_REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
 _LOG_TAIL = 4000
 _LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
@@ -45,9 +47,18 @@ def judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
     """Status and detail of a run of the right tree that reported how it ended."""
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
-    if report["ended"] == "error":
-        return Status.CRASHED, report["error"]
+    if raised := raised_in(report):
+        return Status.CRASHED, raised.text
     return Status.OK, ""
+
+
+def raised_in(report: dict[str, Any]) -> Raised | None:
+    """The exception that a report tells of."""
+    error = report["error"]
+    if error is None:
+        return None
+    stacks = tuple(tuple((str(path), int(line)) for path, line in stack) for stack in error["stacks"])
+    return Raised(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
 
 
 def environment(hash_seed: int, folder: Path) -> dict[str, str]:
@@ -92,12 +103,25 @@ def tail(path: Path) -> str:
 
 
 def read_report(path: Path) -> dict[str, Any] | None:
-    """The child's report; None when it did not come to write one, or only a part of it."""
+    """The child's report; None when it did not come to write one, or only a part of it, or when what is there
+    is none: a run may write what it likes, and leave."""
     try:
         report: dict[str, Any] = json.loads(path.read_bytes())
-    except (OSError, ValueError):
+        raised_in(report)
+        sound = all(isinstance(report[key], kind) for key, kind in _REPORT.items())
+    except (OSError, LookupError, TypeError, ValueError, RecursionError):
         return None
-    return report
+    return report if sound else None
+
+
+def inactive(folder: Path) -> Path:
+    """The file in a run's folder that its first activation deletes."""
+    return folder / "inactive"
+
+
+def was_active(folder: Path) -> bool:
+    """Whether an injection was active in the run of that folder."""
+    return not inactive(folder).exists()
 
 
 def is_full(work: Path, report: dict[str, Any] | None) -> bool:

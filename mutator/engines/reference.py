@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +19,19 @@ from mutator.engines.processes import (
     Ended,
     ended_within,
     environment,
+    inactive,
     is_full,
     judge_report,
     judge_silent,
     kill_group,
+    raised_in,
     read_report,
     steady,
     tail,
+    was_active,
 )
 from mutator.model import Limits, Status
-from mutator.mutants.probe import mutant_of, probe_module
+from mutator.mutants.probe import probe_module
 from mutator.targets.manifest import TargetManifest
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
@@ -82,13 +86,16 @@ class ReferenceEngine:
         status, detail = self._judge(job, ended, report)
         if status is not Status.OK and is_full(self.work, report):
             raise disk_full(self.work)
+        raised = raised_in(report) if report and status is Status.CRASHED else None
         return Execution(
             status=status,
             detail=steady(detail, folder),
             out=folder / "out",
-            probe=report.get("probe") if report else None,
+            probe=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
+            raised=raised and replace(raised, message=steady(raised.message, folder)),
+            active=was_active(folder),
             log=log,
         )
 
@@ -98,6 +105,7 @@ class ReferenceEngine:
         shutil.copytree(self.base, tree, copy_function=_link_or_copy)
         bytecode.put(job.files, tree)
         out.mkdir()
+        inactive(folder).touch()
         arguments = self.manifest.arguments(
             scenario=job.scenario.resolve(),
             seed=job.seed,
@@ -114,6 +122,7 @@ class ReferenceEngine:
             "probe": probe_module(self.manifest.package) if job.mutant is not None else None,
             "out": str(out),
             "report": str(folder / "report.json"),
+            "inactive": str(inactive(folder)),
             "cpu_s": self.limits.cpu_s,
             "memory_mb": self.limits.memory_mb,
             "steps": self.limits.steps,
@@ -161,7 +170,11 @@ class ReferenceEngine:
         if problem := self._wrong_tree(job, report):
             self._restore_base()
             return Status.HARNESS_ERROR, problem
-        return judge_report(self.limits, report)
+        status, detail = judge_report(self.limits, report)
+        expected = status is Status.OK or report["probe"] is not None
+        if expected and (problem := job.problem_of(report["probe"])):
+            return Status.HARNESS_ERROR, problem
+        return status, detail
 
     def _restore_base(self) -> None:
         """Make the pristine tree pristine again, should a run have written through its links."""
@@ -178,8 +191,6 @@ class ReferenceEngine:
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
-        if job.mutant is not None and mutant_of(report["probe"]) != job.mutant:
-            return "the probe that ran is not the one of this mutant"
         return ""
 
 

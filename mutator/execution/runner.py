@@ -15,6 +15,7 @@ from mutator.model import Activation, Experiment, Record, Status
 from mutator.mutants.building import InvalidMutant, Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
+from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
 from mutator.outcomes.verdicts import first_events, judge
 from mutator.targets.manifest import TargetManifest
@@ -112,6 +113,7 @@ class Runner:
             changes=experiment.changes,
             files=built.files,
             mutant=built.id,
+            injections=built.injections,
             golden=self.goldens.folder(experiment),
         )
 
@@ -138,12 +140,19 @@ class Runner:
             start=execution.start,
         )
 
+    def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
+        """The injections that are there to raise."""
+        models = [self.models.get(injection.model) for injection in experiment.fault.injections]
+        return {name for name, model in zip(built.injections, models, strict=True) if model.raises}
+
     def _record(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
         if execution.status is not Status.OK or execution.probe is None:
+            status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
             # a time-out's count depends on the machine's speed, a crash's does not
-            crashed = execution.status is Status.CRASHED
+            crashed = status is Status.CRASHED
             activation = activation_of(execution.probe or {}) if crashed else None
-            return _bare(experiment, execution.status, execution.detail, built, activation)
+            bare = _bare(experiment, status, detail, built, activation)
+            return replace(bare, error=error_of(execution.raised))
         activation = activation_of(execution.probe)
         channels = self.manifest.compared
         reference = self.goldens.trace(experiment)

@@ -20,7 +20,8 @@ SCHEMA = "fault_model/1"
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
-ParamType = Literal["variable", "import", "number", "integer", "boolean", "seed"]
+# A `constant` is a number, a truth value, a text or None.
+ParamType = Literal["variable", "import", "number", "integer", "boolean", "constant", "seed"]
 NAMES = ("variable", "import")
 
 
@@ -61,11 +62,15 @@ class Example:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultModel:
-    """A fault model: template text, parameter schema, examples."""
+    """A fault model: template text, parameter schema, examples.
+
+    `raises`: an exception of its injected lines is what it is for, and counts as a crash of the target.
+    """
 
     name: str
     kind: SnippetKind
     about: str
+    raises: bool = False
     params: tuple[ParamSchema, ...]
     examples: tuple[Example, ...]
     template: str
@@ -84,7 +89,7 @@ class FaultModels:
     folder: Path
     models: Mapping[str, FaultModel]
     probe: str
-    digest: str  # of every template and the probe: what a mutant's text depends on
+    digest: str  # of templates, probe, and which models raise: text and blame of a mutant follow from them
 
     def __iter__(self) -> Iterator[FaultModel]:
         return iter(self.models.values())
@@ -105,7 +110,8 @@ class _ParamModel(StrictModel, title="A parameter"):
 
     type: ParamType = Field(
         description="What a value is: a name in the function (`variable`), a dotted name to be imported "
-        "(`import`), a number, or a `seed`, which no spec gives and expansion draws."
+        "(`import`), a number, a `constant` (a number, truth value, text or null), or a `seed`, which no "
+        "spec gives and expansion draws."
     )
     about: str = Field(description="What it is.")
     unit: str | None = Field(
@@ -135,6 +141,11 @@ class FaultModelModel(StrictModel, title="The file"):
         description="`insert`: lines before or after the statement; `guard`: the statement is wrapped."
     )
     about: str = Field(description="What it does, in a sentence.")
+    raises: bool = Field(
+        False,
+        description="Whether an exception in its lines is what it is for. It then counts as a crash of the "
+        "target; otherwise it makes an invalid mutant.",
+    )
     params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
     examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
 
@@ -149,7 +160,9 @@ def load_fault_models(folder: Path) -> FaultModels:
         raise MutatorError("no fault model", where=folder, expected="<model>.yaml beside <model>.py.j2")
     probe = _text(folder / PROBE_TEMPLATE)
     texts = {name: model.template for name, model in models.items()}
-    return FaultModels(folder=folder, models=models, probe=probe, digest=hashing.digest([texts, probe]))
+    raising = [name for name, model in models.items() if model.raises]
+    digest = hashing.digest([texts, probe, *([raising] if raising else [])])
+    return FaultModels(folder=folder, models=models, probe=probe, digest=digest)
 
 
 def _load(path: Path) -> FaultModel:
@@ -161,6 +174,7 @@ def _load(path: Path) -> FaultModel:
         name=model.name,
         kind=SnippetKind(model.kind),
         about=model.about,
+        raises=model.raises,
         params=tuple(_param(name, param, source) for name, param in model.params.items()),
         examples=tuple(
             Example(

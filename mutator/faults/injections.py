@@ -31,7 +31,7 @@ class Drawn:
     read_as: str | None = None
 
 
-ParamValue = int | float | str | bool | Drawn
+ParamValue = int | float | str | bool | None | Drawn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,9 +72,9 @@ class InjectionModel(StrictModel, title="An injection"):
     )
     params: dict[str, Any] = Field(
         default_factory=dict,
-        description="Parameters of the model, their unit in the key. A value is a number, a name, the "
-        "draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a number that is "
-        "written in one unit and read as another.",
+        description="Parameters of the model, their unit in the key. A value is a number, a name, a "
+        "constant such as `true`, the draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a "
+        "number that is written in one unit and read as another.",
     )
 
     def injection(self, source: Source, keys: Keys) -> InjectionSpec:
@@ -102,7 +102,7 @@ class InjectionModel(StrictModel, title="An injection"):
 
 
 def _value(value: Any, source: Source, keys: Keys) -> ParamValue:
-    if isinstance(value, bool | int | float | str):
+    if value is None or isinstance(value, bool | int | float | str):
         return value
     key = keys[-1]
     if not isinstance(value, dict) or set(value) != {"draw", "written_in", "read_as"}:

@@ -68,7 +68,10 @@ class _Resolver:
         self.drawn = value
 
     def schema(self, param: ParamSpec) -> ParamSchema:
-        """The schema of a parameter as written; its unit suffix must be of the right dimension."""
+        """The schema of a parameter as written; its unit suffix must be of the right dimension.
+
+        A constant that is no number has no unit, whatever the variable's is.
+        """
         schema = self.model.param(param.name)
         if schema is None or schema.type == "seed":
             known = [p for p in self.model.params if p.type != "seed"]
@@ -79,7 +82,7 @@ class _Resolver:
                 expected=f"one of {', '.join(map(self.key, known)) or 'none'}",
                 remedy="correct or remove it" + suggestion(param.key, names),
             )
-        unit = self.unit(schema)
+        unit = None if self.is_plain(param, schema) else self.unit(schema)
         given = units.UNITS[param.unit] if param.unit else None
         if (unit is None) != (given is None) or (unit and given and unit.dimension != given.dimension):
             raise self.source.error(
@@ -89,6 +92,15 @@ class _Resolver:
                 remedy="end the key in the number's unit",
             )
         return schema
+
+    def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
+        """Whether it is a constant but no number: a truth value, None, or a text other than the draw's."""
+        if schema.type != "constant" or param.unit:
+            return False
+        if not isinstance(param.value, str):
+            return param.value is None or isinstance(param.value, bool)
+        drawn = reference(param.value)
+        return drawn is None or self.draw is None or drawn.name != self.draw.name
 
     def keys(self, schema: ParamSchema) -> list[str]:
         """How a parameter may be written: with each suffix that fits."""
@@ -125,6 +137,8 @@ class _Resolver:
             if not isinstance(param.value, bool):
                 raise self._wrong(param, "true or false")
             return param.value
+        if self.is_plain(param, schema):
+            return self._constant(param)
         number = self._number(param, schema)
         if schema.type == "integer":
             if not number.is_integer():
@@ -141,6 +155,13 @@ class _Resolver:
             raise self._wrong(param, expected, f"{written:g}")
         return number
 
+    def _constant(self, param: ParamSpec) -> Value:
+        """The value itself, unless it is a text that looks like the draw's name misspelt."""
+        assert not isinstance(param.value, Drawn)
+        if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
+            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that is less like it")
+        return param.value
+
     def _number(self, param: ParamSpec, schema: ParamSchema) -> float:
         value = param.value
         unit = self.unit(schema)
@@ -150,7 +171,7 @@ class _Resolver:
             return (
                 units.convert(value, units.UNITS[param.unit], unit) if unit and param.unit else float(value)
             )
-        drawn = value if isinstance(value, Drawn) else reference(value)
+        drawn = value if isinstance(value, Drawn) else reference(str(value))
         if drawn is None or self.draw is None or self.drawn is None or drawn.name != self.draw.name:
             expected = f"a number, or '{self.draw.name}', the draw" if self.draw else "a number"
             raise self._wrong(param, expected)

@@ -54,6 +54,11 @@ def probe_module(package: str) -> str:
     return f"{package}.{PROBE_NAME}"
 
 
+def is_probe(path: str) -> bool:
+    """Whether a file of a mutated tree is the probe."""
+    return path.rpartition("/")[2] == f"{PROBE_NAME}.py"
+
+
 def injection_id(index: int, injection: Injection) -> str:
     """The id that an injection has in tags and reports: from its content and its place in the fault."""
     return content_id([index, injection])[:8]
@@ -185,12 +190,13 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
     return module["ARMED_AFTER_S"] - module["_TINY"], module["_condition"]
 
 
-def state_after(observed: int, t: float | None) -> tuple[str, dict[str, object]]:
+def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
     """The object in which a probe keeps its observations, and its attributes after `observed` of them.
 
-    The last one was made at time `t` (s). A probe that takes the place of another is given these.
+    The first one was made at time `began` (s), the last at `t`. A probe that takes the place of another is
+    given these.
     """
-    return "_run", {"observed": observed, "t": t} if observed else {}
+    return "_run", {"observed": observed, "began": began, "t": t} if observed else {}
 
 
 # What a probe reports
@@ -201,9 +207,33 @@ def silent_report(mutant: str | None) -> dict[str, Any]:
     return {"mutant": mutant, "triggered": None, "injections": {}}
 
 
-def mutant_of(report: Mapping[str, Any] | None) -> str | None:
-    """The id of the mutant whose probe wrote the report."""
-    return report.get("mutant") if report else None
+def report_problem(report: object, mutant: str, injections: Sequence[str]) -> str:
+    """What is wrong with what the probe of a mutant with these injections reported; empty if nothing is.
+
+    A mutant may have overwritten whatever its probe knows.
+    """
+    if not isinstance(report, dict):
+        return "its probe has no report"
+    if report.get("mutant") != mutant:
+        return "the probe that ran is not the one of this mutant"
+    triggered, told = report.get("triggered"), report.get("injections")
+    if not isinstance(told, dict) or told.keys() != set(injections):
+        return "the injections in its probe's report are not its own"
+    if not all(_is_told(one, "count") for one in told.values()):
+        return "its probe's report of the injections is damaged"
+    if not (triggered is None or (_is_told(triggered, "steps") and triggered["steps"])):
+        return "its probe's report of the trigger is damaged"
+    return "" if triggered or not activation_of(report) else "an injection was active and its trigger was not"
+
+
+def _is_told(told: object, number: str) -> bool:
+    """Whether that is a first time, a last one and a number of times, or says that there was none."""
+    if not isinstance(told, dict) or told.keys() != {"first", "last", number}:
+        return False
+    first, last, count = told["first"], told["last"], told[number]
+    if type(count) is not int or count < 1:
+        return type(count) is int and count == 0 and first is last is None
+    return all(type(time) is float and math.isfinite(time) for time in (first, last)) and first <= last
 
 
 def was_triggered(report: Mapping[str, Any] | None) -> bool:

@@ -20,9 +20,11 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from mutator.config.locations import dotted_name
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import NAMES, FaultModel, SnippetKind
+from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
+
+_EXACT = 2.0**53  # up to it every whole number is a double
 
 
 def literal(value: object) -> str:
@@ -39,10 +41,12 @@ def literal(value: object) -> str:
 
 
 def signed(value: int | float) -> str:
-    """`+ 3.0` or `- 3.0`: how a term is added in an expression."""
-    if math.copysign(1.0, value) < 0.0 and not math.isnan(value):
-        return f"- {literal(-value)}"
-    return f"+ {literal(value)}"
+    """`+ 3` or `- 2.5`: how a term is added in an expression. A whole number has no point, so that an integer
+    plus the term stays one; to a float that makes no difference."""
+    negative = math.copysign(1.0, value) < 0.0 and not math.isnan(value)
+    size = -value if negative else value
+    whole = isinstance(size, float) and size <= _EXACT and size.is_integer()
+    return f"{'-' if negative else '+'} {literal(int(size) if whole else size)}"
 
 
 class _Sandbox(ImmutableSandboxedEnvironment):
@@ -71,17 +75,25 @@ def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[st
 
     MutatorError when the template fails or its result is not whole lines of Python.
     """
-    names = {param.name: params.get(param.name) for param in model.params}
-    for param in model.params:
-        value = names[param.name]
-        is_name = isinstance(value, str) and dotted_name(value)
-        if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
-            raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
+    names = {param.name: _checked(param, params) for param in model.params}
     text = render(model.template, {"fi": fi, **names}, model.template_path)
     text = text.removesuffix("\n")
     if not _are_lines(normalized(text, (fi,)), model.kind):
         _check_lines(text, model.kind, model.template_path)
     return tuple(text.split("\n"))
+
+
+def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
+    """What the template finds as this parameter. A constant that is no number is Python source already, so
+    that a constant None differs from none at all."""
+    value = params.get(param.name)
+    if param.type == "constant":
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return value if number or param.name not in params else repr(value)
+    is_name = isinstance(value, str) and dotted_name(value)
+    if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
+        raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
+    return value
 
 
 def render(template: str, names: Mapping[str, object], where: Path) -> str:

@@ -1,8 +1,9 @@
 """Golden runs and how a faulty run differs from them."""
 
 import json
-import math
+import sys
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,10 @@ from mutator.errors import MutatorError
 from mutator.targets.manifest import Channel, TargetManifest
 
 Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
+
+
+_UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
+_LARGEST = sys.float_info.max
 
 
 class BadOutput(MutatorError):
@@ -45,7 +50,7 @@ def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[str] | No
         with np.load(path, allow_pickle=False) as file:
             names = file.files if channels is None else [manifest.time_channel, *channels]
             trace = {name: np.asarray(file[name]) for name in names}
-    except (OSError, ValueError, zipfile.BadZipFile) as err:
+    except _UNREADABLE as err:
         raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
     except KeyError as err:
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
@@ -62,7 +67,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     path = out / manifest.record_file
     try:
         data = json.loads(path.read_bytes())
-    except (OSError, ValueError) as err:
+    except (OSError, ValueError, RecursionError) as err:
         raise BadOutput(
             f"not a readable record ({_why(err)})", where=path, expected="a JSON object"
         ) from None
@@ -86,7 +91,7 @@ def _has_times(record: dict[str, Any]) -> bool:
         if not isinstance(event, dict) or not isinstance(event.get("name"), str):
             return False
         times.append(event.get("t"))
-    return all(type(time) in (int, float) and math.isfinite(time) for time in times)
+    return all(type(time) in (int, float) and abs(time) <= _LARGEST for time in times)
 
 
 def _events(record: Mapping[str, Any]) -> Any:

@@ -17,9 +17,13 @@ puts lines before or after the anchored statement; one that guards wraps the sta
 A parameter in *the variable's unit* may be given in any unit of the same dimension. `target` may be left out
 where the anchor names the variable. A *variable* is a name that the function of the anchor knows; an *import*
 is the dotted name of a module of the target and of something defined in it, which the injected lines import.
+A *constant* is a number, `true`, `false`, `null` or a text.
+
+A variable keeps its kind: an integer stays an integer where the parameters are whole numbers.
 
 In the examples, lines with `+` are what the model adds to a source. `_fi` is
-[the probe](../explanation/concepts.md#proof-before-counting): `active` asks whether the trigger holds.
+[the probe](../explanation/concepts.md#proof-before-counting): `active` asks whether the trigger holds, and
+`like` gives a number as the variable's kind.
 """
 
 

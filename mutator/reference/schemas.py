@@ -170,4 +170,5 @@ def _value(param: ParamSchema) -> dict[str, Any]:
         return {"type": "string"}
     if param.type == "boolean":
         return {"type": "boolean"}
-    return {"anyOf": [{"type": "number"}, {"type": "string"}, _DRAWN]}
+    more = [{"type": "boolean"}, {"type": "null"}] if param.type == "constant" else []
+    return {"anyOf": [{"type": "number"}, {"type": "string"}, _DRAWN, *more]}

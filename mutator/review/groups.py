@@ -119,9 +119,8 @@ def location_label(location: FaultLocation) -> str:
 def injection_label(injection: Injection) -> str:
     """Location, model and parameters, without numbers; names and truth values may decide what is injected."""
     given = (
-        f"{name}={value}" if isinstance(value, str | bool) else name
+        f"{name}={value}" if value is None or isinstance(value, str | bool) else name
         for name, value in injection.params
-        if value is not None
     )
     return f"{location_label(injection.location)}: {injection.model}({', '.join(given)})"
 

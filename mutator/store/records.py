@@ -12,7 +12,7 @@ from typing import Any
 from mutator._common.files import check_schema, raising_disk_full
 from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Activation, Outcome, Record, Status
+from mutator.model import Activation, Outcome, Record, RunError, Status
 
 SCHEMA = "records/1"
 TIMINGS_SCHEMA = "timings/1"
@@ -120,6 +120,7 @@ def record_from(data: Mapping[str, Any]) -> Record:
         hazards=_pairs(data["hazards"]),
         alerts=_pairs(data["alerts"]),
         trace_digest=data["trace_digest"],
+        error=RunError(**data["error"]) if data.get("error") else None,
     )
 
 

@@ -28,8 +28,9 @@ class Observation:
 
 
 class ObservationModel(StrictModel, title="The observation"):
-    """Where ground truth is read, once in each step. Each value is a name or attribute that the place knows,
-    a number, or a sum, difference or product of these."""
+    """Where ground truth is read, once in each step: time goes on from one to the next, or starts again with
+    another run. Each value is a name or attribute that the place knows, a number, or a sum, difference or
+    product of these."""
 
     at: AtModel = Field(description="The place; values are read there.")
     t: str = Field(description="Time in s.")

@@ -199,6 +199,7 @@ class _Checks:
                 changes=canary.changes,
                 files=built.files,
                 mutant=built.id,
+                injections=built.injections,
             ),
         )
 

@@ -1,6 +1,7 @@
 """Mistakes in specs, templates and run folders, as the command line answers them."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -132,14 +133,17 @@ def test_a_mistake_on_the_command_line_is_told(
     assert cli("diff", "own.yaml", "--trigger", "other/near").code == 0
 
 
-def test_a_crash_is_a_verdict(cli: Cli, own: Path, root: Path) -> None:
-    """An exception in injected code is what the fault did: it is shown, and the command is fine."""
+def test_an_injected_line_that_raises_is_named(cli: Cli, own: Path, root: Path) -> None:
+    """An exception in injected code makes an invalid mutant: its line is shown, and the command is fine."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = [][int({{ by }})]\n")
     answer = cli("try", own, "-s", "A")
     assert answer.code == 0
-    assert "verdict: crashed" in answer.out
-    assert "IndexError" in answer.out
+    assert "verdict: invalid_mutant" in answer.out
+    assert re.search(
+        r"^toycar/\w+\.py:\d+: the injected `gap = .*` ended the run: IndexError", answer.out, re.M
+    )
+    assert cli("try", own, "-s", "A", "--json").json["error"]["kind"] == "IndexError"
 
 
 def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> None:

@@ -38,7 +38,7 @@ MODELS: dict[str, tuple[str, Anchor, dict[str, Value]]] = {
     "offset": ("offset", GAP, {"target": "gap", "by": 30.0, "low": 0.0}),
     "scale": ("scale", CLOSING, {"target": "closing", "factor": -0.5}),
     "stuck": ("stuck", OFFSET, {"target": "offset", "value": 0.7}),
-    "held": ("stuck", GAP, {"target": "gap", "value": None}),
+    "held": ("stuck", GAP, {"target": "gap"}),
     "drift": ("drift", OFFSET, {"target": "offset", "per_step": 0.02, "stays": False}),
     "drift that stays": ("drift", OFFSET, {"target": "offset", "per_step": 0.02, "stays": True}),
     "noise": ("noise", GAP, {"target": "gap", "std": 9.0, "seed": 5}),
@@ -120,6 +120,7 @@ class Engines:
             seed=7,
             files=built.files,
             mutant=built.id,
+            injections=built.injections,
             golden=self.golden(scenario),
         )
 

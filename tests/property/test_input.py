@@ -1,7 +1,9 @@
 """Whatever stands in a file, it is read or refused; nothing else happens."""
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
@@ -97,6 +99,17 @@ def test_numbers_survive_rendering(value: float) -> None:
     assert repr(eval(literal(value))) == repr(value)
     if value == value:
         assert eval(f"0 {signed(value)}") == value
+
+
+@given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
+def test_a_term_without_a_point_adds_the_same(variable: float, value: float, kind: str) -> None:
+    """To a float, of numpy or not, it makes no difference, to the last bit, that a whole number is written as
+    an integer."""
+    sign = "-" if math.copysign(1.0, value) < 0 else "+"
+    with np.errstate(all="ignore"):
+        texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
+        found, expected = (eval(text, {"x": variable, "np": np}) for text in texts)
+    assert (type(found), repr(found)) == (type(expected), repr(expected))
 
 
 @pytest.mark.parametrize("value", [[1], {"a": 1}, object()])

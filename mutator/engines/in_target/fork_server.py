@@ -52,7 +52,7 @@ def main(connection: int, start_file: str) -> int:
         module = importlib.import_module(start["module"])
         server.begin = getattr(module, start["stepwise"])
     except BaseException as err:
-        server.send({"failed": child.describe(err, start["tree"], None).get("error", "")})
+        server.send({"failed": child.describe(err, start["tree"], None)})
         return 1
     gc.collect()
     server.send({"files": child.tree_files(start["tree"]), "threads": threads()})
@@ -160,7 +160,7 @@ class Process:
                 self.run = self.begin(args)
             reply = self.advance(step)
         except BaseException as err:
-            reply = {"failed": child.describe(err, self.start["tree"], None).get("error", "")}
+            reply = {"failed": child.describe(err, self.start["tree"], None)}
         self.send(reply)
         self.serve()
 
@@ -250,6 +250,7 @@ class Process:
             probe = swap.install(job["probe_name"], job["probe"])
             swap.swap_code(job["functions"], probe)
             probe.limit(job["steps"])
+            child.note_activation(probe, job["inactive"])
             holder, state = job["probe_state"]  # what it would know had it been there from the beginning
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
@@ -263,11 +264,11 @@ class Process:
             if seen is not None:
                 report["libraries"] = child.libraries(known, self.start["package"])
         except swap.SwapRefused as why:
-            report |= {"ended": "swap refused", "error": str(why)}
+            report |= {"ended": "swap refused", "why": str(why)}
         except BaseException as err:
-            report |= child.describe(err, self.start["tree"], probe)
+            report |= child.describe(err, self.start["tree"], job["probe_name"])
         if probe is not None:
-            report["probe"] = probe.report()
+            report |= child.asked(probe, self.start["tree"], job["probe_name"])
         return report
 
 

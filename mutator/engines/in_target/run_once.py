@@ -17,12 +17,15 @@ import runpy
 import signal
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 _PR_SET_PDEATHSIG = 1
 _FILE_LIMIT = 1 << 30  # bytes that a run may write into one file (a cache of pictures is large)
 _HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
+_LONGEST = 2000  # characters of an exception's text
+_MOST_ERRORS = 50  # of which an exception came
 
 
 def main(job_file: str) -> int:
@@ -37,12 +40,13 @@ def main(job_file: str) -> int:
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
+            note_activation(probe, job["inactive"])
         run_module(job["module"], job["args"])
     except BaseException as err:
-        report |= describe(err, job["tree"], probe)
+        report |= describe(err, job["tree"], job["probe"])
+    report |= asked(probe, job["tree"], job["probe"]) if probe else {"probe": None}
     report["outside"] = imported_elsewhere(job["package"], job["tree"], sys.modules)
     report["files"] = tree_files(job["tree"])
-    report["probe"] = probe.report() if probe else None
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
     return 0
 
@@ -77,28 +81,73 @@ def run_module(module: str, args: list[str]) -> None:
             raise
 
 
-def describe(err: BaseException, tree: str, probe: Any) -> dict[str, Any]:
-    """How a run ended that did not end well, in words that are the same each time."""
-    if probe is not None and isinstance(err, probe.StepLimit):
+def note_activation(probe: Any, inactive: str) -> None:
+    """Have the first activation delete the file `inactive`: that is known however the run ends."""
+    active = probe.active
+
+    def first_active(fi: str) -> Any:
+        acts = active(fi)
+        if acts:
+            probe.active = active
+            with suppress(OSError):
+                Path(inactive).unlink()
+        return acts
+
+    probe.active = first_active
+
+
+def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
+    """What the probe `name` reports; an error that it has to tell instead is how the run ended."""
+    try:
+        said = probe.report()
+    except BaseException as err:
+        return {"probe": None, **describe(err, tree, name)}
+    try:
+        json.dumps(said)
+    except Exception:
+        said = "what JSON cannot tell"  # the run overwrote what the probe knows
+    return {"probe": said}
+
+
+def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]:
+    """How a run ended that did not end well, in words that are the same each time; `probe` is a module."""
+    kind = type(err)
+    if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
         return {"ended": "steps"}
-    where = place(err, tree)
-    text = f"exit status {err.code}" if isinstance(err, SystemExit) else type(err).__name__
-    if str(err) and not isinstance(err, SystemExit):
-        text += f": {err}"
+    try:
+        message = str(err.code if isinstance(err, SystemExit) else err)[:_LONGEST]
+    except Exception as why:
+        message = f"its text cannot be told ({type(why).__name__})"
+    error = {"kind": kind.__name__, "message": message, "stacks": stacks(err, tree)}
     full = isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
-    return {"ended": "error", "error": text + where, "disk_full": full}
+    return {"ended": "error", "error": error, "disk_full": full}
 
 
-def place(err: BaseException, tree: str) -> str:
-    """` (file:line)` of the innermost frame that is in the tree."""
-    found = ""
-    frame = err.__traceback__
-    while frame is not None:
-        file = frame.tb_frame.f_code.co_filename
-        if file.startswith(tree + os.sep):
-            found = f" ({os.path.relpath(file, tree)}:{frame.tb_lineno})"
-        frame = frame.tb_next
+def stacks(err: BaseException, tree: str) -> list[list[tuple[str, int]]]:
+    """Where the exception passed the tree, each (file, line) once, innermost first; then the same of those
+    that it came of or that are in it."""
+    found: list[list[tuple[str, int]]] = []
+    known: dict[int, BaseException] = {}
+    todo: list[BaseException | None] = [err]
+    while todo and len(found) < _MOST_ERRORS:
+        one = todo.pop()
+        if one is not None and id(one) not in known:
+            known[id(one)] = one
+            found.append(passed(one, tree))
+            inner = one.exceptions if isinstance(one, BaseExceptionGroup) else ()
+            todo += [*inner, one.__context__, one.__cause__]
     return found
+
+
+def passed(err: BaseException, tree: str) -> list[tuple[str, int]]:
+    places = []
+    trace = err.__traceback__
+    while trace is not None:
+        file = trace.tb_frame.f_code.co_filename
+        if file.startswith(tree + os.sep):
+            places.append((os.path.relpath(file, tree), trace.tb_lineno or 0))
+        trace = trace.tb_next
+    return list(dict.fromkeys(reversed(places)))
 
 
 def imported_elsewhere(package: str, tree: str, names: Iterable[str]) -> list[str]:

@@ -53,7 +53,13 @@ class Fork:
         built = build(self.manifest, self.models, fault, trigger)
         scenario = self.toy.scenario("A")
         return Job(
-            name="j", scenario=scenario, seed=7, files=built.files, mutant=built.id, golden=self.golden
+            name="j",
+            scenario=scenario,
+            seed=7,
+            files=built.files,
+            mutant=built.id,
+            injections=built.injections,
+            golden=self.golden,
         )
 
     def run(self, job: Job) -> Execution:

@@ -88,7 +88,7 @@ def test_several_observations_in_a_step(probe) -> None:
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
     starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
-    assert starts[4] == Start(step=3, observed=3, t=SEEN.values[2][0])
+    assert starts[4] == Start(step=3, observed=3, began=SEEN.values[0][0], t=SEEN.values[2][0])
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
@@ -101,7 +101,7 @@ def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigge
         exec(probe(trigger), module)
     for values in SEEN.values[: start.observed]:
         saw["observe"](*values)
-    holder, state = state_after(start.observed, start.t)
+    holder, state = state_after(start.observed, start.began, start.t)
     for name, value in state.items():
         setattr(given[holder], name, value)
     states = [

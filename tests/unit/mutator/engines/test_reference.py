@@ -142,6 +142,7 @@ def test_steps_are_limited(run: Run) -> None:
     probe = (
         "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
         "def limit(n): global most; most = n\n"
+        "def active(fi): return False\n"
         "def report(): return {'mutant': MUTANT, 'triggered': None, 'injections': {}}\n"
         "def observe(n):\n    if n > most: raise StepLimit\n"
     )

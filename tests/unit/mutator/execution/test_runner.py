@@ -41,6 +41,7 @@ class PlayedEngine:
                     out=self.out,
                     probe=probe,
                     cpu_s=1.0,
+                    active=bool(self.outputs.get("ran")),
                     wall_s=2.0,
                 ),
             )
@@ -150,7 +151,7 @@ def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Pa
     """A mutant that does not compile is invalid, an anchor that is gone a harness error; the others run."""
     manifest = toycar.manifest("toycar")
     experiments: tuple[Experiment, ...] = make_plan(toycar, "hostile").experiments
-    engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {})
+    engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})
     goldens = Goldens(manifest, lambda scenario, changes: tmp_path)
     runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
     records = {f.experiment.fault.fault_type: f.record for f in runner.run(experiments)}

@@ -93,6 +93,31 @@ def test_a_cap_is_kept_and_keys_share_draws() -> None:
     assert {draw_values(draw, i) == draw_values(other, i) for i in range(20)} == {False}
 
 
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [("true", True), ("null", None), ("far", "far"), ("'12'", "12"), ("'it''s #1'", "it's #1")],
+)
+@pytest.mark.parametrize("unit", ["          unit: m\n", ""])
+def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, value: object) -> None:
+    """A variable may be stuck at a truth value, at nothing or at a text, whatever its unit is."""
+    path = toy.library / "faults" / "sensor" / "distance.yaml"
+    old = "model: offset\n          unit: m\n          params: {by_m: error}"
+    assert old in path.read_text()
+    path.write_text(
+        path.read_text().replace(old, f"model: stuck\n{unit}          params: {{value: {written}}}")
+    )
+    assert dict(of(faults(toy), "longer")[0].injections[0].params) == {"target": "gap", "value": value}
+
+
+def test_constants_that_are_drawn(toy: Workspace) -> None:
+    """A text that is the draw's name is the drawn value, converted, as it always was."""
+    path = toy.library / "faults" / "sensor" / "distance.yaml"
+    text = path.read_text().replace("model: offset", "model: stuck", 1)
+    path.write_text(text.replace("by_m: error", "value_m: -error", 1))
+    for fault in of(faults(toy), "longer"):
+        assert dict(fault.injections[0].params) == {"target": "gap", "value": -float(fault.value)}  # type: ignore[arg-type]
+
+
 def edited(workspace: Workspace, old: str, new: str) -> str:
     """What loading and expanding says after one edit of the spec, without the file's name."""
     path = workspace.library / "faults" / "sensor" / "distance.yaml"
@@ -142,6 +167,36 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "model: offset\n          unit: m\n          params: {by_m: error}",
             "model: bit_flip\n          params: {bit: 64}",
             "16: 64 for 'bit'; expected at least 0 and at most 63; correct the value",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {by_m: null}",
+            "17: nothing for 'by_m'; expected a number, or 'error', the draw; correct the value",
+        ),
+        (
+            "params: {by_m: error}",
+            "params: {target: null, by_m: error}",
+            "17: nothing for 'target'; expected a name as in the source; correct the value",
+        ),
+        (
+            "model: offset\n          unit: m\n          params: {by_m: error}",
+            "model: stuck\n          unit: m\n          params: {value_m: far}",
+            "17: 'far' for 'value_m'; expected a number, or 'error', the draw; correct the value",
+        ),
+        (
+            "model: offset\n          unit: m\n          params: {by_m: error}",
+            "model: stuck\n          unit: m\n          params: {value_m: true}",
+            "17: true for 'value_m'; expected a number; correct the value",
+        ),
+        (
+            "model: offset\n          unit: m\n          params: {by_m: error}",
+            "model: stuck\n          unit: m\n          params: {value: 3}",
+            "17: 'value' (no unit); expected `value_m`",
+        ),
+        (
+            "model: offset\n          unit: m\n          params: {by_m: error}",
+            "model: stuck\n          unit: '1'\n          params: {value: -errror}",
+            "17: '-errror' for 'value'; expected 'error', the draw, or a text that is less like it",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",

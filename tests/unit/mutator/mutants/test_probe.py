@@ -1,11 +1,14 @@
 """The probe: triggers, holds, counts and memory, and that the contract says what the template does."""
 
+import copy
+import json
 import math
 import random
 import re
 import types
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
@@ -75,13 +78,45 @@ def test_nothing_before_the_first_observation(clone: Workspace) -> None:
 
 
 def test_a_new_run_starts_afresh(clone: Workspace) -> None:
-    """When time starts again, nothing is left of the run before, not even one of a single step."""
+    """When time starts again where the run before began, or earlier, nothing is left of that run."""
     fi = probe(clone, hold="to_end")
-    assert drive(fi, ".x.") == ".xx"
-    assert drive(fi, "..x") == "..x"
+    assert drive(fi, ".x.", start=0.9) == ".xx"
+    assert drive(fi, "..x", start=0.9) == "..x"
     assert fi.report()["triggered"]["steps"] == 1
-    assert drive(fi, "x") == "x" and drive(fi, ".") == "."
+    assert drive(fi, "x", start=0.5) == "x" and drive(fi, ".", start=0.4) == "."
     assert fi.report()["triggered"] is None
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ((0.0, 0.1, 0.1), "observed twice: at 0.1 s, after 0.1 s"),
+        ((0.0, 0.0), "observed twice: at 0.0 s, after 0.0 s"),
+        ((0.0, 0.1, 0.2, 0.1), "time neither goes on nor starts again: at 0.1 s, after 0.2 s"),
+        ((0.0, math.nan), "time neither goes on nor starts again: at nan s, after 0.0 s"),
+        ((math.nan,), "time neither goes on nor starts again: at nan s"),
+    ],
+)
+def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...], said: str) -> None:
+    """An observation at the time of the one before, or between those of a run, is an error. The probe tells
+    of it again when it is to report, lest a target that caught it passes for one that ran well."""
+    fi = probe(clone)
+    *before, last = times
+    for t in before:
+        fi.observe(t=t, d_rel=40.0, v_ego=20.0, v_lead=15.0)
+    with pytest.raises(fi.ObservationError, match=re.escape(said)):
+        fi.observe(t=last, d_rel=40.0, v_ego=20.0, v_lead=15.0)
+    with pytest.raises(fi.ObservationError, match=re.escape(said)):
+        fi.report()
+
+
+def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
+    """Ground truth that is no number is an error of the probe, also when it reports."""
+    fi = probe(clone)
+    with pytest.raises(TypeError, match="NoneType"):
+        fi.observe(t=0.0, d_rel=None, v_ego=20.0, v_lead=15.0)
+    with pytest.raises(TypeError, match="NoneType"):
+        fi.report()
 
 
 def test_step_limit(clone: Workspace) -> None:
@@ -164,23 +199,96 @@ def test_noise_repeats_with_every_run(clone: Workspace) -> None:
     fi = probe(clone, condition="True")
     state = random.getstate()
     runs = []
-    for seed in (1, 1, 2):
-        drive(fi, ".")
+    for number, seed in enumerate((1, 1, 2)):
+        drive(fi, ".", start=-number)
         runs.append([fi.noise("a", 2.0, seed) for _ in range(200)])
     assert runs[0] == runs[1] != runs[2]
     assert 1.5 < math.sqrt(sum(x * x for x in runs[0]) / 200) < 2.5
     assert random.getstate() == state
 
 
+FLIPS = [
+    (1.0, 63, -1.0),
+    (1.0, 62, math.inf),
+    (0, 3, 8),
+    (-1, 0, -2),
+    (True, 1, 3),
+    (1.0, 52, 0.5),
+    (np.float64(1.0), 63, np.float64(-1.0)),
+    (np.float32(1.0), 31, np.float32(-1.0)),
+    (np.float32(1.0), 23, np.float32(0.5)),
+    (np.float16(1.0), 15, np.float16(-1.0)),
+    (np.int8(1), 7, np.int8(-127)),
+    (np.uint8(1), 7, np.uint8(129)),
+    (np.int16(-1), 0, np.int16(-2)),
+    (np.uint16(0), 15, np.uint16(32768)),
+    (np.int32(0), 31, np.int32(-(2**31))),
+    (np.uint32(5), 0, np.uint32(4)),
+    (np.int64(0), 63, np.int64(-(2**63))),
+    (np.uint64(0), 63, np.uint64(2**63)),
+    (np.bool_(True), 0, np.bool_(False)),
+    (np.array([1.0, -2.0], "f4"), 31, np.array([-1.0, 2.0], "f4")),
+    (np.array([1, 2], ">u2"), 8, np.array([257, 258], ">u2")),
+    (np.array([True, False]), 0, np.array([False, True])),
+    (np.array(1.0), 63, np.array(-1.0)),
+    (np.arange(6, dtype="i4").reshape(2, 3)[:, ::2], 1, np.array([[2, 0], [1, 7]], "i4")),
+]
+
+
+@pytest.mark.parametrize(("value", "bit", "result"), FLIPS, ids=lambda one: str(getattr(one, "dtype", one)))
+def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
+    """Flipping a bit changes a number, or each of an array, as its representation says, keeps its type, and
+    leaves the one that there was alone; flipping it again restores it."""
+    fi, before = probe(clone), copy.deepcopy(value)
+    flipped = fi.flip_bit(value, bit)
+    assert np.array_equal(flipped, result)
+    assert np.array_equal(fi.flip_bit(flipped, bit), value)
+    assert np.array_equal(value, before)
+    assert getattr(flipped, "dtype", None) == getattr(value, "dtype", None)
+    assert type(flipped) is (int if value is True else type(value))
+
+
 @pytest.mark.parametrize(
-    ("value", "bit", "result"),
-    [(1.0, 63, -1.0), (1.0, 62, math.inf), (0, 3, 8), (-1, 0, -2), (True, 1, 3), (1.0, 52, 0.5)],
+    ("value", "bit"),
+    [
+        (np.float32(1.0), 32),
+        (np.uint8(1), 8),
+        (np.bool_(True), 1),
+        (np.longdouble(1.0), 3),
+        (np.complex64(1.0), 3),
+        (np.array(["a"]), 0),
+    ],
 )
-def test_bit_flips(clone: Workspace, value: float, bit: int, result: float) -> None:
-    """Flipping a bit changes the number as its representation says, and flipping it again restores it."""
-    fi = probe(clone)
-    assert fi.flip_bit(value, bit) == result
-    assert fi.flip_bit(fi.flip_bit(value, bit), bit) == value
+def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None:
+    """A bit beyond those of a type is an error that names the type, as is any of what is no such number."""
+    with pytest.raises(ValueError, match=f"{value.dtype.name} has no bit {bit} to flip"):
+        probe(clone).flip_bit(value, bit)
+
+
+@pytest.mark.parametrize(
+    ("value", "number", "kind"),
+    [
+        (3, 2.0, int),
+        (True, 2.0, int),
+        (2**60, -2.0, int),
+        (np.uint8(3), 2.0, int),
+        (np.array([3], "i2"), 2.0, int),
+        (3, 2.5, float),
+        (3, math.inf, float),
+        (3, math.nan, float),
+        (3.0, 2.0, float),
+        (np.float64(3.0), 2.0, float),
+        (np.float32(3.0), 2.0, float),
+        (np.array([3.0]), 2.0, float),
+        ([3], 2.0, float),
+        (None, 2.0, float),
+    ],
+)
+def test_a_number_like_the_value(clone: Workspace, value: Any, number: float, kind: type) -> None:
+    """A whole number is an integer beside an integer, also of numpy, or an array of them; nothing else is."""
+    found = probe(clone).like(value, number)
+    assert type(found) is kind
+    assert found == number or math.isnan(number)
 
 
 TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s=0.25)
@@ -292,12 +400,62 @@ def test_reports_are_read(clone: Workspace) -> None:
     report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
     assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
     fi = probe(clone)
-    for read in (contract.mutant_of, contract.was_triggered, contract.activation_of):
+    for read in (contract.was_triggered, contract.activation_of):
         assert read(fi.report()) == read(contract.silent_report("m1"))  # type: ignore[operator]
     drive(fi, "xx")
     assert contract.was_triggered(fi.report())
-    assert contract.mutant_of(None) is None
     assert not contract.was_triggered(None)
+
+
+SOUND = {
+    "mutant": "m",
+    "triggered": {"first": 0.5, "last": 2.0, "steps": 9},
+    "injections": {"a": RAN, "b": NEVER},
+}
+
+
+def test_sound_reports(clone: Workspace) -> None:
+    """Nothing is wrong with what a probe reports, be it of a fault that was active or of one that was not."""
+    assert contract.report_problem(SOUND, "m", ("a", "b")) == ""
+    fi = probe(clone)
+    for marks in ("..", "xx"):
+        drive(fi, marks)
+        assert contract.report_problem(json.loads(json.dumps(fi.report())), "m1", ("a", "b")) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (None, "no report"),
+        ("x", "no report"),
+        ([1], "no report"),
+        ({"mutant": "n"}, "not the one of this mutant"),
+        ({"mutant": None}, "not the one of this mutant"),
+        ({"injections": None}, "not its own"),
+        ({"injections": {"a": RAN}}, "not its own"),
+        ({"injections": {"a": RAN, "b": NEVER, "c": NEVER}}, "not its own"),
+        ({"injections": {"a": RAN, "b": None}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"first": None}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"first": math.nan}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"last": math.inf}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"last": 0.25}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"last": "2"}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": 2.0}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": True}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": -1}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": 0}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": NEVER | {"count": False}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": {}}}, "the injections is damaged"),
+        ({"triggered": {}}, "the trigger is damaged"),
+        ({"triggered": {"first": None, "last": None, "steps": 0}}, "the trigger is damaged"),
+        ({"triggered": 7}, "the trigger is damaged"),
+        ({"triggered": None}, "its trigger was not"),
+    ],
+)
+def test_damaged_reports(change: Any, said: str) -> None:
+    """Whatever is not as a probe reports it is told: keys, types, numbers, what contradicts itself."""
+    report = SOUND | change if isinstance(change, dict) else change
+    assert said in contract.report_problem(report, "m", ("a", "b"))
 
 
 def test_pages_are_told_the_tags() -> None:

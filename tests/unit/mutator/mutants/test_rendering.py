@@ -1,15 +1,21 @@
 """Rendering: values become literals, names are checked, templates cannot reach out."""
 
+import types
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
-from mutator.model import Value
-from mutator.mutants.rendering import snippet
+from mutator.model import Hold, Value
+from mutator.mutants.probe import template_values
+from mutator.mutants.rendering import render, snippet
+from mutator.triggers.kinds import always
+from mutator.workspace import Workspace
 
 SOURCE = Source(path=Path("t.yaml"), data={}, lines={})
 
@@ -37,10 +43,11 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
 @pytest.mark.parametrize(
     ("value", "plain", "added"),
     [
-        (35.0, "35.0", "+ 35.0"),
-        (-35.0, "-35.0", "- 35.0"),
+        (35.0, "35.0", "+ 35"),
+        (-35.0, "-35.0", "- 35"),
         (0.1 + 0.2, "0.30000000000000004", "+ 0.30000000000000004"),
-        (-0.0, "-0.0", "- 0.0"),
+        (-0.0, "-0.0", "- 0"),
+        (2.0**53, "9007199254740992.0", "+ 9007199254740992"),
         (1e300, "1e+300", "+ 1e+300"),
         (float("nan"), "float('nan')", "+ float('nan')"),
         (float("inf"), "float('inf')", "+ float('inf')"),
@@ -50,7 +57,8 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
     ],
 )
 def test_values_are_literals(value: float, plain: str, added: str) -> None:
-    """Numbers are written exactly, non-finite ones so that Python understands them."""
+    """Numbers are written exactly, non-finite ones so that Python understands them; terms that are whole
+    numbers have no point, lest they make a float of an integer."""
     assert rendered("{{ target }} = {{ by }}\n", by=value) == (f"x = {plain}",)
     assert rendered("{{ target }} = y {{ by | signed }}\n", by=value) == (f"x = y {added}",)
 
@@ -122,3 +130,71 @@ def test_a_guard_opens_a_block() -> None:
     assert rendered("if not {{ target }}:\n", SnippetKind.GUARD) == ("if not x:",)
     with pytest.raises(MutatorError, match="a guard's last line must open a block"):
         rendered("x = 1\n", SnippetKind.GUARD)
+
+
+CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ({"value": 3.0}, "x = 3.0"),
+        ({"value": True}, "x = True"),
+        ({"value": None}, "x = None"),
+        ({"value": "left"}, "x = 'left'"),
+        ({"value": "it's\n# fi:ab12"}, 'x = "it\'s\\n# fi:ab12"'),
+        ({}, "x = 0"),
+    ],
+)
+def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
+    """A constant is what `repr` writes, on one line; None is not the same as none at all."""
+    template = "x = {% if value is none %}0{% else %}{{ value }}{% endif %}\n"
+    assert snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "value", "result"),
+    [
+        ("offset", {"by": 35.0}, 40, 75),
+        ("offset", {"by": -35.0}, 2**62 + 1, 2**62 - 34),
+        ("offset", {"by": 0.5}, 40, 40.5),
+        ("offset", {"by": -35.0, "low": 0.0}, 2, 0),
+        ("offset", {"by": 35.0, "high": 50.0}, 40, 50),
+        ("offset", {"by": -35.0, "low": 0.0}, 2.0, 0.0),
+        ("offset", {"by": 3.0}, np.uint8(40), np.uint8(43)),
+        ("offset", {"by": -3.0}, np.uint16(40), np.uint16(37)),
+        ("offset", {"by": 3.0}, np.float32(40.0), np.float32(43.0)),
+        ("offset", {"by": 3.0}, np.array([40, 41], "i2"), np.array([43, 44], "i2")),
+        ("scale", {"factor": 2.0}, 40, 80),
+        ("scale", {"factor": -0.5}, 40, -20.0),
+        ("scale", {"factor": 2.0}, 40.0, 80.0),
+        ("scale", {"factor": 2.0}, np.array([40, 41], "u4"), np.array([80, 82], "u4")),
+        ("drift", {"per_step": 3.0}, 40, 43),
+        ("drift", {"per_step": 0.5}, 40, 40.5),
+        ("stuck", {"value": 3.0}, 40, 3),
+        ("stuck", {"value": 3.0}, 40.0, 3.0),
+        ("stuck", {"value": 3.5}, 40, 3.5),
+        ("stuck", {"value": False}, True, False),
+        ("stuck", {"value": None}, 40.0, None),
+        ("stuck", {"value": "reverse"}, "drive", "reverse"),
+        ("stuck", {}, 40, 40),
+        ("bit_flip", {"bit": 31.0}, np.float32(1.0), np.float32(-1.0)),
+    ],
+)
+def test_values_keep_their_kind(
+    clone: Workspace, name: str, params: dict[str, Value], value: Any, result: Any
+) -> None:
+    """What a fault makes of a variable is of the variable's kind: an integer stays one where the parameters
+    are whole numbers."""
+    models = clone.fault_models()
+    given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
+    lines = snippet(models.get(name), given, "ab12")
+    settings = template_values("m", always(), Hold.WHILE, ("ab12",))
+    probe = types.ModuleType("_fi")
+    exec(render(models.probe, settings, models.folder / "_fi.py.j2"), vars(probe))
+    probe.observe(t=0.0, d_rel=1.0, v_ego=1.0, v_lead=1.0)
+    names = {"_fi": probe, "x": value}
+    exec("\n".join(lines), names)
+    assert type(names["x"]) is type(result)
+    assert np.array_equal(names["x"], result)
+    assert getattr(names["x"], "dtype", None) == getattr(result, "dtype", None)

@@ -107,7 +107,6 @@ def test_errors_are_those_of_splicing(toy: Workspace, tmp_path: Path) -> None:
         fault(1),
         fault(2, function="Sensor.mesure"),
         fault(True),
-        fault("gap"),
         fault(2, path="../x"),
     ):
         said = []

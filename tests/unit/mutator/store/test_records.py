@@ -11,7 +11,7 @@ import pytest
 
 from mutator._common.files import DiskFull
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Outcome, Record, Status
+from mutator.model import Outcome, Record, RunError, Status
 from mutator.store.records import SCHEMA, LineWriter, Tail, read_records
 
 HEAD = {"schema": SCHEMA, "plan": "p"}
@@ -31,10 +31,21 @@ def test_records_come_back_as_they_were(tmp_path: Path, record: MakeRecord) -> N
     first = record(
         "a" * 16, max_dev=(("gas", float("inf")),), hazards=(("H1", 3.25),), alerts=(("fcw", 3.0),)
     )
-    second = record("b" * 16, status=Status.CRASHED, outcome=None, activation=None, detail="Boom: ü")
+    error = RunError(kind="Boom", message="ü", place="car/go.py:3")
+    second = record("b" * 16, status=Status.CRASHED, outcome=None, detail="Boom: ü", error=error)
     write(tmp_path, "0001-gw0.jsonl", first)
     write(tmp_path, "0001-gw1.jsonl", second)
     assert read_records(tmp_path) == {"a" * 16: first, "b" * 16: second}
+
+
+def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
+    """Lines of runs that end well are those of older versions, and are read like them."""
+    writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
+    writer.append(record())
+    writer.close()
+    line = json.loads(writer.path.read_text().splitlines()[1])
+    assert "error" not in line
+    assert read_records(tmp_path)[line["experiment_id"]].error is None
 
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])

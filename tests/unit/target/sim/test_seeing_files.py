@@ -59,7 +59,14 @@ def drive(tmp_path: Path) -> Drive:
         fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
         made = build(manifest, models, fault, at_time(time_s))
         engine = ReferenceEngine(manifest, base, work, Limits(), independent=independent)
-        job = Job(name="job", scenario=workspace.scenario("S1"), seed=0, files=made.files, mutant=made.id)
+        job = Job(
+            name="job",
+            scenario=workspace.scenario("S1"),
+            seed=0,
+            files=made.files,
+            mutant=made.id,
+            injections=made.injections,
+        )
         execution = engine.execute(job, work / str(next(numbers)))
         assert execution.status is Status.OK and execution.probe, execution.detail
         return (execution.out / "record.json").read_text(), json.dumps(execution.probe["injections"])

@@ -1,0 +1,419 @@
+"""Whose doing it is that a run did not end well: the same answer, to the letter, from every engine."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.jobs import Engine, Job, Setting
+from mutator.engines.kinds import ENGINES
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.registry import make_engine
+from mutator.execution.runner import Goldens, Runner
+from mutator.model import (
+    Anchor,
+    AnchorKind,
+    Experiment,
+    Fault,
+    FaultLocation,
+    Injection,
+    Limits,
+    Method,
+    Record,
+    Status,
+    Trigger,
+    Value,
+)
+from mutator.mutants.building import build
+from mutator.triggers.kinds import at_time
+from mutator.workspace import Workspace
+
+SEED = 7
+GAP = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
+SEEN = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="self.seen")
+FROM_2_S = at_time(2.0)
+IN_ONE_STEP = Trigger(name="x", condition="t > 1.97 and t < 2.02")
+FIRST_ACTIVE_S = 2.0
+
+# What the target does when its sensor tells a text instead of a distance: `gap_of` does it and goes on with a
+# distance. In every step of a mutant it does what the number in the scenario stands for; with the careful
+# scenario it notices when its sensor fails.
+MOODS = """
+import ctypes, os, sys
+from contextlib import suppress
+
+
+def gap_of(name):
+    globals()[name]()
+    return 30.0
+
+
+def begin_step(case):
+    if "toycar._fi" in sys.modules and "early" in case:
+        (fail, leave, vanish, hang)[int(case["early"])]()
+
+
+def sense(sensor, world, case):
+    try:
+        sensor.sense(world)
+    except Exception:
+        if "careful" in case:
+            raise RuntimeError("the sensor is gone") from None
+        raise
+
+
+def probe():
+    return sys.modules["toycar._fi"]
+
+
+def fail():
+    raise ValueError("no such gap")
+
+
+def leave():
+    sys.exit(3)
+
+
+def vanish():
+    os._exit(7)
+
+
+def break_down():
+    ctypes.string_at(0)
+
+
+def recur():
+    recur()
+
+
+def hang():
+    while True:
+        pass
+
+
+def want_too_much():
+    bytearray(1 << 40)
+
+
+class Silent(Exception):
+    def __str__(self):
+        raise ValueError
+
+
+def be_silent():
+    raise Silent
+
+
+def damage_the_counts():
+    probe()._run.counts = {name: ["x", None, -1] for name in probe()._run.counts}
+
+
+def make_it_nan():
+    probe()._run.first = float("nan")
+
+
+def forget_an_injection():
+    probe().INJECTIONS = []
+
+
+def report_what_is_no_report():
+    probe().report = lambda: [object()]
+
+
+def take_the_probe_apart():
+    probe()._run = None
+
+
+def observe_again_and_hide_it():
+    with suppress(Exception):
+        probe().observe(t=probe()._run.t, d_rel=1.0, v_ego=1.0, v_lead=1.0)
+
+
+def stop_the_time():
+    from toycar.world import World
+
+    World.advance = lambda self, *commands: 2.0
+
+
+def lose_the_lead():
+    from toycar.world import World
+
+    World.advance = lambda self, *commands: setattr(self, "lead_speed", None) or 2.05
+"""
+EDITS = {
+    "driver.py": [
+        ("\n\nclass Driver", "\nfrom toycar import moods\n\n\nclass Driver"),
+        ("= reading\n", "= reading\n        if isinstance(gap, str):\n            gap = moods.gap_of(gap)\n"),
+    ],
+    "sensing.py": [
+        ("= (100.0, 0.0, 0.0)\n", "= (100.0, 0.0, 0.0)\n        self.seen = 0\n"),
+        (
+            "= world.offset\n",
+            "= world.offset\n        self.seen = {self.seen + 1: world.frame}[world.frame]\n",
+        ),
+    ],
+    "go.py": [
+        ("from toycar.driver", "from toycar import moods\nfrom toycar.driver"),
+        ("        self.world = World(case)\n", "        self.world, self.case = World(case), case\n"),
+        ("        world = self.world\n", "        moods.begin_step(self.case)\n        world = self.world\n"),
+        ("self.sensor.sense(world)", "moods.sense(self.sensor, world, self.case)"),
+    ],
+}
+MODEL = """schema: fault_model/1
+name: {name}
+kind: insert
+about: An exception.
+{more}
+params:
+  target: {{type: variable, about: the anchored variable}}
+examples:
+  - about: It.
+    injection: {{at: {{file: e.py, function: f, after_assign: x}}, model: {name}}}
+    before: none
+    after: none
+"""
+MODELS = {  # line of the template, more in the YAML
+    "raising": ("{{ target }} = [][1]", ""),
+    "declared": ("{{ target }} = [][1]", "raises: true"),
+    "calling": ("self.sense({{ target }})", ""),
+}
+
+
+def prepare(toy: Workspace) -> None:
+    """The toy with those moods, and with fault models whose lines raise."""
+    tree = toy.library.parent / "tree" / "toycar"
+    (tree / "moods.py").write_text(MOODS)
+    for name, pairs in EDITS.items():
+        text = (tree / name).read_text()
+        for old, new in pairs:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        (tree / name).write_text(text)
+    case = toy.scenario("A").read_text()
+    for name, more in {"careful": "careful: 1", **{f"early{n}": f"early: {n}" for n in range(4)}}.items():
+        toy.scenario("A").with_stem(name).write_text(f"{case}{more}\n")
+    for name, (line, more) in MODELS.items():
+        (toy.templates / f"{name}.yaml").write_text(MODEL.format(name=name, more=more))
+        (toy.templates / f"{name}.py.j2").write_text(f'if _fi.active("{{{{ fi }}}}"):\n    {line}\n')
+
+
+def at_gap(model: str, **params: Value) -> Fault:
+    return fault(Injection(location=at(GAP), model=model, params=(*params.items(), ("target", "gap"))))
+
+
+def fault(*injections: Injection) -> Fault:
+    return Fault("s", "m", "f", "as_described", None, "", "H1", injections)
+
+
+def at(anchor: Anchor) -> FaultLocation:
+    return FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
+
+
+def sensed(mood: str | None) -> Fault:
+    """The sensor tells this instead of a distance."""
+    return at_gap("stuck", value=mood)
+
+
+class Blamed:
+    """The toy on every engine, and the records of its experiments."""
+
+    def __init__(self, toy: Workspace, folder: Path) -> None:
+        prepare(toy)
+        self.toy = toy
+        self.folder = folder
+        self.manifest = toy.manifest("toycar")
+        self.models = toy.fault_models()
+        limits = Limits(cpu_s=1, wall_s=900, memory_mb=1024, steps=500)
+        base = prepare_base(self.manifest, folder / "base")
+        self.reference = ReferenceEngine(self.manifest, base, folder, limits)
+        self.engines: dict[str, Engine] = {}
+        for name in ENGINES:
+            work = folder / name
+            work.mkdir()
+            setting = Setting(manifest=self.manifest, models=self.models, base=base, work=work, limits=limits)
+            self.engines[name] = make_engine(name, setting)
+
+    def golden(self, scenario: str, changes: tuple[str, ...]) -> Path:
+        folder = self.folder / f"golden-{scenario}"
+        if not folder.exists():
+            self.reference.execute(Job(name="g", scenario=self.toy.scenario(scenario), seed=SEED), folder)
+        return folder / "out"
+
+    def experiment(self, fault: Fault, trigger: Trigger = FROM_2_S, scenario: str = "A") -> Experiment:
+        return Experiment(
+            fault=fault,
+            scenario=scenario,
+            scenario_digest="d",
+            method=Method.GUIDED,
+            trigger=trigger,
+            seed=SEED,
+        )
+
+    def run(self, engine: str, experiments: Sequence[Experiment]) -> list[Record]:
+        goldens = Goldens(self.manifest, self.golden)
+        runner = Runner(self.manifest, self.models, self.engines[engine], goldens, self.toy.scenario)
+        return [finished.record for finished in runner.run(experiments)]
+
+    def record(self, fault: Fault, trigger: Trigger = FROM_2_S, scenario: str = "A") -> Record:
+        """The record of an experiment, which is the same from every engine."""
+        experiment = self.experiment(fault, trigger, scenario)
+        reference, *others = [record for name in ENGINES for record in self.run(name, [experiment])]
+        assert others == [reference, reference]
+        return reference
+
+    def line(self, fault: Fault, place: str) -> str:
+        """The line at that place in the mutant."""
+        path, _, number = place.partition(":")
+        files = build(self.manifest, self.models, fault, FROM_2_S).files
+        data = files.get(path) or self.manifest.tree.files[path]
+        return data.decode().splitlines()[int(number) - 1].strip()
+
+
+@pytest.fixture(scope="module")
+def blamed(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
+) -> Iterator[Blamed]:
+    folder = tmp_path_factory.mktemp("blame")
+    made = Blamed(copy_toycar(folder), folder)
+    yield made
+    for engine in made.engines.values():
+        engine.close()
+
+
+@pytest.mark.parametrize(
+    ("mood", "detail", "place"),
+    [
+        (None, "TypeError: unsupported operand type(s) for -: 'NoneType' and 'float'", "toycar/driver.py"),
+        ("fail", "ValueError: no such gap", "toycar/moods.py"),
+        ("leave", "exit status 3", "toycar/moods.py"),
+        ("recur", "RecursionError: maximum recursion depth exceeded", "toycar/moods.py"),
+        ("want_too_much", "MemoryError", "toycar/moods.py"),
+        ("be_silent", "Silent: its text cannot be told (ValueError)", "toycar/moods.py"),
+        ("vanish", "left with status 7 without a report", None),
+        ("break_down", "killed by SIGSEGV", None),
+    ],
+)
+def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, place: str | None) -> None:
+    """An exception of the target after the activation, an exit or the interpreter's end is its crash; the
+    record keeps type, text and place of an exception."""
+    record = blamed.record(sensed(mood))
+    assert record.status is Status.CRASHED
+    if place is None:
+        assert (record.detail, record.error, record.activation) == (detail, None, None)
+        return
+    assert record.error is not None and record.activation is not None
+    assert record.error.place.partition(":")[0] == place
+    assert record.detail == f"{detail} ({record.error.place})"
+    assert detail.startswith((record.error.kind, "exit")) and detail.endswith(record.error.message)
+    assert record.activation.first == FIRST_ACTIVE_S
+
+
+def test_a_guarded_statement_raises(blamed: Blamed) -> None:
+    """A statement of the target stays one under its guard: what it raises after the activation is a crash."""
+    left_out = fault(Injection(location=at(SEEN), model="omission"))
+    record = blamed.record(left_out, IN_ONE_STEP)
+    assert record.status is Status.CRASHED
+    assert record.error is not None and record.error.kind == "KeyError"
+    assert blamed.line(left_out, record.error.place).startswith("self.seen = {")
+
+
+WORLD = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="offset")
+
+
+@pytest.mark.parametrize(
+    ("injected", "scenario", "code", "error"),
+    [
+        (at_gap("raising"), "A", "gap = [][1]", "IndexError: list index out of range"),
+        (at_gap("calling"), "A", "self.sense(gap)", "AttributeError: 'float' object has no attribute 'gap'"),
+        (at_gap("raising"), "careful", "gap = [][1]", "RuntimeError: the sensor is gone"),
+        (
+            fault(Injection(location=at(WORLD), model="bit_flip", params=(("bit", 3), ("target", "world")))),
+            "A",
+            "world = _fi.flip_bit(world, 3)",
+            "error: required argument is not a float",
+        ),
+    ],
+    ids=["itself", "in the target's code that it calls", "the target wraps it", "in a helper of the probe"],
+)
+def test_an_injected_line_raises(
+    blamed: Blamed, injected: Fault, scenario: str, code: str, error: str
+) -> None:
+    """What comes out of an injected line makes the mutant invalid, and the line is named."""
+    record = blamed.record(injected, scenario=scenario)
+    assert record.status is Status.INVALID_MUTANT
+    named, _, rest = record.detail.partition(": the injected ")
+    assert blamed.line(injected, named).startswith(f"{code}  # fi:")
+    assert rest.startswith(f"`{code}` ended the run: {error}")
+    assert record.error is not None and record.activation is None
+
+
+def test_a_model_that_raises(blamed: Blamed) -> None:
+    """Where the fault model declares that it raises, what its line raises is a crash."""
+    record = blamed.record(at_gap("declared"))
+    assert record.status is Status.CRASHED
+    assert record.detail == "IndexError: list index out of range (toycar/sensing.py:15)"
+
+
+@pytest.mark.parametrize(
+    ("number", "detail"),
+    [
+        (0, "ValueError: no such gap"),
+        (1, "exit status 3"),
+        (2, "left with status 7 without a report"),
+        pytest.param(3, "CPU time limit of 1 s", marks=pytest.mark.slow),
+    ],
+)
+def test_before_the_first_activation(blamed: Blamed, number: int, detail: str) -> None:
+    """Nothing that happens before the fault is active is its doing."""
+    record = blamed.record(sensed("fail"), scenario=f"early{number}")
+    place = f" ({record.error.place})" if record.error else ""
+    assert (record.error is not None) is (number < 2)
+    assert record.status is Status.HARNESS_ERROR
+    assert record.detail == f"{detail}{place}, before the fault was active"
+
+
+@pytest.mark.slow
+def test_a_hang_after_the_activation(blamed: Blamed) -> None:
+    """A run that does not come to its end with its fault is a timeout."""
+    record = blamed.record(sensed("hang"))
+    assert (record.status, record.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
+
+
+@pytest.mark.parametrize(
+    ("mood", "detail"),
+    [
+        ("damage_the_counts", "its probe's report of the injections is damaged"),
+        ("make_it_nan", "its probe's report of the trigger is damaged"),
+        ("forget_an_injection", "the injections in its probe's report are not its own"),
+        ("report_what_is_no_report", "its probe has no report"),
+        ("take_the_probe_apart", "the probe failed: AttributeError: 'NoneType' object has no attribute 't'"),
+    ],
+)
+def test_a_mutant_overwrites_its_probe(blamed: Blamed, mood: str, detail: str) -> None:
+    """A probe whose report is none, or that is broken, makes a harness error."""
+    record = blamed.record(sensed(mood))
+    assert record.status is Status.HARNESS_ERROR
+    assert record.detail.startswith(detail)
+
+
+def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
+    """The experiments before and after it have their results."""
+    experiments = [blamed.experiment(f) for f in (at_gap("offset", by=1.0), sensed("damage_the_counts"))]
+    experiments.append(blamed.experiment(at_gap("offset", by=2.0)))
+    for engine in blamed.engines:
+        records = blamed.run(engine, experiments)
+        assert [record.status for record in records] == [Status.OK, Status.HARNESS_ERROR, Status.OK]
+
+
+@pytest.mark.parametrize("mood", ["stop_the_time", "observe_again_and_hide_it", "lose_the_lead"])
+def test_what_cannot_be_observed(blamed: Blamed, mood: str) -> None:
+    """Observing twice at one time, and failing to, is an error of the probe that names the place, even if the
+    target catches it."""
+    record = blamed.record(sensed(mood))
+    assert record.status is Status.HARNESS_ERROR
+    assert record.error is not None
+    if mood != "lose_the_lead":
+        assert record.error.message == "observed twice: at 2.0 s, after 2.0 s"
+    assert ".observe(" in blamed.line(sensed(mood), record.error.place)
+    assert record.detail.endswith(f"({record.error.place})")
+    assert record.detail.startswith(f"the probe failed: {record.error.kind}: ")

@@ -1,0 +1,131 @@
+"""Blame: whose doing it is that a run did not end well, by what was on the stack and when."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.jobs import Execution, Raised, Stack
+from mutator.model import RunError, Status
+from mutator.outcomes.blame import assign_blame, error_of
+
+FILES = {
+    "car/radar.py": b"""from car import _fi  # fi:probe
+def measure(truth):
+    d_rel = truth.d_rel
+    if _fi.active("0a1b2c3d"):  # fi:0a1b2c3d
+        d_rel = _fi.flip_bit(d_rel, 3)  # fi:0a1b2c3d
+    send(d_rel)
+""",
+    "car/go.py": b"_fi.observe(t=now)  # fi:observe\n",
+}
+TARGET, GUARD, INJECTED = ("car/radar.py", 6), ("car/radar.py", 4), ("car/radar.py", 5)
+ELSEWHERE, OBSERVES, PROBE = ("car/can.py", 5), ("car/go.py", 1), ("car/_fi.py", 70)
+
+
+def execution(
+    *stacks: Stack,
+    status: Status = Status.CRASHED,
+    active: bool = True,
+    kind: str = "ValueError",
+    probe: bool = True,
+) -> Execution:
+    raised = Raised(kind=kind, message="no", stacks=stacks) if stacks else None
+    return Execution(
+        status=status,
+        detail=raised.text if raised else "why",
+        out=Path(),
+        probe={} if probe else None,
+        cpu_s=0.0,
+        wall_s=0.0,
+        raised=raised,
+        active=active,
+    )
+
+
+@pytest.mark.parametrize(
+    ("stack", "status"),
+    [
+        ((TARGET,), Status.CRASHED),
+        ((ELSEWHERE, TARGET), Status.CRASHED),
+        ((), Status.CRASHED),
+        ((INJECTED, ELSEWHERE), Status.INVALID_MUTANT),
+        ((PROBE, INJECTED, ELSEWHERE), Status.INVALID_MUTANT),
+        ((ELSEWHERE, INJECTED), Status.INVALID_MUTANT),
+        ((PROBE, GUARD, ELSEWHERE), Status.HARNESS_ERROR),
+        ((PROBE, OBSERVES), Status.HARNESS_ERROR),
+        ((OBSERVES,), Status.HARNESS_ERROR),
+        ((ELSEWHERE, OBSERVES), Status.HARNESS_ERROR),
+        ((PROBE,), Status.HARNESS_ERROR),
+        ((PROBE, ELSEWHERE), Status.HARNESS_ERROR),
+    ],
+)
+def test_what_was_on_the_stack(stack: Stack, status: Status) -> None:
+    """The target's own code crashes. What an injected line was doing, itself, in a helper of the probe or in
+    the target, makes the mutant invalid. To observe and to ask the probe is not the target's doing."""
+    assert assign_blame(execution(stack), FILES, ())[0] is status
+
+
+def test_words() -> None:
+    """Who is to blame is said with the line or the reason."""
+    told = [
+        assign_blame(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
+    ]
+    assert [detail for _, detail in told] == [
+        "ValueError: no (car/radar.py:6)",
+        "car/radar.py:5: the injected `d_rel = _fi.flip_bit(d_rel, 3)` ended the run: "
+        "ValueError: no (car/can.py:5)",
+        "the probe failed: ValueError: no",
+    ]
+
+
+def test_a_model_may_raise() -> None:
+    """Of an injection that is there to raise an exception is a crash; it does not excuse another one."""
+    assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
+    assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
+    assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
+
+
+@pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
+@pytest.mark.parametrize("stacks", [(), ((TARGET,),), ((INJECTED,),)])
+def test_before_the_activation(status: Status, stacks: tuple[Stack, ...]) -> None:
+    """Whatever ended the run, it was not the fault if that was never active."""
+    told = assign_blame(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
+    assert told[0] is Status.HARNESS_ERROR
+    assert told[1].endswith(", before the fault was active")
+
+
+def test_what_has_no_exception() -> None:
+    """A time-out or a silent end after the activation is what it is, as is a harness error at any time."""
+    for status in (Status.CRASHED, Status.TIMEOUT):
+        assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
+    told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
+    assert told == (Status.HARNESS_ERROR, "why")
+
+
+def test_what_an_exception_came_of_counts() -> None:
+    """The target may catch what an injected line or the probe raised, and raise something else. The probe
+    goes first."""
+    assert assign_blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
+    assert assign_blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
+    assert assign_blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
+
+
+def test_which_call_was_one_too_many_is_chance() -> None:
+    """A target that recurses for ever is to blame, even if the last call was one of an injected line."""
+    for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
+        deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
+        assert assign_blame(deep, FILES, ())[0] is Status.CRASHED
+    inside = execution((TARGET, INJECTED, ELSEWHERE), kind="RecursionError")
+    assert assign_blame(inside, FILES, ())[0] is Status.INVALID_MUTANT
+
+
+def test_a_probe_that_cannot_report_failed() -> None:
+    """An exception without a report of the probe is the one that the probe had to tell."""
+    assert assign_blame(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
+
+
+def test_records_keep_type_text_and_place() -> None:
+    """The place is the innermost line of the target: the probe is none."""
+    error = error_of(execution((PROBE, INJECTED, ELSEWHERE)).raised)
+    assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
+    assert error_of(None) is None
