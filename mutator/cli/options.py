@@ -40,7 +40,12 @@ Only = Annotated[
 Exclude = Annotated[
     str | None, typer.Option(metavar="EXPR", help="Leave out experiments for which this holds.")
 ]
-Limit = Annotated[int | None, typer.Option(min=1, help="At most so many experiments, spread over the plan.")]
+Limit = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="At most so many experiments, spread over the plan, guided and random ones in pairs."
+    ),
+]
 ShardOf = Annotated[
     str | None,
     typer.Option("--shard", metavar="K/N", help="Run the K-th of N shares of the plan; see `merge`."),
