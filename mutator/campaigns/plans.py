@@ -14,11 +14,12 @@ from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
+from mutator._common.version import VERSION
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.provenance import check_sources, check_version, sources, versions
+from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
@@ -301,7 +302,8 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "canary_hazard": plan.campaign.canary.hazard,
         "sources": _sources(plan, workspace),
         "target_files": manifest.tree.digests,
-        "provenance": versions(),
+        "provenance": {"mutator": VERSION},
+        "stretches": [],
         "chunks": chunks,
     }
 

@@ -58,6 +58,10 @@ Engine = Annotated[
         + f". The results are the same. Default: {FORK}, where that is possible and worth it.",
     ),
 ]
+AcceptVersions = Annotated[
+    bool,
+    typer.Option("--accept-versions", help="Other versions of Python or packages will do; they are noted."),
+]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 
 
