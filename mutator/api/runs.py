@@ -53,7 +53,7 @@ def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
 
 
 def newest_run(root: Path) -> Path:
-    """The run folder in runs/, here or under `root`, that was planned last; MutatorError if there is none."""
+    """The run folder in runs/, here or under `root`, that was used last; MutatorError if there is none."""
     here = {base.resolve() for base in (RUNS, root / RUNS)}
     heads = [head for base in here for head in base.glob(f"*/{HEAD}")]
     if not heads:
