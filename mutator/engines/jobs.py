@@ -77,7 +77,8 @@ class Execution:
     exception that ended it, and `active` says whether an injection was active in it. `probe` is the probe's
     report if the tree has one; `log` the tail of what the run printed. `mode` says how it was carried out,
     and `why` another engine did it than the one that was asked; `start` is the step before which the golden
-    run did its work.
+    run did its work. `modules` are the top-level modules that the run imported from neither its
+    package nor the standard library (of the reference engine alone).
     """
 
     status: Status
@@ -92,6 +93,7 @@ class Execution:
     mode: RunMode = RunMode.REFERENCE
     why: str = ""
     start: int = 0
+    modules: tuple[str, ...] = ()
 
 
 class Engine(Protocol):

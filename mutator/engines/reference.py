@@ -97,6 +97,7 @@ class ReferenceEngine:
             raised=raised and replace(raised, message=steady(raised.message, folder)),
             active=was_active(folder),
             log=log,
+            modules=tuple(report["modules"]) if report else (),
         )
 
     def _prepare(self, job: Job, folder: Path) -> Path:
