@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mutator.api.trials import Trial, try_fault
     from mutator.campaigns.plans import Choices, Plan
     from mutator.comparison.comparison import Gate
-    from mutator.errors import CheckFailed, MutatorError
+    from mutator.errors import CheckFailed, MutatorError, MutatorWarning
     from mutator.execution.session import Summary
     from mutator.exports import Format
     from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
@@ -58,7 +58,7 @@ _HOMES = {
     "mutator.api.trials": ("Trial", "try_fault"),
     "mutator.campaigns.plans": ("Choices", "Plan"),
     "mutator.comparison.comparison": ("Gate",),
-    "mutator.errors": ("CheckFailed", "MutatorError"),
+    "mutator.errors": ("CheckFailed", "MutatorError", "MutatorWarning"),
     "mutator.execution.session": ("Summary",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
@@ -79,6 +79,7 @@ __all__ = [
     "IncompleteRun",
     "MutantSet",
     "MutatorError",
+    "MutatorWarning",
     "Outcome",
     "Plan",
     "Progress",

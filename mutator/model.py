@@ -225,3 +225,4 @@ class Record:
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[tuple[str, float], ...]
     trace_digest: str
+    patch: str = ""  # digest of the stored patch; empty without a mutant, and in old records

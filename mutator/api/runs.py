@@ -30,8 +30,8 @@ from mutator.outcomes.reader import Results
 from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
 from mutator.store import plan_file, run_folder
-from mutator.store.records import read_records
-from mutator.store.run_folder import HEAD, RunFolder, golden_key
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_head import HEAD
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
 from mutator.workspace import Workspace
@@ -140,7 +140,7 @@ class Run:
     @cached_property
     def records(self) -> Mapping[str, Record]:
         """The record of each experiment that has one, by id."""
-        return read_records(self.path)
+        return self.folder.records()
 
     @cached_property
     def results(self) -> "pd.DataFrame":
@@ -220,7 +220,7 @@ class Run:
 
     def check_equivalence(self) -> None:
         """CheckFailed when a sample that was run again on the reference engine gave another result."""
-        equivalence.judge(self.folder, read_records(self.path))
+        equivalence.judge(self.folder, self.folder.records())
 
     def delete(self) -> None:
         """Delete the run folder; MutatorError while a command or its workers hold it."""
@@ -251,9 +251,9 @@ class RunExperiment(ExperimentResult):
     @cached_property
     def patch(self) -> str:
         """The whole patch, probe included: the kept one, or made now when it has not run yet."""
-        kept = self.run.folder.patch(self.id)
-        if kept.exists():
-            return kept.read_bytes().decode("utf-8", "surrogateescape")
+        kept = self.run.folder.read_patch(self.id, self.record)
+        if kept is not None:
+            return kept.decode("utf-8", "surrogateescape")
         return built(self.run._bench, self.fault, self.experiment.trigger).patch
 
     def traces(self, *, exact: bool = False) -> TraceFrames:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.arguments import check_type, check_whole
-from mutator._common.files import is_half_written, make_folder, write_atomic, write_json
+from mutator._common.files import is_half_written, json_bytes, make_folder, write_atomic
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.tables import Table
@@ -24,9 +24,11 @@ from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
 from mutator.store.check_results import measured_cpu_s
-from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
+from mutator.store.digests import Digest, Ledger
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.store.shards import Shard
 from mutator.workspace import Workspace
 
@@ -249,7 +251,8 @@ def make_run_folder(out: Path) -> None:
     make_folder(out)
 
 
-_OURS = ("owner.lock", "workers", "plan", "plan.csv", "campaign.yaml")  # what a killed freeze leaves
+CSV = "plan.csv"
+_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # what a killed freeze leaves
 
 
 def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
@@ -266,10 +269,14 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
         check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(plan, workspace))
         return folder
-    write_atomic(out / "campaign.yaml", plan.campaign.source)
-    write_atomic(out / "plan.csv", _csv(plan))
+    write_atomic(out / CAMPAIGN, plan.campaign.source)
+    write_atomic(out / CSV, _csv(plan))
     chunks = plan_file.write(out, plan.experiments, plan.chunks)
-    write_json(out / HEAD, _head(plan, workspace, chunks))
+    head = json_bytes(_head(plan, workspace, chunks))
+    written = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+    files = {name: Digest.of((out / name).read_bytes()) for name in written}
+    digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    write_atomic(out / HEAD, head)  # last: from now on it is a run folder
     return RunFolder.open(out)
 
 
@@ -320,7 +327,7 @@ def load_plan(out: Path) -> Plan:
     canary = dict(head["canary"])
     fault = plan_file.fault_from(canary["fault"])
     return Plan(
-        campaign=load_campaign(folder.path / "campaign.yaml"),
+        campaign=load_campaign(folder.path / CAMPAIGN),
         choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
         seed=head["seed"],
         reading=head["reading"],

@@ -9,7 +9,7 @@ from typing import Any
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
-from mutator.store.run_folder import SCHEMA
+from mutator.store.run_head import SCHEMA
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

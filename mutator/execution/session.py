@@ -4,6 +4,7 @@ How the pending work is dealt out to processes is not decided here: see `distrib
 """
 
 import os
+import re
 import shutil
 import time
 from collections import Counter
@@ -16,7 +17,7 @@ from typing import Any
 
 from mutator._common.files import DiskFull, is_half_written
 from mutator._common.interrupts import terminable
-from mutator._common.locks import owned
+from mutator._common.locks import owned, wait_for_workers
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.plans import Choices, make_run_folder
 from mutator.engines.kinds import REFERENCE
@@ -26,7 +27,8 @@ from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
-from mutator.store.records import Progress, label, read_records
+from mutator.store import digests
+from mutator.store.records import Progress, label
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 from mutator.verification.preflight import run_checks
@@ -83,7 +85,7 @@ class Session:
 
     def prepare(self) -> None:
         """Find what is left to run; if anything is, pass the checks and lay out the pristine tree."""
-        records = read_records(self.folder.path)
+        records = self.folder.records()
         self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
@@ -97,8 +99,9 @@ class Session:
 
     def worker_name(self, name: str) -> str:
         """Name of a worker's files, used by no session before this one."""
-        files = self.folder.path.glob("records/*.jsonl")
-        taken = [int(path.name.split("-")[0]) for path in files]
+        kinds = ("records", "timings", equivalence.FOLDER)
+        files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in kinds)
+        taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
     def worker_input(self) -> dict[str, Any]:
@@ -116,15 +119,17 @@ class Session:
     def finish(self) -> Summary:
         """Build the table from what there is now, and say what the run has come to."""
         self.notify(Progress(stage="results"))
-        records = read_records(self.folder.path) if self._records is None else self._records
+        records = self.folder.records() if self._records is None else self._records
         wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
         done = len(records) - len(wrong)
         built = None
-        try:
+        with self._noting_full_disk():
+            self._close_segments()
             built = results.ensure(self.folder.path)
-        except DiskFull as err:  # the records are there, the table can be made any time
-            self.problem = self.problem or str(err)
         proven = equivalence.judge(self.folder, records)
+        if done == self.folder.planned and (proven is None or proven.whole):
+            with self._noting_full_disk():
+                self._close_segments(finished=True)
         return Summary(
             planned=self.folder.planned,
             done=done,
@@ -137,6 +142,19 @@ class Session:
             proof=proven,
             elapsed_s=time.monotonic() - self._began,
         )
+
+    @contextmanager
+    def _noting_full_disk(self) -> Iterator[None]:
+        """A full disk is no end: the records are there, the rest can be made at any time."""
+        try:
+            yield
+        except DiskFull as err:
+            self.problem = self.problem or str(err)
+
+    def _close_segments(self, *, finished: bool | None = None) -> None:
+        """Enter what this session's workers wrote; if one is still dying, the next session does it."""
+        if not wait_for_workers(self.folder.path):
+            digests.close_segments(self.folder.path, finished=finished)
 
 
 @contextmanager
@@ -163,6 +181,7 @@ def open_session(
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is left
                 shutil.rmtree(out, ignore_errors=True)
             raise
+        digests.close_segments(folder.path)
         shutil.rmtree(folder.work, ignore_errors=True)
         # not everywhere: there may be thousands of patches
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))

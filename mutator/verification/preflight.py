@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import raising_disk_full, read_json, write_json
+from mutator._common.files import DiskFull, json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns.provenance import sources, versions
 from mutator.campaigns.shared_runs import same_in
@@ -19,8 +19,9 @@ from mutator.mutants.building import InvalidMutant, build
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
+from mutator.store.digests import Digest
 from mutator.store.records import Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
@@ -88,19 +89,19 @@ class _Checks:
         as they were; they are then here."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
-        place = preflight_cache.entry(self.digest)
+        copy = self._kept
         try:
-            found = read_json(place / FILE, SCHEMA)
-            results = self._passed(found, place)
+            with raising_disk_full(copy):
+                preflight_cache.copy(preflight_cache.entry(self.digest), copy, FILE)
+            found = read_json(copy / FILE, SCHEMA)
+            results = self._passed(found, copy)
+        except DiskFull:
+            raise
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # none is there, or a damaged one
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            try:
-                with raising_disk_full(self.folder.path):
-                    preflight_cache.copy(place, self.folder.path, FILE)
-            except OSError:
-                return None  # it was deleted meanwhile
+            self._install((copy / FILE).read_bytes())
         return results
 
     def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
@@ -122,17 +123,32 @@ class _Checks:
         goldens = {golden_key(*key): runs[_GOLDEN, key].digest for key in self.keys}
         self._check_same_as_before(goldens)
         cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
-        write_json(
-            self.folder.path / FILE,
-            {
-                "schema": SCHEMA,
-                "digest": self.digest,
-                "results": [asdict(result) for result in results],
-                "goldens": goldens,
-                "run_cpu_s": sum(cpu) / len(cpu),
-            },
-        )
+        checks = {
+            "schema": SCHEMA,
+            "digest": self.digest,
+            "results": [asdict(result) for result in results],
+            "goldens": goldens,
+            "run_cpu_s": sum(cpu) / len(cpu),
+        }
+        self._install(json_bytes(checks))
         yield from results
+
+    @property
+    def _kept(self) -> Path:
+        """Where golden runs are until they are known to be the run's."""
+        return self.folder.work / "kept"
+
+    def _install(self, checks: bytes) -> None:
+        """Make the kept golden runs and these results those of the run folder."""
+        run, golden = self.folder.path, self._kept / "golden"
+        golden.mkdir(parents=True, exist_ok=True)
+        files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
+        new = {name: Digest.of(path.read_bytes()) for name, path in files.items() if path.is_file()}
+        gone = {name: None for name in digests.read(run).names if name.startswith("golden/")}
+        with digests.rewriting(run, {**gone, **new, FILE: Digest.of(checks)}):
+            shutil.rmtree(run / "golden", ignore_errors=True)
+            golden.rename(run / "golden")
+            write_atomic(run / FILE, checks)
 
     def _before(self) -> dict[str, Any] | None:
         path = self.folder.path / FILE
@@ -156,7 +172,8 @@ class _Checks:
         jobs = dict(self._jobs())
         runs: dict[tuple[str, Any], CheckRun] = {}
         work = self.folder.work / "checks"
-        shutil.rmtree(work, ignore_errors=True)
+        for scratch in (work, self._kept):
+            shutil.rmtree(scratch, ignore_errors=True)
         work.mkdir(parents=True)
         base = prepare_base(self.manifest, self.folder.base)
         engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
@@ -208,7 +225,9 @@ class _Checks:
             execution = engine.execute(job, scratch)
             run = self._look(execution)
             if name[0] == _GOLDEN and not run.problem:
-                self._keep(execution.out, self.folder.golden(*name[1]))
+                place = self._kept / "golden" / golden_key(*name[1])
+                place.parent.mkdir(parents=True, exist_ok=True)
+                execution.out.rename(place)
             return run
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
@@ -232,11 +251,6 @@ class _Checks:
             triggered=was_triggered(execution.probe),
             cpu_s=execution.cpu_s,
         )
-
-    def _keep(self, out: Path, place: Path) -> None:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(place, ignore_errors=True)
-        out.rename(place)
 
     def _judge(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
         for key in self.keys:

@@ -16,7 +16,8 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.model import Experiment, Outcome, Status
 from mutator.store import plan_file
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -93,7 +94,9 @@ def driven(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) ->
     patch = folder.patch(experiment.id)
     patch.parent.mkdir(parents=True)
     (tmp_path / "single" / "mutant.patch").rename(patch)
-    lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA})
+    lines = LineWriter(
+        folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+    )
     lines.append(dataclasses.asdict(single.record))
     lines.close()
     return mutator.load_run(folder.path, workspace=toycar)

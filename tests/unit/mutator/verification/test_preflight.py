@@ -9,7 +9,8 @@ import pytest
 from mutator.campaigns.plans import freeze, load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.store.records import SCHEMA, LineWriter, Progress
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, Progress
 from mutator.store.run_folder import RunFolder
 from mutator.verification import preflight
 from mutator.verification.preflight import run_checks
@@ -128,7 +129,9 @@ def test_other_golden_runs_than_before_are_refused(
     """A run with records does not go on when the machine's packages changed what golden is."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
-    LineWriter(folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA}).close()
+    LineWriter(
+        folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+    ).close()
     monkeypatch.setattr(preflight, "versions", lambda: {"python": "another"})
     assert all(result.passed for result in run_checks(toycar, folder))
     monkeypatch.setattr(preflight, "versions", lambda: {"python": "a third"})
