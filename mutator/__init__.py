@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.version import VERSION
 
 if TYPE_CHECKING:
+    from mutator.api.audits import Audit, verify
     from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
     from mutator.api.campaigns import IncompleteRun, plan, run
     from mutator.api.comparisons import RunComparison, compare
@@ -40,6 +41,7 @@ __version__ = VERSION
 
 # module -> names; pandas, libcst and pytest are not paid for by who only wants the version
 _HOMES = {
+    "mutator.api.audits": ("Audit", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("IncompleteRun", "plan", "run"),
     "mutator.api.comparisons": ("RunComparison", "compare"),
@@ -69,6 +71,7 @@ _HOMES = {
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Audit",
     "BuiltMutant",
     "CheckFailed",
     "Choices",
@@ -113,6 +116,7 @@ __all__ = [
     "prune_caches",
     "run",
     "try_fault",
+    "verify",
 ]
 
 

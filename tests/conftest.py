@@ -176,11 +176,11 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def reseal() -> Callable[[Path], None]:
+def reseal() -> Callable[..., None]:
     """Computes every checksum and digest of a run folder anew: who changed a file, and is that careful, is
     found by nothing that the folder itself tells."""
 
-    def run_again(run: Path) -> None:
+    def compute(run: Path, finished: bool | None = None) -> None:
         for path in (file for kind in ("records", "timings", "proof") for file in (run / kind).glob("*")):
             lines = [json.loads(line) for line in path.read_bytes().splitlines()]
             head, *content = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
@@ -193,6 +193,6 @@ def reseal() -> Callable[[Path], None]:
         names = [name for name, one in known.files.items() if one.lines is None and (run / name).exists()]
         files = {name: Digest.of((run / name).read_bytes()) for name in names}
         digests.write(run, dataclasses.replace(known, files=files))
-        digests.close_segments(run)
+        digests.close_segments(run, finished=finished)
 
-    return run_again
+    return compute

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.arguments import check_type
 from mutator._common.tables import Table
+from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
 from mutator.api.html import facts_html, text_html
 from mutator.api.mutants import built
@@ -34,6 +35,7 @@ from mutator.store.run_folder import RunFolder, golden_key
 from mutator.store.run_head import HEAD
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
+from mutator.verification.seal import not_verifiable, seal
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -95,7 +97,8 @@ class Run:
         done = f"{sum(self.endings.values())} of {self.folder.planned} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
-        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}>"
+        old = "" if self.verifiable else f", {not_verifiable(self.folder)}"
+        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}{old}>"
 
     def _repr_html_(self) -> str:
         return text_html(repr(self)) + facts_html(self.endings.items()) + str(self.counts().as_html())
@@ -125,7 +128,7 @@ class Run:
     @cached_property
     def plan(self) -> Plan:
         """The frozen plan."""
-        return load_plan(self.path)
+        return load_plan(self.folder)
 
     @cached_property
     def faults(self) -> dict[str, Fault]:
@@ -159,6 +162,17 @@ class Run:
     def harness_errors(self) -> dict[str, str]:
         """Experiments that the harness failed at, and why; `mutator.run` tries them again."""
         return {r.experiment_id: r.detail for r in self._rows if r.status is Status.HARNESS_ERROR}
+
+    @property
+    def verifiable(self) -> bool:
+        """Whether its content can be verified; runs of earlier schemas have no digests."""
+        return self.folder.verifiable
+
+    @cached_property
+    def seal(self) -> str | None:
+        """One digest of everything that counts, computed now; None for a run that is not finished, or not
+        verifiable."""
+        return seal(self.folder)
 
     def counts(self) -> Table:
         """How the experiments of each fault type ended."""
@@ -221,6 +235,11 @@ class Run:
     def check_equivalence(self) -> None:
         """CheckFailed when a sample that was run again on the reference engine gave another result."""
         equivalence.judge(self.folder, self.folder.records())
+
+    def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> Audit:
+        """Audit the folder: see `mutator.verify`."""
+        workspace = self._workspace_if_any()
+        return verify(self.path, rerun=rerun, expect=expect, repair=repair, workspace=workspace)
 
     def delete(self) -> None:
         """Delete the run folder; MutatorError while a command or its workers hold it."""

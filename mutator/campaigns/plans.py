@@ -3,6 +3,7 @@
 import csv
 import io
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from html import escape
 from pathlib import Path
@@ -175,7 +176,6 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
             expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
             remedy="use fewer shards, or a smaller chunk in the campaign",
         )
-    content = [[e.id for e in experiments], chunks, canary.id, plain(loaded.canary), plain(loaded.limits)]
     return Plan(
         campaign=loaded,
         choices=choices,
@@ -184,9 +184,15 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
         experiments=experiments,
         chunks=chunks,
         canary=canary,
-        digest=digest([_DIGEST_PREFIX, *content]),
+        digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
         runs=len(once),
     )
+
+
+def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+    """The digest that follows from ids and chunks of the experiments, the canary's id, and the campaign."""
+    content = [ids, chunks, canary, plain(campaign.canary), plain(campaign.limits)]
+    return digest([_DIGEST_PREFIX, *content])
 
 
 def _choose(
@@ -270,7 +276,7 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
         check_sources(out, folder.head["sources"], _sources(plan, workspace))
         return folder
     write_atomic(out / CAMPAIGN, plan.campaign.source)
-    write_atomic(out / CSV, _csv(plan))
+    write_atomic(out / CSV, plan_csv(plan))
     chunks = plan_file.write(out, plan.experiments, plan.chunks)
     head = json_bytes(_head(plan, workspace, chunks))
     written = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
@@ -304,6 +310,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "hazards": list(manifest.hazards),
         "compared": [channel.name for channel in manifest.compared],
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "golden_files": [manifest.trace_file, manifest.record_file],
         "canary": canary,
         "canary_hazard": plan.campaign.canary.hazard,
         "sources": _sources(plan, workspace),
@@ -313,19 +320,17 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
     }
 
 
-def _csv(plan: Plan) -> bytes:
+def plan_csv(plan: Plan) -> bytes:
+    """What plan.csv holds."""
     writer = csv.DictWriter(text := io.StringIO(), PLAN_COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(plan.rows())
     return text.getvalue().encode()
 
 
-def load_plan(out: Path) -> Plan:
+def load_plan(folder: RunFolder) -> Plan:
     """The frozen plan of a run folder, complete (for reports; workers read single chunks instead)."""
-    folder = RunFolder.open(out)
     head = folder.head
-    canary = dict(head["canary"])
-    fault = plan_file.fault_from(canary["fault"])
     return Plan(
         campaign=load_campaign(folder.path / CAMPAIGN),
         choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
@@ -333,7 +338,7 @@ def load_plan(out: Path) -> Plan:
         reading=head["reading"],
         experiments=plan_file.read_all(folder.path),
         chunks=tuple(count for _, _, count in head["chunks"]),
-        canary=plan_file.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
+        canary=folder.canary,
         runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),

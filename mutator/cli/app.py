@@ -16,6 +16,7 @@ from typer.main import get_command
 from mutator._common.interrupts import terminable
 from mutator._common.version import VERSION
 from mutator.cli import (
+    audits,
     caches,
     campaigns,
     comparisons,
@@ -54,7 +55,7 @@ GROUPS = (
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
-    ("After a campaign", ("compare", "export")),
+    ("After a campaign", ("compare", "export", "verify")),
     ("One experiment", ("show", "rerun")),
 )
 EXAMPLES = f"""\b
@@ -121,6 +122,7 @@ for module in (
     reviews,
     campaigns,
     run_folders,
+    audits,
     comparisons,
     exports,
     experiments,

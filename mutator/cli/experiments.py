@@ -65,6 +65,7 @@ def show(
     if as_json:
         facts = {**describe(found.experiment), **found.verdict, "patch": patch}
         facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
+        facts |= {"verifiable": found.run.verifiable}
         terminal.emit(facts | {"films": filmed})
         return
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -72,6 +73,8 @@ def show(
         terminal.say(str(found.not_run()))
     else:
         experiment_view.print_verdict(terminal, found.record)
+    if not found.run.verifiable:
+        terminal.say("not verifiable: an earlier version of mutator wrote this run, without digests")
     if drawn:
         terminal.say(f"plot: {short_path(drawn)}")
     for path in filmed:

@@ -17,7 +17,7 @@ from mutator.store import digests
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import LineWriter, read_segment
+from mutator.store.lines import read_segment, written
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
@@ -199,7 +199,6 @@ def _copy_segments(folder: RunFolder, out: Path) -> None:
             (out / kind).mkdir(exist_ok=True)
         for path in sorted((folder.path / kind).glob("*.jsonl")):
             place = out / kind / f"{path.stem}-shard{folder.shard.number}.jsonl"
-            writer = LineWriter(place, {"schema": schema, "plan": folder.head["plan"]})
-            for _, line in read_segment(path).objects(schema):
-                writer.append({name: value for name, value in line.items() if name != "sum"})
-            writer.close()
+            head = {"schema": schema, "plan": folder.head["plan"]}
+            lines = (line for _, line in read_segment(path).objects(schema))
+            write_atomic(place, written(place, head, lines))

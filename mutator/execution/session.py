@@ -31,7 +31,8 @@ from mutator.store import digests
 from mutator.store.records import Progress, label
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
-from mutator.verification.preflight import run_checks
+from mutator.verification.preflight import are_there, run_checks
+from mutator.verification.seal import seal
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
@@ -52,6 +53,7 @@ class Summary:
     interrupted: bool
     results: Path | None  # results.csv; None when there was no room for it
     proof: equivalence.Proof | None  # None: nothing that the reference engine has not run
+    seal: str | None  # of a finished run
     elapsed_s: float
 
     @property
@@ -91,7 +93,7 @@ class Session:
         if left and self.engine != REFERENCE:
             equivalence.begin(self.folder.path)
         self.proof = equivalence.left(self.folder)
-        if left or self.proof:
+        if left or self.proof or not are_there(self.folder):
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             prepare_base(self._manifest, self.folder.base)
         self.pending = left
@@ -140,6 +142,7 @@ class Session:
             interrupted=self.interrupted,
             results=built,
             proof=proven,
+            seal=seal(self.folder),
             elapsed_s=time.monotonic() - self._began,
         )
 

@@ -5,19 +5,22 @@ earlier schema has neither digests nor checksums; of it only the ids are checked
 """
 
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from pathlib import Path
 
+from mutator._common.files import is_half_written
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import Segment, read_segment
-from mutator.store.records import second_record
+from mutator.store.records import SCHEMA, second_record
 from mutator.store.run_head import CAMPAIGN, HEAD, Head
 from mutator.store.shards import Shard
 
 SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has nothing unknown
-_WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # cannot be made again
+WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # cannot be made again
+TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
 _MANY = 5  # experiments that one message names
 
 
@@ -27,7 +30,13 @@ def problems(run: Path, head: Head, ledger: Ledger | None, shard: Shard | None) 
         yield from file_problems(run, ledger)
         yield from _open_segments(run, ledger)
         if ledger.finished:
-            yield from _strangers(run, ledger)
+            for path in strangers(run, ledger):
+                yield MutatorError(
+                    f"not named in {digests.FILE}",
+                    where=path,
+                    expected="only what the finished run wrote",
+                    remedy=_remedy(run, ""),
+                )
     try:
         planned = share(run, head, shard)
     except MutatorError as err:
@@ -89,7 +98,10 @@ def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[Mut
             got, where=path, line=len(segment.lines), expected=_told(known), remedy=_remedy(run, name)
         )
         return
-    line = plan_file.damaged_line(run, name) if name.startswith("plan/") else None
+    line = None
+    if name in (plan_file.EXPERIMENTS, plan_file.FAULTS):
+        with suppress(MutatorError):  # the other one is missing
+            line = next((one.line for one in plan_file.problems(run) if one.where == str(path)), None)
     yield MutatorError(
         f"changed: {_told(found)}", where=path, line=line, expected=_told(known), remedy=_remedy(run, name)
     )
@@ -101,7 +113,7 @@ def _told(one: Digest) -> str:
 
 
 def _remedy(run: Path, name: str) -> str:
-    if name in _WHOLE:
+    if name in WHOLE:
         return "take it from a copy of the run folder, or run into a new one"
     return f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
 
@@ -114,18 +126,15 @@ def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
             yield from map(segment.problem, segment.damaged)
 
 
-def _strangers(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
-    """Files where only those belong that the ledger names."""
+def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
+    """Files of a finished run, where only those belong that the ledger names, that it does not name."""
     known = {*ledger.files, *ledger.rewriting}
-    for folder in SEALED:
-        for path in sorted((run / folder).rglob("*")):
-            if path.is_file() and path.relative_to(run).as_posix() not in known:
-                yield MutatorError(
-                    f"not named in {digests.FILE}",
-                    where=path,
-                    expected="only what the finished run wrote",
-                    remedy=_remedy(run, ""),
-                )
+    paths = [run / name for name in TOP]
+    paths += [path for folder in SEALED for path in sorted((run / folder).rglob("*"))]
+    for path in paths:
+        ours = path.relative_to(run).as_posix() in known or is_half_written(path.name)
+        if path.is_file() and not ours:
+            yield path
 
 
 def id_problems(
@@ -136,7 +145,7 @@ def id_problems(
         done: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
             segment = read_segment(path, checksums=ledger is not None)
-            yield from _plan_problem(segment, head["plan"])
+            yield from _head_problem(segment, head["plan"])
             yield from _id_problems(segment, planned, done)
         missing = [name for name in planned if name not in done]
         if ledger is not None and ledger.finished and kind == "records" and missing:
@@ -149,16 +158,20 @@ def id_problems(
             )
 
 
-def _plan_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
-    """A segment of another run."""
-    if 1 in segment.lines and (found := segment.content(1).get("plan")) != plan:
-        yield MutatorError(
-            f"records of plan {str(found)[:16]}",
-            where=segment.path,
-            line=1,
-            expected=plan[:16],
-            remedy="put the file back where it came from",
-        )
+def _head_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
+    """A segment of another run, or in another's place."""
+    try:
+        segment.check_head(SCHEMA)
+        if 1 in segment.lines and (found := segment.content(1).get("plan")) != plan:
+            yield MutatorError(
+                f"records of plan {str(found)[:16]}",
+                where=segment.path,
+                line=1,
+                expected=plan[:16],
+                remedy="put the file back where it came from",
+            )
+    except MutatorError as err:
+        yield err
 
 
 def _id_problems(segment: Segment, planned: Collection[str], done: dict[str, int]) -> Iterator[MutatorError]:

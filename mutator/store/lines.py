@@ -8,7 +8,7 @@ doubled or moved is found by its number, and the lines after it still verify.
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -41,13 +41,11 @@ class LineWriter:
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         self._end = 0
         self._last = b""
-        self.append({**head, "file": _name(path)})
+        self.append(_head(path, head))
 
     def append(self, value: Mapping[str, Any]) -> None:
         """Append one line; it is on the disk after the next `sync` at the latest."""
-        body = canonical(value).encode()[1:]
-        checksum = _checksum(self._last, body)
-        data = b"".join((_KEY, checksum, _AFTER, body, b"\n"))
+        data = _line(self._last, canonical(value).encode()[1:])
         with raising_disk_full(self.path):
             try:
                 written = 0
@@ -57,7 +55,7 @@ class LineWriter:
                 os.ftruncate(self._fd, self._end)
                 raise
         self._end += len(data)
-        self._last = checksum
+        self._last = data[_SUM]
         self._unsynced += 1
         if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _BATCH_S:
             self.sync()
@@ -100,39 +98,43 @@ class Segment:
         )
 
     def content(self, number: int) -> dict[str, Any]:
-        """The object on a line; MutatorError when it is none."""
+        """The object on a line, without its checksum; MutatorError when it is none."""
         try:
             value = json.loads(self.lines[number])
         except (ValueError, RecursionError):
             value = None
         if not isinstance(value, dict):
             raise self.problem(number)
+        value.pop("sum", None)
         return value
 
     def body(self, number: int) -> bytes:
         """A line without its checksum: the same in every file that it is in."""
         return self.lines[number][_BODY if self.checksums else 0 :]
 
+    def check_head(self, schema: str) -> None:
+        """MutatorError for a file of another schema, or one that was written under another name."""
+        if 1 not in self.lines:
+            return
+        head = self.content(1)
+        check_schema(head.get("schema"), schema, self.path)
+        if self.checksums != (head["schema"] == schema):
+            raise MutatorError(f"schema {head['schema']!r} in a run folder of another", where=self.path)
+        if self.checksums and head.get("file") != _name(self.path):
+            raise MutatorError(
+                f"was written as {head.get('file')}",
+                where=self.path,
+                line=1,
+                remedy="give it that name again, or put it back where it came from",
+            )
+
     def objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
         """Number and content of each line after the head; MutatorError for a damaged line, and for a file of
         another schema or name."""
         if self.damaged:
             raise self.problem(self.damaged[0])
-        for number in self.lines:
-            value = self.content(number)
-            if number > 1:
-                yield number, value
-                continue
-            check_schema(value.get("schema"), schema, self.path)
-            if self.checksums != (value["schema"] == schema):
-                raise MutatorError(f"schema {value['schema']!r} in a run folder of another", where=self.path)
-            if self.checksums and value.get("file") != _name(self.path):
-                raise MutatorError(
-                    f"was written as {value.get('file')}",
-                    where=self.path,
-                    line=1,
-                    remedy="give it that name again, or put it back where it came from",
-                )
+        self.check_head(schema)
+        yield from ((number, self.content(number)) for number in self.lines if number > 1)
 
 
 def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
@@ -146,7 +148,7 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     damaged: list[int] = []
     last = b""
     for number, line in enumerate(data[:end].split(b"\n")[:-1], start=1):
-        if not checksums or line == b"".join((_KEY, _checksum(last, line[_BODY:]), _AFTER, line[_BODY:])):
+        if not checksums or line == _line(last, line[_BODY:])[:-1]:
             lines[number] = line
         else:
             damaged.append(number)
@@ -154,8 +156,22 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     return Segment(path=path, checksums=checksums, lines=lines, damaged=tuple(damaged), end=end)
 
 
-def _checksum(last: bytes, body: bytes) -> bytes:
-    return sha256(last + body).hexdigest()[:_WIDTH].encode()
+def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
+    """What a file at `path` holds to which `values` were appended."""
+    lines = [b""]
+    for value in (_head(path, head), *values):
+        lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
+    return b"".join(lines)
+
+
+def _line(last: bytes, body: bytes) -> bytes:
+    """A line: its checksum, which follows on `last`, and `body`, the object without its first brace."""
+    checksum = sha256(last + body).hexdigest()[:_WIDTH].encode()
+    return b"".join((_KEY, checksum, _AFTER, body, b"\n"))
+
+
+def _head(path: Path, head: Mapping[str, Any]) -> dict[str, Any]:
+    return {**head, "file": _name(path)}
 
 
 def _name(path: Path) -> str:

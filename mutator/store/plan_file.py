@@ -58,17 +58,23 @@ def _lines(path: Path) -> _Lines:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=_REMEDY) from None
 
 
-def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T]:
-    """What is `made` of each line of the plan file at `path`; MutatorError with the line at fault."""
+def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T | MutatorError]:
+    """What is `made` of each line of the plan file at `path`, or what is wrong with the line."""
     for number, line in lines:
         try:
             yield made(json.loads(line))
         except MutatorError as err:
-            raise MutatorError(
-                err.got, where=path, line=number, expected=err.expected, remedy=err.remedy
-            ) from None
+            yield MutatorError(err.got, where=path, line=number, expected=err.expected, remedy=err.remedy)
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            raise MutatorError("a damaged line", where=path, line=number, remedy=_REMEDY) from None
+            yield MutatorError("a damaged line", where=path, line=number, remedy=_REMEDY)
+
+
+def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T]:
+    """As `_tried`, but what is wrong is raised."""
+    for found in _tried(path, lines, made):
+        if isinstance(found, MutatorError):
+            raise found
+        yield found
 
 
 def read_faults(run: Path) -> dict[str, Fault]:
@@ -103,22 +109,20 @@ def ids(run: Path) -> Iterator[str]:
     return _read(path, _lines(path), lambda data: str(data["id"]))
 
 
-def damaged_line(run: Path, name: str) -> int | None:
-    """The first line of a changed plan file that is not what an id stands for; None where that is not to be
-    found."""
-    path = run / name
-    try:
-        if name == EXPERIMENTS:
-            read_all(run)
-        else:
-            planned = run / EXPERIMENTS
-            used = set(_read(planned, _lines(planned), itemgetter("fault")))
-            for number, fault in enumerate(_read(path, _lines(path), fault_from), start=1):
-                if fault.id not in used:
-                    return number
-    except MutatorError as err:
-        return err.line if err.where == str(path) else None
-    return None
+def problems(run: Path) -> Iterator[MutatorError]:
+    """Every line that is not what its id, or the id by which others name it, stands for."""
+    planned, defined = run / EXPERIMENTS, run / FAULTS
+    found = list(_tried(defined, _lines(defined), fault_from))
+    faults = {fault.id: fault for fault in found if isinstance(fault, Fault)}
+    used = set(_tried(planned, _lines(planned), itemgetter("fault")))
+    for number, fault in enumerate(found, start=1):
+        if isinstance(fault, MutatorError):
+            yield fault
+        elif fault.id not in used:
+            got = f"fault {fault.id}, which no experiment has"
+            yield MutatorError(got, where=defined, line=number, remedy=_REMEDY)
+    experiments = _tried(planned, _lines(planned), partial(experiment_from, faults=faults))
+    yield from (one for one in experiments if isinstance(one, MutatorError))
 
 
 def to_plain(experiment: Experiment) -> dict[str, Any]:
@@ -157,6 +161,15 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
             remedy=_REMEDY,
         )
     return experiment
+
+
+def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
+    """The canary, as the run.json at `head` has it; MutatorError when it is damaged."""
+    try:
+        fault = fault_from(data["fault"])
+        return experiment_from({**data, "fault": fault.id}, {fault.id: fault})
+    except (MutatorError, ValueError, LookupError, TypeError, AttributeError) as err:
+        raise MutatorError(f"damaged at 'canary' ({err})", where=head, remedy=_REMEDY) from None
 
 
 def fault_from(data: Mapping[str, Any]) -> Fault:

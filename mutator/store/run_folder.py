@@ -21,7 +21,7 @@ DIR/
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,10 +29,9 @@ from typing import Any
 from mutator._common.hashing import digest
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
-from mutator.model import Limits, Record
-from mutator.store import digests, integrity
+from mutator.model import Experiment, Limits, Record
+from mutator.store import digests, integrity, plan_file
 from mutator.store.lines import read_segment
-from mutator.store.plan_file import ids
 from mutator.store.records import TIMINGS_SCHEMA, read_records
 from mutator.store.run_head import HEAD, SCHEMA, Head, read_head
 from mutator.store.shards import Shard
@@ -175,6 +174,10 @@ class RunFolder:
         """The records of the experiments, or those of the `proof`, by experiment id."""
         return read_records(self.path, kind, checksums=self.verifiable)
 
+    def comparable(self, record: Record) -> Record:
+        """A record of today as one of this folder has it: earlier schemas knew nothing of patches."""
+        return record if self.verifiable else replace(record, patch="")
+
     def timings(self) -> dict[str, dict[str, Any]]:
         """What each experiment cost, where: its newest line, by experiment id."""
         newest: dict[str, dict[str, Any]] = {}
@@ -186,6 +189,11 @@ class RunFolder:
                 except (KeyError, TypeError):
                     raise segment.problem(number) from None
         return newest
+
+    @property
+    def canary(self) -> Experiment:
+        """The experiment that must reach its hazard before the campaign starts."""
+        return plan_file.canary_from(self.path / HEAD, self.head["canary"])
 
     def share(self) -> dict[str, int]:
         """Ids and places of the planned experiments that are run here, in the plan's order."""
@@ -203,7 +211,7 @@ class RunFolder:
 
     def find(self, prefix: str) -> str:
         """The one planned experiment whose id starts with `prefix`; MutatorError for none or several."""
-        hits = [name for name in ids(self.path) if name.startswith(prefix)]
+        hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"
             raise MutatorError(

@@ -28,6 +28,7 @@ _SHAPES: dict[str, Any] = {
     "hazards": [str],
     "compared": [str],
     "goldens": [list],
+    "golden_files": [str],
     "canary": {str: object},
     "canary_hazard": str,
     "sources": _TEXTS,

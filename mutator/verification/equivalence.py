@@ -75,12 +75,12 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
     if not (folder.path / FOLDER).is_dir():
         return ()
     found = folder.records(FOLDER)
-    ids = [name for name in _sampled(folder) if name not in found or not _counts(found[name])]
+    ids = [name for name in sampled(folder) if name not in found or not _counts(found[name])]
     pieces = range(0, len(ids), _PIECE)
     return tuple(Sample(number, tuple(ids[i : i + _PIECE])) for number, i in enumerate(pieces))
 
 
-def _sampled(folder: RunFolder) -> list[str]:
+def sampled(folder: RunFolder) -> list[str]:
     """Ids of the sample that are of this folder's share, in the plan's order."""
     wanted = {experiment.id for experiment in sample(plan_file.read_all(folder.path), folder.head["seed"])}
     return [name for name in folder.share() if name in wanted]
@@ -102,16 +102,17 @@ def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
             continue
         if record != truth:
             raise CheckFailed(
-                f"experiment {name} is another one on the reference engine: {_difference(record, truth)}",
+                f"experiment {name} is another one on the reference engine: {difference(record, truth)}",
                 where=folder.path,
                 expected="the same record from every engine",
                 remedy="do not trust this run: run it anew with --engine reference, and report this",
             )
         same += 1
-    return Proof(sampled=len(_sampled(folder)), same=same, errors=tuple(sorted(errors)))
+    return Proof(sampled=len(sampled(folder)), same=same, errors=tuple(sorted(errors)))
 
 
-def _difference(record: Record, truth: Record) -> str:
+def difference(record: Record, truth: Record) -> str:
+    """The first field in which a record differs from what it should be."""
     names = [name for name in Record.__slots__ if getattr(record, name) != getattr(truth, name)]
     return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(truth, names[0])!r}"
 

@@ -62,6 +62,13 @@ def run_checks(
     return results
 
 
+def are_there(folder: RunFolder) -> bool:
+    """Whether a run folder holds results of checks and all golden runs."""
+    places = (folder.golden(scenario, tuple(changes)) for scenario, changes in folder.head["goldens"])
+    goldens = (place / name for place in places for name in folder.head["golden_files"])
+    return all(path.is_file() for path in (folder.path / FILE, *goldens))
+
+
 class _Checks:
     """The checks of one run folder."""
 
@@ -73,10 +80,7 @@ class _Checks:
         self.models = workspace.fault_models()
         self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
         self.seed: int = head["seed"]
-        fault = plan_file.fault_from(head["canary"]["fault"])
-        self.canary: Experiment = plan_file.experiment_from(
-            head["canary"] | {"fault": fault.id}, {fault.id: fault}
-        )
+        self.canary: Experiment = folder.canary
         self.hazard: str = head["canary_hazard"]
         now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
         self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
@@ -156,10 +160,10 @@ class _Checks:
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
         """A run that has records must not go on with other golden runs (of another Python, say)."""
-        before = self._before()
-        started = any((self.folder.path / "records").glob("*.jsonl"))
-        other = [key for key in goldens if before and before["goldens"].get(key) != goldens[key]]
-        if started and other:
+        run, before = self.folder.path, (self._before() or {}).get("goldens", {})
+        known = {key: before.get(key) or _digest_of(self.manifest, run / "golden" / key) for key in goldens}
+        other = [key for key in goldens if known[key] not in ("", goldens[key])]
+        if other and any((run / "records").glob("*.jsonl")):
             raise CheckFailed(
                 f"the golden run {other[0]} is not the one this run began with",
                 where=self.folder.path,

@@ -43,7 +43,7 @@ def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: p
     }
     assert all(r.passed for r in results)
     assert (told[-1].stage, told[-1].done, told[-1].total) == ("checks", 7, 7)
-    assert load_plan(folder.path).cost(2).measured
+    assert load_plan(folder).cost(2).measured
     monkeypatch.setattr(ReferenceEngine, "execute", None)
     assert run_checks(toycar, folder) == results
 
