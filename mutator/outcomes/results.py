@@ -79,11 +79,11 @@ def build(run: Path) -> Path:
     """Write results.csv (returned), results.parquet and timings.parquet of a run folder from its plan and
     records. A MutatorWarning tells of a table that somebody has edited: it is no more."""
     folder = RunFolder.open(run)
-    made_from, before = _made_from(folder), _found(folder)
+    made_from = _made_from(folder)
     made = tables(folder)
     now = {name: digest(data) for name, data in made.items()}
-    _warn_of_edited(folder, before, now)
     # first what is there and what will be, so that a table which a kill left is not taken for an edited one
+    before = _unedited(folder, now)
     stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
     write_json(folder.path / STAMP, stamp)
     for name, data in made.items():
@@ -131,15 +131,18 @@ def _stamp(folder: RunFolder) -> dict[str, Any]:
     return {"made_from": None, "tables": {}, "before": {}}
 
 
-def _warn_of_edited(folder: RunFolder, found: Mapping[str, str | None], now: Mapping[str, str]) -> None:
-    """Say which tables are none that was made; of old folders without results.json nobody knows."""
+def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
+    """Digests of the tables that are there and were made by a build; a warning tells of any other one. Of old
+    folders without results.json nobody knows."""
     stamp = _stamp(folder)
     tells = folder.verifiable or stamp.get("made_from")
-    for name, one in found.items():
-        made = [now[name], *(stamp[key].get(name) for key in ("tables", "before"))]
-        if tells and one is not None and one not in made:
+    found = {name: one for name, one in _found(folder).items() if one is not None}
+    made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
+    for name in found:
+        if tells and found[name] not in made[name]:
             text = f"{folder.path / name}: not what was made from plan and records; made anew"
             warnings.warn(text, MutatorWarning, stacklevel=2)
+    return {name: one for name, one in found.items() if one in made[name]}
 
 
 def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
