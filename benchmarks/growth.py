@@ -21,7 +21,8 @@ from mutator.mutants.building import build
 from mutator.outcomes import results
 from mutator.statistics.frame import load
 from mutator.store import plan_file
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

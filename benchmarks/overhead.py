@@ -28,7 +28,8 @@ from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E40
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
-from mutator.store.records import SCHEMA, LineWriter  # noqa: E402
+from mutator.store.lines import LineWriter  # noqa: E402
+from mutator.store.records import SCHEMA  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 

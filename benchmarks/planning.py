@@ -21,7 +21,8 @@ from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.verification import preflight, preflight_cache
 from mutator.workspace import Workspace

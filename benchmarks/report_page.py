@@ -35,7 +35,8 @@ from mutator.report import series as report_series
 from mutator.report.browse import Browse
 from mutator.report.page import Content
 from mutator.review.groups import shapes
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.web import embedded
 from mutator.workspace import Workspace
 

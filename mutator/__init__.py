@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.version import VERSION
 
 if TYPE_CHECKING:
+    from mutator.api.audits import Audit, verify
     from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
     from mutator.api.campaigns import IncompleteRun, plan, run
     from mutator.api.comparisons import RunComparison, compare
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from mutator.api.trials import Trial, try_fault
     from mutator.campaigns.plans import Choices, Plan
     from mutator.comparison.comparison import Gate
-    from mutator.errors import CheckFailed, MutatorError
+    from mutator.errors import CheckFailed, MutatorError, MutatorWarning
     from mutator.execution.session import Summary
     from mutator.exports import Format
     from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
@@ -40,6 +41,7 @@ __version__ = VERSION
 
 # module -> names; pandas, libcst and pytest are not paid for by who only wants the version
 _HOMES = {
+    "mutator.api.audits": ("Audit", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("IncompleteRun", "plan", "run"),
     "mutator.api.comparisons": ("RunComparison", "compare"),
@@ -58,7 +60,7 @@ _HOMES = {
     "mutator.api.trials": ("Trial", "try_fault"),
     "mutator.campaigns.plans": ("Choices", "Plan"),
     "mutator.comparison.comparison": ("Gate",),
-    "mutator.errors": ("CheckFailed", "MutatorError"),
+    "mutator.errors": ("CheckFailed", "MutatorError", "MutatorWarning"),
     "mutator.execution.session": ("Summary",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
@@ -69,6 +71,7 @@ _HOMES = {
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Audit",
     "BuiltMutant",
     "CheckFailed",
     "Choices",
@@ -79,6 +82,7 @@ __all__ = [
     "IncompleteRun",
     "MutantSet",
     "MutatorError",
+    "MutatorWarning",
     "Outcome",
     "Plan",
     "Progress",
@@ -112,6 +116,7 @@ __all__ = [
     "prune_caches",
     "run",
     "try_fault",
+    "verify",
 ]
 
 

@@ -61,6 +61,10 @@ class MutatorError(Exception):
         return _rebuild, (type(self), self.got, state)
 
 
+class MutatorWarning(UserWarning):
+    """Something that the user should know although nothing failed: shown in one line."""
+
+
 def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> MutatorError:
     return cls(got, **state)
 

@@ -237,3 +237,4 @@ class Record:
     alerts: tuple[tuple[str, float], ...]
     trace_digest: str
     error: RunError | None = added(None)
+    patch: str = ""  # digest of the stored patch; empty without a mutant, and in old records

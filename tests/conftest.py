@@ -1,6 +1,7 @@
 """Fixtures that several kinds of tests share."""
 
 import dataclasses
+import json
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -25,7 +26,10 @@ from mutator.model import (
     Status,
     Trigger,
 )
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store import digests
+from mutator.store.digests import Digest
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
@@ -171,7 +175,7 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         freeze(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared
         unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
-        lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA})
+        lines = LineWriter(out / "records" / "0001-a.jsonl", {"schema": SCHEMA, "plan": plan.digest})
         for experiment in plan.experiments:
             fields = became(experiment)
             if fields is not None:
@@ -180,3 +184,26 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         return out
 
     return write
+
+
+@pytest.fixture(scope="session")
+def reseal() -> Callable[..., None]:
+    """Computes every checksum and digest of a run folder anew: who changed a file, and is that careful, is
+    found by nothing that the folder itself tells."""
+
+    def compute(run: Path, finished: bool | None = None) -> None:
+        for path in (file for kind in ("records", "timings", "proof") for file in (run / kind).glob("*")):
+            lines = [json.loads(line) for line in path.read_bytes().splitlines()]
+            head, *content = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
+            path.unlink()
+            writer = LineWriter(path, head)
+            for line in content:
+                writer.append(line)
+            writer.close()
+        known = digests.read(run)
+        names = [name for name, one in known.files.items() if one.lines is None and (run / name).exists()]
+        files = {name: Digest.of((run / name).read_bytes()) for name in names}
+        digests.write(run, dataclasses.replace(known, files=files))
+        digests.close_segments(run, finished=finished)
+
+    return compute

@@ -84,7 +84,12 @@ def is_half_written(name: str) -> bool:
 
 def write_json(path: Path, data: dict[str, Any]) -> None:
     """Write `data` (which names its schema) for people and programs."""
-    write_atomic(path, (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode())
+    write_atomic(path, json_bytes(data))
+
+
+def json_bytes(data: dict[str, Any]) -> bytes:
+    """What `write_json` writes."""
+    return (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def read_json(path: Path, schema: str) -> dict[str, Any]:

@@ -34,7 +34,13 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         with raising_disk_full(run):
             os.ftruncate(fd, 0)
             os.write(fd, f"{os.getpid()}\n".encode())
-        _wait_for_workers(run, patience_s)
+        if living := wait_for_workers(run, patience_s):
+            raise MutatorError(
+                f"workers of an earlier run are still running (processes {', '.join(map(str, living))})",
+                where=run,
+                expected="a folder without workers",
+                remedy="wait for them or end them, then give the same command again",
+            )
         yield
     finally:
         os.close(fd)
@@ -65,17 +71,12 @@ def living_workers(run: Path) -> list[int]:
     return living
 
 
-def _wait_for_workers(run: Path, patience_s: float) -> None:
+def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
+    """Wait until no worker is left in `run`; process ids of those that stay longer."""
     deadline = time.monotonic() + patience_s
-    while living := living_workers(run):
-        if time.monotonic() > deadline:
-            raise MutatorError(
-                f"workers of an earlier run are still running (processes {', '.join(map(str, living))})",
-                where=run,
-                expected="a folder without workers",
-                remedy="wait for them or end them, then give the same command again",
-            )
+    while (living := living_workers(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)
+    return living
 
 
 def _try_lock(fd: int) -> bool:

@@ -35,7 +35,7 @@ def plan(
     made = make_plan(found, campaign, choices)
     if out is None:
         return made
-    return load_plan(freeze(made, Path(out), found).path)  # knows what a run took, once one was driven here
+    return load_plan(freeze(made, Path(out), found))  # knows what a run took, once one was driven here
 
 
 def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:

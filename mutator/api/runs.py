@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.arguments import check_type
 from mutator._common.tables import Table
+from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
 from mutator.api.html import facts_html, text_html
 from mutator.api.mutants import built
@@ -30,11 +31,12 @@ from mutator.outcomes.reader import Results
 from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
 from mutator.store import plan_file, run_folder
-from mutator.store.records import read_records
-from mutator.store.run_folder import HEAD, RunFolder, golden_key
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
+from mutator.verification.seal import not_verifiable, seal
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -96,7 +98,8 @@ class Run:
         done = f"{sum(self.endings.values())} of {self.folder.planned} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
-        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}>"
+        old = "" if self.verifiable else f", {not_verifiable(self.folder)}"
+        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}{old}>"
 
     def _repr_html_(self) -> str:
         return text_html(repr(self)) + facts_html(self.endings.items()) + str(self.counts().as_html())
@@ -127,7 +130,7 @@ class Run:
     @cached_property
     def plan(self) -> Plan:
         """The frozen plan."""
-        return load_plan(self.path)
+        return load_plan(self.folder)
 
     @cached_property
     def faults(self) -> dict[str, Fault]:
@@ -142,7 +145,7 @@ class Run:
     @cached_property
     def records(self) -> Mapping[str, Record]:
         """The record of each experiment that has one, by id."""
-        return read_records(self.path)
+        return self.folder.records()
 
     @cached_property
     def results(self) -> "pd.DataFrame":
@@ -161,6 +164,17 @@ class Run:
     def harness_errors(self) -> dict[str, str]:
         """Experiments that the harness failed at, and why; `mutator.run` tries them again."""
         return {r.experiment_id: r.detail for r in self._rows if r.status is Status.HARNESS_ERROR}
+
+    @property
+    def verifiable(self) -> bool:
+        """Whether its content can be verified; runs of earlier schemas have no digests."""
+        return self.folder.verifiable
+
+    @cached_property
+    def seal(self) -> str | None:
+        """One digest of everything that counts, computed now; None for a run that is not finished, or not
+        verifiable."""
+        return seal(self.folder)
 
     def counts(self) -> Table:
         """How the experiments of each fault type ended."""
@@ -222,7 +236,12 @@ class Run:
 
     def check_equivalence(self) -> None:
         """CheckFailed when a sample that was run again on the reference engine gave another result."""
-        equivalence.judge(self.folder, read_records(self.path))
+        equivalence.judge(self.folder, self.folder.records())
+
+    def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> Audit:
+        """Audit the folder: see `mutator.verify`."""
+        workspace = self._workspace_if_any()
+        return verify(self.path, rerun=rerun, expect=expect, repair=repair, workspace=workspace)
 
     def delete(self) -> None:
         """Delete the run folder; MutatorError while a command or its workers hold it."""
@@ -253,9 +272,9 @@ class RunExperiment(ExperimentResult):
     @cached_property
     def patch(self) -> str:
         """The whole patch, probe included: the kept one, or made now when it has not run yet."""
-        kept = self.run.folder.patch(self.id)
-        if kept.exists():
-            return kept.read_bytes().decode("utf-8", "surrogateescape")
+        kept = self.run.folder.read_patch(self.id, self.record)
+        if kept is not None:
+            return kept.decode("utf-8", "surrogateescape")
         return built(self.run._bench, self.fault, self.experiment.trigger).patch
 
     def traces(self, *, exact: bool = False) -> TraceFrames:

@@ -3,13 +3,14 @@
 import csv
 import io
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.arguments import check_type, check_whole
-from mutator._common.files import is_half_written, make_folder, write_atomic, write_json
+from mutator._common.files import is_half_written, json_bytes, make_folder, write_atomic
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.tables import Table
@@ -25,9 +26,11 @@ from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
 from mutator.store.check_results import measured_cpu_s
-from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
+from mutator.store.digests import Digest, Ledger
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.store.shards import Shard
 from mutator.workspace import Workspace
 
@@ -174,7 +177,6 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
             expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
             remedy="use fewer shards, or a smaller chunk in the campaign",
         )
-    content = [[e.id for e in experiments], chunks, canary.id, plain(loaded.canary), plain(loaded.limits)]
     return Plan(
         campaign=loaded,
         choices=choices,
@@ -183,9 +185,15 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
         experiments=experiments,
         chunks=chunks,
         canary=canary,
-        digest=digest([_DIGEST_PREFIX, *content]),
+        digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
         runs=len(once),
     )
+
+
+def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+    """The digest that follows from ids and chunks of the experiments, the canary's id, and the campaign."""
+    content = [ids, chunks, canary, plain(campaign.canary), plain(campaign.limits)]
+    return digest([_DIGEST_PREFIX, *content])
 
 
 def _choose(
@@ -250,7 +258,8 @@ def make_run_folder(out: Path) -> None:
     make_folder(out)
 
 
-_OURS = ("owner.lock", "workers", "plan", "plan.csv", "campaign.yaml")  # what a killed freeze leaves
+CSV = "plan.csv"
+_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # what a killed freeze leaves
 
 
 def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
@@ -267,10 +276,14 @@ def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
         check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(plan, workspace))
         return folder
-    write_atomic(out / "campaign.yaml", plan.campaign.source)
-    write_atomic(out / "plan.csv", _csv(plan))
+    write_atomic(out / CAMPAIGN, plan.campaign.source)
+    write_atomic(out / CSV, plan_csv(plan))
     chunks = plan_file.write(out, plan.experiments, plan.chunks)
-    write_json(out / HEAD, _head(plan, workspace, chunks))
+    head = json_bytes(_head(plan, workspace, chunks))
+    written = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+    files = {name: Digest.of((out / name).read_bytes()) for name in written}
+    digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    write_atomic(out / HEAD, head)  # last: from now on it is a run folder
     return RunFolder.open(out)
 
 
@@ -298,6 +311,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "hazards": list(manifest.hazards),
         "compared": [channel.name for channel in manifest.compared],
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "golden_files": [manifest.trace_file, manifest.record_file],
         "canary": canary,
         "canary_hazard": plan.campaign.canary.hazard,
         "sources": _sources(plan, workspace),
@@ -308,27 +322,25 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
     }
 
 
-def _csv(plan: Plan) -> bytes:
+def plan_csv(plan: Plan) -> bytes:
+    """What plan.csv holds."""
     writer = csv.DictWriter(text := io.StringIO(), PLAN_COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(plan.rows())
     return text.getvalue().encode()
 
 
-def load_plan(out: Path) -> Plan:
+def load_plan(folder: RunFolder) -> Plan:
     """The frozen plan of a run folder, complete (for reports; workers read single chunks instead)."""
-    folder = RunFolder.open(out)
     head = folder.head
-    canary = dict(head["canary"])
-    fault = plan_file.fault_from(canary["fault"])
     return Plan(
-        campaign=load_campaign(folder.path / "campaign.yaml"),
+        campaign=load_campaign(folder.path / CAMPAIGN),
         choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
         seed=head["seed"],
         reading=head["reading"],
         experiments=plan_file.read_all(folder.path),
         chunks=tuple(count for _, _, count in head["chunks"]),
-        canary=plan_file.experiment_from(canary | {"fault": fault.id}, {fault.id: fault}),
+        canary=folder.canary,
         runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),

@@ -5,13 +5,15 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import write_json
+from mutator._common.files import json_bytes
 from mutator._common.hashing import digest, plain
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
 from mutator.errors import MutatorError
+from mutator.store import digests
 from mutator.store.check_results import loaded_packages
-from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import HEAD, SCHEMA
 from mutator.store.stretches import Stretch, differences
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -110,5 +112,5 @@ def add_stretch(folder: RunFolder, stretch: Stretch) -> None:
     """Append a stretch of work to run.json of a folder that the caller owns."""
     head = folder.head
     stretches = [*head.get("stretches", ()), plain(stretch)]
-    write_json(folder.path / HEAD, head | {"stretches": stretches})
+    digests.rewrite(folder.path, HEAD, json_bytes(head | {"stretches": stretches}))
     head["stretches"] = stretches

@@ -4,7 +4,9 @@ import errno
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -14,6 +16,7 @@ from typer.main import get_command
 from mutator._common.interrupts import terminable
 from mutator._common.version import VERSION
 from mutator.cli import (
+    audits,
     caches,
     campaigns,
     comparisons,
@@ -26,9 +29,16 @@ from mutator.cli import (
     reviews,
     run_folders,
 )
-from mutator.cli.console import show_error
+from mutator.cli.console import Terminal, show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
-from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK, EXIT_WRONG_INPUT, MutatorError
+from mutator.errors import (
+    EXIT_CHECK_FAILED,
+    EXIT_HARNESS_ERRORS,
+    EXIT_OK,
+    EXIT_WRONG_INPUT,
+    MutatorError,
+    MutatorWarning,
+)
 
 EXIT_INTERRUPTED = 130
 EXIT_CODES = {
@@ -45,7 +55,7 @@ GROUPS = (
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
-    ("After a campaign", ("compare", "export")),
+    ("After a campaign", ("compare", "export", "verify")),
     ("One experiment", ("show", "rerun")),
 )
 EXAMPLES = f"""\b
@@ -112,6 +122,7 @@ for module in (
     reviews,
     campaigns,
     run_folders,
+    audits,
     comparisons,
     exports,
     experiments,
@@ -137,7 +148,11 @@ def _answer(words: Sequence[str]) -> int:
     try:
         # Not `app()`: it would answer errors, interruptions and closed pipes in its own way.
         command = get_command(app)
-        with terminable(), command.make_context("mutator", [*words] or ["--help"]) as ctx:
+        with (
+            _warnings_in_one_line(),
+            terminable(),
+            command.make_context("mutator", [*words] or ["--help"]) as ctx,
+        ):
             command.invoke(ctx)
         return EXIT_OK
     except typer.Exit as e:
@@ -161,6 +176,23 @@ def _answer(words: Sequence[str]) -> int:
         return EXIT_WRONG_INPUT
     except Exception:
         return _defect()
+
+
+@contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """Within it, the harness's own warnings are a line of standard error each."""
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+            if issubclass(category, MutatorWarning):
+                Terminal().note(f"warning: {message}")
+            else:
+                others(message, category, *place, **more)
+
+        warnings.simplefilter("always", MutatorWarning)
+        warnings.showwarning = show
+        yield
 
 
 def _usage(error: typer.TyperException) -> int:

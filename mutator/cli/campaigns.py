@@ -192,7 +192,7 @@ def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") ->
         paths = {"run": str(out), "report": str(report[0]) if report else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
-        terminal.emit(counts | paths | found)
+        terminal.emit(counts | paths | found | {"seal": summary.seal})
     if written:
         show_counts(terminal, run)
     terminal.say(
@@ -203,6 +203,8 @@ def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") ->
         terminal.say(f"proof: {summary.proof}")
     if written:
         terminal.say(f"report: {report[0]} and {report[1]}")
+    if summary.seal:
+        terminal.say(f"seal: {summary.seal}")
     if summary.harness_errors:
         terminal.say(
             f"{len(summary.harness_errors)} harness errors, in no count; the same command tries them again:"

@@ -66,7 +66,7 @@ def show(
     if as_json:
         facts = {**describe(found.experiment), **found.verdict, "patch": patch}
         facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
-        facts["run_with"] = stretch
+        facts |= {"run_with": stretch, "verifiable": found.run.verifiable}
         terminal.emit(facts | {"films": filmed})
         return
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -76,6 +76,8 @@ def show(
         experiment_view.print_verdict(terminal, found.record)
     if stretch:
         terminal.say(f"run with: {stretch}")
+    if not found.run.verifiable:
+        terminal.say("not verifiable: an earlier version of mutator wrote this run, without digests")
     if drawn:
         terminal.say(f"plot: {short_path(drawn)}")
     for path in filmed:

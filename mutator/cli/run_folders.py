@@ -50,11 +50,13 @@ def merge(
     """
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
-        planned = mutator.merge_runs(shards, out, accept_versions=accept_versions).folder.planned
+        merged = mutator.merge_runs(shards, out, accept_versions=accept_versions)
+        planned, seal = merged.folder.planned, merged.seal
     if as_json:
-        terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
+        terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned, "seal": seal})
     results = short_path(out / "results.csv")
     terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
+    terminal.say(f"seal: {seal}")
     terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
 
 
@@ -78,7 +80,7 @@ def report(
     a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
     """
     terminal = Terminal(as_json)
-    loaded = mutator.load_run(run, workspace=_library(place))
+    loaded = mutator.load_run(run, workspace=library_if_any(place))
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = loaded.report(anew=True)
     if as_json:
@@ -88,7 +90,7 @@ def report(
     loaded.check_equivalence()
 
 
-def _library(place: Place) -> "Workspace | None":
+def library_if_any(place: Place) -> "Workspace | None":
     """The workspace; None where none is named and none is found: a report can be written anywhere."""
     try:
         return place.workspace()

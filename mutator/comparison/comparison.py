@@ -83,7 +83,7 @@ class Comparison:
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        return remarks(self.matching)
+        return remarks(self.a, self.b, self.matching)
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:

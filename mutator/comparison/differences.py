@@ -12,6 +12,7 @@ from mutator.comparison.sides import Side
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import package_versions
 from mutator.store.stretches import told as ran_with
+from mutator.verification.seal import not_verifiable
 
 _SHORT = 12  # digits of a digest that are shown
 _HEAD = ("campaign", "target", "seed", "reading")
@@ -76,8 +77,9 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
     return found
 
 
-def remarks(matching: Matching) -> tuple[str, ...]:
-    """What is not the same within pairs although they have one name, with the number of such pairs."""
+def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
+    """Which run is not verifiable; what is not the same within pairs although they have one name, with the
+    number of such pairs."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
         ("inject something else, or elsewhere", lambda p: p.a.fault.injections != p.b.fault.injections),
         ("wait for another condition", lambda p: p.a.trigger.condition != p.b.trigger.condition),
@@ -85,8 +87,12 @@ def remarks(matching: Matching) -> tuple[str, ...]:
         ("drive a scenario with another text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
         ("have another seed", lambda p: p.a.seed != p.b.seed),
     )
+    old = (side for side in (a, b) if not side.folder.verifiable)
     counts = ((_count(matching.pairs, differs), what) for what, differs in told)
-    return tuple(f"{n} of {len(matching.pairs)} pairs {what}." for n, what in counts if n)
+    return (
+        *(f"The content of {side.name} is {not_verifiable(side.folder)}." for side in old),
+        *(f"{n} of {len(matching.pairs)} pairs {what}." for n, what in counts if n),
+    )
 
 
 def _hold(experiment: Any) -> tuple[object, ...]:

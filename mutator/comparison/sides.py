@@ -10,7 +10,6 @@ from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.outcomes.reader import row_of
 from mutator.outcomes.rows import Row
 from mutator.store import plan_file
-from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 
@@ -48,7 +47,7 @@ def read_side(run: Path, only: str | None = None) -> Side:
     CheckFailed when the proof of its engine failed: its results are not to be compared.
     """
     folder = RunFolder.open(run)
-    records = read_records(folder.path)
+    records = folder.records()
     equivalence.judge(folder, records)
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import raising_disk_full, read_json, write_json
+from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import plain
 from mutator._common.locks import owned
 from mutator._common.text import counted
@@ -17,15 +17,18 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.review.gate import FILE as REVIEWED
-from mutator.store import plan_file
+from mutator.store import digests
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.records import read_records
-from mutator.store.run_folder import HEAD, RunFolder
+from mutator.store.digests import Digest, Ledger
+from mutator.store.lines import read_segment, written
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
-_SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
+_SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
@@ -47,7 +50,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
         )
     if not shards:
         raise MutatorError("no run folder", argument="shards", remedy=_REMEDY)
-    folders = [RunFolder.open(path) for path in shards]
+    folders = [_opened(path) for path in shards]
     _check_plans(folders)
     _check_numbers(folders)
     with ExitStack() as stack:
@@ -66,6 +69,18 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             for path in out.iterdir():
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
             raise
+
+
+def _opened(path: Path) -> RunFolder:
+    folder = RunFolder.open(path)
+    if not folder.verifiable:
+        raise MutatorError(
+            f"not verifiable ({folder.head['schema']})",
+            where=path,
+            expected="shards with digests and checksums",
+            remedy="merge them with the version of mutator that ran them, or run them again",
+        )
+    return folder
 
 
 def _check_plans(folders: Sequence[RunFolder]) -> None:
@@ -113,19 +128,12 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_complete(folder: RunFolder) -> None:
-    """Every experiment of the share has a record that counts, no other one any, and the proof is whole."""
-    records = read_records(folder.path)
-    done = {name for name, record in records.items() if _counts(record)}
-    share = _share(folder)
-    if strangers := sorted(set(records) - share):
+    """Every experiment of the share has a record that counts, and the proof is whole."""
+    records = folder.records()
+    done = sum(_counts(record) for record in records.values())
+    if done < folder.planned:
         raise MutatorError(
-            f"a record of {strangers[0]}, which is not of this shard",
-            where=folder.path,
-            remedy="run the shard again into a new folder",
-        )
-    if len(done) < len(share):
-        raise MutatorError(
-            f"unfinished: {len(done)} of {len(share)} experiments done",
+            f"unfinished: {done} of {folder.planned} experiments done",
             where=folder.path,
             expected="a finished shard",
             remedy="run it to its end with the command it was begun with",
@@ -142,18 +150,6 @@ def _check_complete(folder: RunFolder) -> None:
 
 def _counts(record: Record) -> bool:
     return record.status is not Status.HARNESS_ERROR
-
-
-def _share(folder: RunFolder) -> set[str]:
-    shard = folder.shard
-    assert shard is not None
-    names = plan_file.ids(folder.path)
-    share: set[str] = set()
-    for index, (_, _, count) in enumerate(folder.head["chunks"]):
-        chunk = [next(names) for _ in range(count)]
-        if shard.has(index):
-            share.update(chunk)
-    return share
 
 
 def _check_goldens(folders: Sequence[RunFolder]) -> None:
@@ -190,22 +186,44 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
     """Everything of the shards; the head comes last, so a folder half made is no run folder."""
     first = folders[0]
-    for name in _SHARED:
-        source = first.path / name
-        if source.is_dir():
-            shutil.copytree(source, out / name)
-        else:
-            shutil.copy(source, out / name)
-    if all((folder.path / REVIEWED).exists() for folder in folders):
-        shutil.copy(first.path / REVIEWED, out / REVIEWED)
+    ledger = digests.settled(first.path)
+    reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
+    files = {
+        name: one
+        for name, one in ledger.files.items()
+        if one.lines is None and name != HEAD and (reviewed or name != REVIEWED)
+    }
+    for name in files:
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(first.path / name, out / name)
     for folder in folders:
-        assert folder.shard is not None
-        shutil.copytree(folder.path / "patches", out / "patches", dirs_exist_ok=True)
-        for name in ("records", "timings", equivalence.FOLDER):
-            if (folder.path / name).is_dir():
-                (out / name).mkdir(exist_ok=True)
-            for path in (folder.path / name).glob("*.jsonl"):
-                shutil.copy(path, out / name / f"{path.stem}-shard{folder.shard.number}.jsonl")
-    head = first.head
-    whole = {"choices": head["choices"] | {"shard": None}, "stretches": stretches}
-    write_json(out / HEAD, head | whole)
+        _copy_patches(folder, out)
+        _copy_segments(folder, out)
+    whole = {"choices": first.head["choices"] | {"shard": None}, "stretches": stretches}
+    head = json_bytes(first.head | whole)
+    digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    digests.close_segments(out, finished=True)
+    write_atomic(out / HEAD, head)
+
+
+def _copy_patches(folder: RunFolder, out: Path) -> None:
+    """The patches that the records name."""
+    merged = RunFolder(out)
+    for record in folder.records().values():
+        if (data := folder.read_patch(record.experiment_id, record)) is not None:
+            place = merged.patch(record.experiment_id)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+
+
+def _copy_segments(folder: RunFolder, out: Path) -> None:
+    """The lines of a shard's segments, in files whose names tell the shard."""
+    assert folder.shard is not None
+    for kind, schema in _SEGMENTS.items():
+        if (folder.path / kind).is_dir():
+            (out / kind).mkdir(exist_ok=True)
+        for path in sorted((folder.path / kind).glob("*.jsonl")):
+            place = out / kind / f"{path.stem}-shard{folder.shard.number}.jsonl"
+            head = {"schema": schema, "plan": folder.head["plan"]}
+            lines = (line for _, line in read_segment(path).objects(schema))
+            write_atomic(place, written(place, head, lines))

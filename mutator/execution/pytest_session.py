@@ -260,5 +260,6 @@ def _lines(summary: Summary) -> list[str]:
         *(f"{name}: {what}" for name, what in summary.harness_errors),
         f"proof: {summary.proof}" if summary.proof else "",
         f"results: {summary.results}" if summary.results else "",
+        f"seal: {summary.seal}" if summary.seal else "",
     ]
     return [line for line in lines if line]

@@ -24,7 +24,7 @@ def open_frozen(
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
-        approvals = gate.approvals(workspace, load_plan(folder.path)) if reviewed else None
+        approvals = gate.approvals(workspace, load_plan(folder)) if reviewed else None
     else:
         plan = make_plan(workspace, campaign, choices)
         approvals = gate.approvals(workspace, plan) if reviewed else None

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import MutatorError
@@ -179,6 +180,7 @@ class Runner:
             hazards=tuple(hazards),
             alerts=tuple(first_events(golden.alerts_of(said, self.manifest.alerts), activation)),
             trace_digest=golden.trace_digest(self.manifest, execution.out),
+            patch=digest(built.patch_bytes),
         )
 
 
@@ -215,4 +217,5 @@ def _bare(
         hazards=(),
         alerts=(),
         trace_digest="",
+        patch=digest(built.patch_bytes) if built else "",
     )

@@ -4,6 +4,7 @@ How the pending work is dealt out to processes is not decided here: see `distrib
 """
 
 import os
+import re
 import shutil
 import time
 from collections import Counter
@@ -16,7 +17,7 @@ from typing import Any
 
 from mutator._common.files import DiskFull, is_half_written
 from mutator._common.interrupts import terminable
-from mutator._common.locks import owned
+from mutator._common.locks import owned, wait_for_workers
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.plans import Choices, make_run_folder
 from mutator.campaigns.provenance import begin_stretch, check_versions
@@ -27,10 +28,12 @@ from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
-from mutator.store.records import Progress, label, read_records
+from mutator.store import digests
+from mutator.store.records import Progress, label
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
-from mutator.verification.preflight import run_checks
+from mutator.verification.preflight import are_there, run_checks
+from mutator.verification.seal import seal
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
@@ -51,6 +54,7 @@ class Summary:
     interrupted: bool
     results: Path | None  # results.csv; None when there was no room for it
     proof: equivalence.Proof | None  # None: nothing that the reference engine has not run
+    seal: str | None  # of a finished run
     elapsed_s: float
 
     @property
@@ -93,13 +97,13 @@ class Session:
     def prepare(self) -> None:
         """Find what is left to run; if anything is, pass the checks, lay out the pristine tree, and note the
         stretch of work that begins. MutatorError for other versions than before that are not accepted."""
-        records = read_records(self.folder.path)
+        records = self.folder.records()
         self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
             equivalence.begin(self.folder.path)
         self.proof = equivalence.left(self.folder)
-        if left or self.proof:
+        if left or self.proof or not are_there(self.folder):
             check_versions(self.folder, accept=self._accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             prepare_base(self._manifest, self.folder.base)
@@ -114,8 +118,9 @@ class Session:
 
     def worker_name(self, name: str) -> str:
         """Name of a worker's files, used by no session before this one."""
-        files = self.folder.path.glob("records/*.jsonl")
-        taken = [int(path.name.split("-")[0]) for path in files]
+        kinds = ("records", "timings", equivalence.FOLDER)
+        files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in kinds)
+        taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
     def worker_input(self) -> dict[str, Any]:
@@ -133,15 +138,17 @@ class Session:
     def finish(self) -> Summary:
         """Build the table from what there is now, and say what the run has come to."""
         self.notify(Progress(stage="results"))
-        records = read_records(self.folder.path) if self._records is None else self._records
+        records = self.folder.records() if self._records is None else self._records
         wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
         done = len(records) - len(wrong)
         built = None
-        try:
+        with self._noting_full_disk():
+            self._close_segments()
             built = results.ensure(self.folder.path)
-        except DiskFull as err:  # the records are there, the table can be made any time
-            self.problem = self.problem or str(err)
         proven = equivalence.judge(self.folder, records)
+        if done == self.folder.planned and (proven is None or proven.whole):
+            with self._noting_full_disk():
+                self._close_segments(finished=True)
         return Summary(
             planned=self.folder.planned,
             done=done,
@@ -152,8 +159,22 @@ class Session:
             interrupted=self.interrupted,
             results=built,
             proof=proven,
+            seal=seal(self.folder),
             elapsed_s=time.monotonic() - self._began,
         )
+
+    @contextmanager
+    def _noting_full_disk(self) -> Iterator[None]:
+        """A full disk is no end: the records are there, the rest can be made at any time."""
+        try:
+            yield
+        except DiskFull as err:
+            self.problem = self.problem or str(err)
+
+    def _close_segments(self, *, finished: bool | None = None) -> None:
+        """Enter what this session's workers wrote; if one is still dying, the next session does it."""
+        if not wait_for_workers(self.folder.path):
+            digests.close_segments(self.folder.path, finished=finished)
 
 
 @contextmanager
@@ -181,6 +202,7 @@ def open_session(
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is left
                 shutil.rmtree(out, ignore_errors=True)
             raise
+        digests.close_segments(folder.path)
         shutil.rmtree(folder.work, ignore_errors=True)
         # not everywhere: there may be thousands of patches
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))

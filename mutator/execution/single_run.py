@@ -15,7 +15,6 @@ from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.building import Mutant
 from mutator.store import plan_file
-from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -84,8 +83,11 @@ def rerun(
         limits=folder.limits,
         golden=golden if golden.is_dir() and not film else None,
     )
-    known = read_records(folder.path).get(wanted)
-    return single, known is None or known == single.record
+    known = folder.records().get(wanted)
+    if known is None:
+        return single, True
+    folder.read_patch(wanted, known)
+    return single, known == folder.comparable(single.record)
 
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:

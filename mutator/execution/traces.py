@@ -9,7 +9,6 @@ from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden import Trace, load_trace, trace_digest
 from mutator.store import plan_file
-from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -29,7 +28,7 @@ class Traces:
 
     @cached_property
     def _records(self) -> Mapping[str, Record]:
-        return read_records(self.folder.path)
+        return self.folder.records()
 
     @cached_property
     def _experiments(self) -> Mapping[str, Experiment]:

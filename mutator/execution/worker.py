@@ -18,7 +18,8 @@ from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Status
 from mutator.store import plan_file
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 from mutator.verification.equivalence import Sample

@@ -19,7 +19,6 @@ from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import Edit
 from mutator.store import plan_file
-from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -37,7 +36,7 @@ def content(folder: RunFolder, workspace: Workspace) -> bytes:
 
 def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
     """The report as plain data."""
-    records = read_records(folder.path)
+    records = folder.records()
     drives: dict[str, list[Experiment]] = {}
     for experiment in plan_file.read_all(folder.path):
         drives.setdefault(experiment.fault.id, []).append(experiment)

@@ -2,10 +2,15 @@
 
 import csv
 import io
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from mutator._common.files import write_atomic
+from mutator._common.files import read_json, write_atomic, write_json
+from mutator._common.hashing import digest
+from mutator._common.version import VERSION
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.columns import (
     TIMINGS,
@@ -17,10 +22,11 @@ from mutator.outcomes.columns import (
 )
 from mutator.outcomes.verdicts import reaction_time
 from mutator.store import plan_file
-from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
+from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
 
 CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
+SCHEMA, STAMP = "results/1", "results.json"
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
@@ -60,30 +66,83 @@ def _time(value: float | None) -> float | None:
 
 
 def ensure(run: Path) -> Path:
-    """results.csv of a run folder: as it is when all derived files are newer than all they are made from,
+    """results.csv of a run folder: as it is when all tables are what was made of what the folder holds now,
     else built."""
-    derived = [run / name for name in (CSV, PARQUET, TIMINGS_PARQUET)]
-    if all(path.is_file() for path in derived):
-        made_from = [run / "run.json", *run.glob("records/*.jsonl"), *run.glob("timings/*.jsonl")]
-        oldest = min(path.stat().st_mtime_ns for path in derived)
-        if all(path.stat().st_mtime_ns < oldest for path in made_from):
-            return derived[0]
+    folder = RunFolder.unverified(run)
+    stamp = _stamp(folder)
+    if stamp.get("made_from") == _made_from(folder) and stamp["tables"] == _found(folder):
+        return folder.path / CSV
     return build(run)
 
 
 def build(run: Path) -> Path:
     """Write results.csv (returned), results.parquet and timings.parquet of a run folder from its plan and
-    records."""
+    records. A MutatorWarning tells of a table that somebody has edited: it is no more."""
     folder = RunFolder.open(run)
-    records = read_records(folder.path)
+    made_from = _made_from(folder)
+    made = tables(folder)
+    now = {name: digest(data) for name, data in made.items()}
+    # first what is there and what will be, so that a table which a kill left is not taken for an edited one
+    before = _unedited(folder, now)
+    stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
+    write_json(folder.path / STAMP, stamp)
+    for name, data in made.items():
+        write_atomic(folder.path / name, data)
+    return folder.path / CSV
+
+
+def tables(folder: RunFolder) -> dict[str, bytes]:
+    """The tables of a run folder by file name, made from its plan, records and timings."""
+    records = folder.records()
     experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     head = folder.head
     columns = result_columns(head["hazards"], head["compared"])
     rows = [row(e, records[e.id], head["hazards"]) for e in experiments if e.id in records]
-    write_atomic(folder.path / CSV, _csv(rows, [column.name for column in columns]))
-    write_atomic(folder.path / PARQUET, _parquet(rows, columns))
-    write_atomic(folder.path / TIMINGS_PARQUET, _timings(folder.path))
-    return folder.path / CSV
+    return {
+        CSV: _csv(rows, [column.name for column in columns]),
+        PARQUET: _parquet(rows, columns),
+        TIMINGS_PARQUET: _timings(folder),
+    }
+
+
+def _made_from(folder: RunFolder) -> str:
+    """Digest of all that the tables follow from, this version of mutator included."""
+    run = folder.path
+    lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
+    files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
+    found = [(path.relative_to(run).as_posix(), Digest.of_file(path)) for path in files]
+    return digest([SCHEMA, VERSION, folder.head["hazards"], folder.head["compared"], found])
+
+
+def _found(folder: RunFolder) -> dict[str, str | None]:
+    """Digests of the tables as they are now; None of a missing one."""
+    found = {name: Digest.of_file(folder.path / name) for name in (CSV, PARQUET, TIMINGS_PARQUET)}
+    return {name: one.sha256 if one else None for name, one in found.items()}
+
+
+def _stamp(folder: RunFolder) -> dict[str, Any]:
+    """What results.json says; as good as nothing where it is missing or damaged."""
+    try:
+        known = read_json(folder.path / STAMP, SCHEMA)
+        if all(isinstance(known[key], dict) for key in ("tables", "before")):
+            return known
+    except (MutatorError, KeyError):
+        pass
+    return {"made_from": None, "tables": {}, "before": {}}
+
+
+def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
+    """Digests of the tables that are there and were made by a build; a warning tells of any other one. Of old
+    folders without results.json nobody knows."""
+    stamp = _stamp(folder)
+    tells = folder.verifiable or stamp.get("made_from")
+    found = {name: one for name, one in _found(folder).items() if one is not None}
+    made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
+    for name in found:
+        if tells and found[name] not in made[name]:
+            text = f"{folder.path / name}: not what was made from plan and records; made anew"
+            warnings.warn(text, MutatorWarning, stacklevel=2)
+    return {name: one for name, one in found.items() if one in made[name]}
 
 
 def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
@@ -109,9 +168,7 @@ def _parquet(rows: list[dict[str, object]], columns: Sequence[Column]) -> bytes:
     return sink.getvalue()
 
 
-def _timings(run: Path) -> bytes:
-    """What each experiment cost, where: its newest line wins."""
-    newest: dict[str, dict[str, object]] = {}
-    for path in sorted((run / "timings").glob("*.jsonl")):
-        newest |= {line["experiment_id"]: line for line in read_lines(path, TIMINGS_SCHEMA)}
+def _timings(folder: RunFolder) -> bytes:
+    """What each experiment cost, where."""
+    newest = folder.timings()
     return _parquet([newest[name] for name in sorted(newest)], TIMINGS)

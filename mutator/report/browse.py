@@ -195,12 +195,11 @@ def _setting(experiment: Experiment) -> str:
 
 def _patches(folder: RunFolder, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
     """(experiment, nothing more that a shape must have in common, its patch without the probe)."""
+    records = folder.records()
     for row in rows:
-        try:
-            data = folder.patch(row.experiment_id).read_bytes()
-        except FileNotFoundError:  # never run, or no mutant
-            continue
-        yield row.experiment_id, "", readable(data.decode("utf-8", "replace"))[0]
+        data = folder.read_patch(row.experiment_id, records.get(row.experiment_id))
+        if data is not None:
+            yield row.experiment_id, "", readable(data.decode("utf-8", "replace"))[0]
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from mutator._common.tables import Table
 from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
-from mutator.store.records import TIMINGS_SCHEMA, read_lines, read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 
@@ -46,12 +45,8 @@ def engine_summary(folder: RunFolder) -> EngineSummary | None:
 
 def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
     """RunMode many experiments were run how, and why not as was asked; the newest line of each counts."""
-    newest: dict[str, tuple[str | None, str]] = {}
-    for path in sorted((folder.path / "timings").glob("*.jsonl")):
-        for line in read_lines(path, TIMINGS_SCHEMA):
-            if "engine" in line:  # not in runs of before there were several
-                newest[line["experiment_id"]] = (line["engine"], line["why"])
-    return Counter(newest.values())
+    lines = folder.timings().values()
+    return Counter((line["engine"], line["why"]) for line in lines if "engine" in line)  # old runs had one
 
 
 def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
@@ -69,7 +64,7 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
 def _proof(folder: RunFolder) -> tuple[str, str, bool]:
     """What is said of the proof, the same in few words, and whether it failed."""
     try:
-        found = equivalence.judge(folder, read_records(folder.path))
+        found = equivalence.judge(folder, folder.records())
     except CheckFailed as err:
         said = f"The proof failed, so nothing here is to be trusted: {err.got}."
         return said, f"FAILED: {err.got}", True

@@ -9,7 +9,9 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.outcomes.reader import Results
 from mutator.review import gate
-from mutator.store.run_folder import HEAD, RunFolder
+from mutator.store import digests
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import HEAD
 from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
@@ -28,8 +30,8 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     results = [digest((run / HEAD).read_bytes()), digest(Results.of_run(run).csv())]
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
-    reviewed = _files(run, gate.FILE)
-    return digest([SCHEMA, own, results, engine, plots, references, reviewed])
+    sealed = [_files(run, name) for name in (gate.FILE, digests.FILE)]
+    return digest([SCHEMA, own, results, engine, plots, references, *sealed])
 
 
 def read_stamp(out: Path) -> dict[str, Any]:

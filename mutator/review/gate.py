@@ -5,13 +5,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import read_json, write_json
+from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import plain
 from mutator._common.text import counted
 from mutator.campaigns.plans import Plan
 from mutator.errors import CheckFailed
 from mutator.review.catalogue import Group, of_plan
 from mutator.review.decisions import Review, State, load_review
+from mutator.store import digests
 from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"
@@ -36,7 +37,7 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
 
 def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
     """Write to the run folder what was approved, by whom, and the digests of what they saw."""
-    write_json(run / FILE, approvals)
+    digests.rewrite(run, FILE, json_bytes(approvals))
 
 
 def approval_summary(run: Path) -> str:

@@ -27,4 +27,5 @@ def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
 def measured_cpu_s(folder: RunFolder) -> float | None:
     """Mean CPU time in s of the golden runs in a folder; None before they ran."""
     path = folder.path / FILE
-    return read_json(path, SCHEMA)["run_cpu_s"] if path.is_file() else None
+    found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
+    return found if isinstance(found, int | float) else None

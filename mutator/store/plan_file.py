@@ -1,9 +1,10 @@
 """The frozen plan on disk: one line per experiment, read whole or one chunk at a time."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
-from functools import lru_cache
+from functools import lru_cache, partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,8 +23,9 @@ from mutator.model import (
     Trigger,
 )
 
-_EXPERIMENTS = "plan/experiments.jsonl"
-_FAULTS = "plan/faults.jsonl"
+EXPERIMENTS = "plan/experiments.jsonl"
+FAULTS = "plan/faults.jsonl"
+_REMEDY = "the plan is damaged: take the file from a copy of the run folder, or plan into a new one"
 
 _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
@@ -35,8 +37,8 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
     faults = {experiment.fault.id: experiment.fault for experiment in experiments}
     with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
-    write_atomic(run / _EXPERIMENTS, b"".join(lines))
-    write_atomic(run / _FAULTS, b"".join(canonical(plain(f)).encode() + b"\n" for f in faults.values()))
+    write_atomic(run / EXPERIMENTS, b"".join(lines))
+    write_atomic(run / FAULTS, b"".join(canonical(plain(f)).encode() + b"\n" for f in faults.values()))
     places: list[Chunk] = []
     offset = first = 0
     for count in chunks:
@@ -46,43 +48,81 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
     return places
 
 
-def _content(path: Path) -> bytes:
+_Lines = Iterable[tuple[int | None, bytes]]  # number, where it is known, and text
+
+
+def _lines(path: Path) -> _Lines:
     try:
-        return path.read_bytes()
+        return enumerate(path.read_bytes().splitlines(), start=1)
     except OSError as err:
-        raise MutatorError(
-            f"cannot be read ({err.strerror}); the run folder is damaged",
-            where=path,
-            remedy="plan into a new folder",
-        ) from None
+        raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=_REMEDY) from None
+
+
+def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T | MutatorError]:
+    """What is `made` of each line of the plan file at `path`, or what is wrong with the line."""
+    for number, line in lines:
+        try:
+            yield made(json.loads(line))
+        except MutatorError as err:
+            yield MutatorError(err.got, where=path, line=number, expected=err.expected, remedy=err.remedy)
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+            yield MutatorError("a damaged line", where=path, line=number, remedy=_REMEDY)
+
+
+def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T]:
+    """As `_tried`, but what is wrong is raised."""
+    for found in _tried(path, lines, made):
+        if isinstance(found, MutatorError):
+            raise found
+        yield found
 
 
 def read_faults(run: Path) -> dict[str, Fault]:
     """The plan's faults by id."""
-    faults = (fault_from(json.loads(line)) for line in _content(run / _FAULTS).splitlines())
-    return {fault.id: fault for fault in faults}
+    path = run / FAULTS
+    return {fault.id: fault for fault in _read(path, _lines(path), fault_from)}
 
 
 def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
     """The experiments of one chunk."""
-    offset, length, _ = chunk
-    with (run / _EXPERIMENTS).open("rb") as file:
+    offset, length, count = chunk
+    path = run / EXPERIMENTS
+    with path.open("rb") as file:
         file.seek(offset)
         data = file.read(length)
-    return tuple(experiment_from(json.loads(line), faults) for line in data.splitlines())
+    lines = ((None, line) for line in data.splitlines())
+    found = tuple(_read(path, lines, partial(experiment_from, faults=faults)))
+    if len(found) != count:
+        raise MutatorError(f"{len(found)} experiments in a chunk of {count}", where=path, remedy=_REMEDY)
+    return found
 
 
 def read_all(run: Path) -> tuple[Experiment, ...]:
     """Every experiment, in the plan's order."""
-    faults = read_faults(run)
-    lines = _content(run / _EXPERIMENTS).splitlines()
-    return tuple(experiment_from(json.loads(line), faults) for line in lines)
+    path, faults = run / EXPERIMENTS, read_faults(run)
+    return tuple(_read(path, _lines(path), partial(experiment_from, faults=faults)))
 
 
 def ids(run: Path) -> Iterator[str]:
     """Every experiment's id, in the plan's order."""
-    for line in _content(run / _EXPERIMENTS).splitlines():
-        yield json.loads(line)["id"]
+    path = run / EXPERIMENTS
+    return _read(path, _lines(path), lambda data: str(data["id"]))
+
+
+def problems(run: Path) -> Iterator[MutatorError]:
+    """Every line that is not what its id, or the id by which others name it, stands for."""
+    planned, defined = run / EXPERIMENTS, run / FAULTS
+    found = list(_tried(defined, _lines(defined), fault_from))
+    faults = {fault.id: fault for fault in found if isinstance(fault, Fault)}
+    used = set(_tried(planned, _lines(planned), itemgetter("fault")))
+    for number, fault in enumerate(found, start=1):
+        if isinstance(fault, MutatorError):
+            yield fault
+        elif fault.id not in used:
+            got = f"fault {fault.id}, which no experiment has"
+            yield MutatorError(got, where=defined, line=number, remedy=_REMEDY)
+    experiments = _tried(planned, _lines(planned), partial(experiment_from, faults=faults))
+    yield from (one for one in experiments if isinstance(one, MutatorError))
 
 
 def to_plain(experiment: Experiment) -> dict[str, Any]:
@@ -101,7 +141,10 @@ def to_plain(experiment: Experiment) -> dict[str, Any]:
 
 
 def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
-    """The experiment of a plan file's line; MutatorError for a field that this version does not know."""
+    """The experiment of a plan file's line; MutatorError when its id is not that of its content, and for a
+    field that this version does not know."""
+    if data["fault"] not in faults:
+        raise MutatorError(f"fault {data['fault']} is not in {FAULTS}, or was changed there", remedy=_REMEDY)
     trigger = data["trigger"]
     values = {name: value for name, value in data.items() if name != "id"}
     read = {
@@ -110,7 +153,23 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
         "trigger": _make(Trigger, trigger, hold=Hold(trigger["hold"])),
         "setting": tuple(data["setting"]),
     }
-    return _make(Experiment, values, **read)
+    experiment = _make(Experiment, values, **read)
+    if experiment.id != data["id"]:
+        raise MutatorError(
+            f"what is called experiment {data['id']} is {experiment.id}",
+            expected="the content that the id was made from",
+            remedy=_REMEDY,
+        )
+    return experiment
+
+
+def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
+    """The canary, as the run.json at `head` has it; MutatorError when it is damaged."""
+    try:
+        fault = fault_from(data["fault"])
+        return experiment_from({**data, "fault": fault.id}, {fault.id: fault})
+    except (MutatorError, ValueError, LookupError, TypeError, AttributeError) as err:
+        raise MutatorError(f"damaged at 'canary' ({err})", where=head, remedy=_REMEDY) from None
 
 
 def fault_from(data: Mapping[str, Any]) -> Fault:

@@ -1,23 +1,19 @@
 """Records on disk: appended by workers, one file each, read back whatever a kill left behind."""
 
 import json
-import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import check_schema, raising_disk_full
-from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
+from mutator.store.lines import read_segment
 
-SCHEMA = "records/1"
-TIMINGS_SCHEMA = "timings/1"
-_BATCH = 32  # lines between two syncs
-_BATCH_S = 2.0  # and at most this long
+SCHEMA = "records/2"
+TIMINGS_SCHEMA = "timings/2"
 
 
 @dataclass(kw_only=True)
@@ -33,83 +29,11 @@ class Progress:
     remaining_s: float | None = None
 
 
-class LineWriter:
-    """Appends JSON lines to a new file of its own: whole lines, synced in batches.
-
-    A line that does not fit on the disk is taken back, so the file stays readable; DiskFull is raised.
-    """
-
-    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
-        self.path = path
-        self._unsynced = 0
-        self._synced_at = time.monotonic()
-        with raising_disk_full(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
-        self._end = 0
-        self.append(head)
-
-    def append(self, value: Any) -> None:
-        """Append one line; it is on the disk after the next `sync` at the latest."""
-        data = canonical(value).encode() + b"\n"
-        with raising_disk_full(self.path):
-            try:
-                written = 0
-                while written < len(data):
-                    written += os.write(self._fd, data[written:])
-            except OSError:
-                os.ftruncate(self._fd, self._end)
-                raise
-        self._end += len(data)
-        self._unsynced += 1
-        if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _BATCH_S:
-            self.sync()
-
-    def sync(self) -> None:
-        """Make sure that what was appended survives a power cut."""
-        with raising_disk_full(self.path):
-            os.fsync(self._fd)
-        self._unsynced = 0
-        self._synced_at = time.monotonic()
-
-    def close(self) -> None:
-        try:
-            self.sync()
-        finally:
-            os.close(self._fd)
-
-
-def read_lines(path: Path, schema: str) -> Iterator[dict[str, Any]]:
-    """The JSON lines of a file after its head; a torn last line is what a kill leaves, and is skipped."""
-    lines = path.read_bytes().split(b"\n")
-    complete, torn = lines[:-1], lines[-1]
-    for number, line in enumerate(complete, start=1):
-        try:
-            value = json.loads(line)
-        except ValueError:
-            if number == len(complete) and not torn:
-                return
-            raise _damaged(path, number, line.decode("utf-8", "replace")) from None
-        if number == 1:
-            check_schema(value.get("schema") if isinstance(value, dict) else None, schema, path)
-        else:
-            yield value
-
-
-def _damaged(path: Path, line: int, text: str) -> MutatorError:
-    return MutatorError(
-        f"damaged line: {text[:40]!r}",
-        where=path,
-        line=line,
-        remedy="delete the line; what it told will be run again",
-    )
-
-
 def record_from(data: Mapping[str, Any]) -> Record:
     """The record of a parsed line."""
     activation = data["activation"]
     return Record(
-        experiment_id=data["experiment_id"],
+        experiment_id=str(data["experiment_id"]),
         status=Status(data["status"]),
         outcome=Outcome(data["outcome"]) if data["outcome"] else None,
         detail=data["detail"],
@@ -121,6 +45,7 @@ def record_from(data: Mapping[str, Any]) -> Record:
         alerts=_pairs(data["alerts"]),
         trace_digest=data["trace_digest"],
         error=RunError(**data["error"]) if data.get("error") else None,
+        patch=data.get("patch", ""),
     )
 
 
@@ -128,30 +53,46 @@ def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
     return tuple((name, value) for name, value in items)
 
 
-def read_records(run: Path, folder: str = "records") -> dict[str, Record]:
+def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> dict[str, Record]:
     """The final record of each experiment id that has one (torn last lines are skipped).
 
-    Any other record goes before a harness error. CheckFailed when two final records of one experiment differ.
+    Any other record goes before a harness error. MutatorError for a damaged line and for a second record of
+    one experiment; CheckFailed when the two differ.
     """
     records: dict[str, Record] = {}
     for path in sorted((run / folder).glob("*.jsonl")):
-        for number, data in enumerate(read_lines(path, SCHEMA), start=2):
+        segment = read_segment(path, checksums=checksums)
+        for number, data in segment.objects(SCHEMA):
             try:
                 record = record_from(data)
             except (KeyError, TypeError, ValueError):
-                raise _damaged(path, number, canonical(data)) from None
+                raise segment.problem(number) from None
             known = records.setdefault(record.experiment_id, record)
-            if known == record or record.status is Status.HARNESS_ERROR:
+            if known is record or record.status is Status.HARNESS_ERROR:
                 continue
             if known.status is not Status.HARNESS_ERROR:
-                raise CheckFailed(
-                    f"experiment {record.experiment_id} has two records that differ",
-                    where=path,
-                    expected="the same result each time",
-                    remedy="this is a fault of the harness or of the machine; do not trust this run",
-                )
+                raise second_record(path, number, record.experiment_id, same=known == record)
             records[record.experiment_id] = record
     return records
+
+
+def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
+    """What is said of a second final record of an experiment."""
+    if same:
+        return MutatorError(
+            f"a second record of experiment {experiment_id}",
+            where=path,
+            line=line,
+            expected="one of each",
+            remedy="delete the file if it is a copy of another one",
+        )
+    return CheckFailed(
+        f"experiment {experiment_id} has two records that differ",
+        where=path,
+        line=line,
+        expected="the same result each time",
+        remedy="this is a fault of the harness or of the machine; do not trust this run",
+    )
 
 
 def label(status: str, outcome: str | None) -> str:

@@ -1,6 +1,7 @@
 """The run folder: where a campaign keeps all it was told and all it found out.
 
 DIR/
+  digests.json          size and SHA-256 of every file that counts
   run.json              schema, plan digest, choices, chunks, limits, canary, sources, stretches of work
   campaign.yaml         the campaign file as it was read
   plan.csv              the plan for people and spreadsheets
@@ -20,22 +21,23 @@ DIR/
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import read_json
-from mutator._common.hashing import plain
+from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
-from mutator.model import Limits
-from mutator.store.plan_file import ids
+from mutator.model import Experiment, Limits, Record
+from mutator.store import digests, integrity, plan_file
+from mutator.store.lines import read_segment
+from mutator.store.records import TIMINGS_SCHEMA, read_records
+from mutator.store.run_head import HEAD, SCHEMA, Head, read_head
 from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 
-SCHEMA = "run/1"
-HEAD = "run.json"
+_LOOKS = 3  # at a folder whose owner writes while it is looked at
 
 
 def golden_key(scenario: str, changes: Sequence[str]) -> str:
@@ -51,8 +53,20 @@ class RunFolder:
 
     @classmethod
     def open(cls, path: Path) -> "RunFolder":
-        """An existing run folder; MutatorError when there is none, or one of a newer schema."""
-        if not (path / HEAD).is_file():
+        """An existing run folder whose content is what was written.
+
+        MutatorError when there is none, one of a newer schema, or anything in it is damaged, missing or not
+        of its plan. Patches are verified when they are read.
+        """
+        folder = cls.unverified(path)
+        for problem in folder.problems():
+            raise problem
+        return folder
+
+    @classmethod
+    def unverified(cls, path: Path) -> "RunFolder":
+        """As `open`, but only its head was looked at."""
+        if not cls.exists(path):
             raise MutatorError(
                 "no run folder (it has no run.json)",
                 where=path,
@@ -68,10 +82,39 @@ class RunFolder:
         """Whether there is a run folder at `path`."""
         return (path / HEAD).is_file()
 
+    def problems(self) -> list[MutatorError]:
+        """All that is not as it was written; a folder of an earlier schema cannot tell all."""
+        if not self.verifiable:
+            stray = (self.path / digests.FILE).exists()
+            downgraded = MutatorError(
+                f"{self.head['schema']} in a folder with {digests.FILE}", where=self.path / HEAD
+            )
+            found = [downgraded] if stray else []
+            return [*found, *integrity.problems(self.path, self.head, None, self.shard)]
+        for _ in range(_LOOKS):
+            try:
+                ledger = digests.read(self.path)
+            except MutatorError as err:
+                return [err]
+            found = list(integrity.problems(self.path, self.head, ledger, self.shard))
+            if not found or digests.read(self.path) == ledger:
+                break
+        return found
+
+    @property
+    def verifiable(self) -> bool:
+        """Whether it has digests and checksums: folders of earlier schemas have none."""
+        return bool(self.head["schema"] == SCHEMA)
+
+    @property
+    def finished(self) -> bool:
+        """Whether every experiment has a record that counts, and the proof is whole."""
+        return self.verifiable and digests.read(self.path).finished
+
     @cached_property
-    def head(self) -> dict[str, Any]:
+    def head(self) -> Head:
         """run.json."""
-        return read_json(self.path / HEAD, SCHEMA)
+        return read_head(self.path)
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -122,6 +165,56 @@ class RunFolder:
         """The source diff of an experiment (exists once it was run)."""
         return self.path / "patches" / experiment_id[:2] / f"{experiment_id}.patch"
 
+    def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
+        """The stored diff of an experiment with that record; None where it has not run, or had no mutant.
+
+        MutatorError when it is missing, or not the one that the record names.
+        """
+        path = self.patch(experiment_id)
+        data = path.read_bytes() if path.is_file() else None
+        if not self.verifiable:
+            return data
+        if record is None or not record.patch:
+            return None
+        if data is None or digest(data) != record.patch:
+            raise MutatorError(
+                "missing" if data is None else f"another patch than was run: SHA-256 {digest(data)[:16]}",
+                where=path,
+                expected=f"SHA-256 {record.patch[:16]}, as the record says",
+                remedy=f"`mutator verify {self.path} --repair` puts it aside; "
+                "the same `mutator run` then fills the gap",
+            )
+        return data
+
+    def records(self, kind: str = "records") -> dict[str, Record]:
+        """The records of the experiments, or those of the `proof`, by experiment id."""
+        return read_records(self.path, kind, checksums=self.verifiable)
+
+    def comparable(self, record: Record) -> Record:
+        """A record of today as one of this folder has it: earlier schemas knew nothing of patches."""
+        return record if self.verifiable else replace(record, patch="")
+
+    def timings(self) -> dict[str, dict[str, Any]]:
+        """What each experiment cost, where: its newest line, by experiment id."""
+        newest: dict[str, dict[str, Any]] = {}
+        for path in sorted((self.path / "timings").glob("*.jsonl")):
+            segment = read_segment(path, checksums=self.verifiable)
+            for number, line in segment.objects(TIMINGS_SCHEMA):
+                try:
+                    newest[line["experiment_id"]] = line
+                except (KeyError, TypeError):
+                    raise segment.problem(number) from None
+        return newest
+
+    @property
+    def canary(self) -> Experiment:
+        """The experiment that must reach its hazard before the campaign starts."""
+        return plan_file.canary_from(self.path / HEAD, self.head["canary"])
+
+    def share(self) -> dict[str, int]:
+        """Ids and places of the planned experiments that are run here, in the plan's order."""
+        return integrity.share(self.path, self.head, self.shard)
+
     @property
     def work(self) -> Path:
         """Scratch; whatever is in it may be deleted while nobody owns the folder."""
@@ -134,7 +227,7 @@ class RunFolder:
 
     def find(self, prefix: str) -> str:
         """The one planned experiment whose id starts with `prefix`; MutatorError for none or several."""
-        hits = [name for name in ids(self.path) if name.startswith(prefix)]
+        hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"
             raise MutatorError(

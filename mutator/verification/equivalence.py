@@ -15,7 +15,6 @@ from mutator.campaigns.sampling import pick
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
 from mutator.store import plan_file
-from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 
 FOLDER = "proof"
@@ -75,22 +74,16 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
     """What of the sample has no counting record in `proof/` yet; nothing where no proof is needed."""
     if not (folder.path / FOLDER).is_dir():
         return ()
-    found = read_records(folder.path, FOLDER)
-    ids = [name for name in _sampled(folder) if name not in found or not _counts(found[name])]
+    found = folder.records(FOLDER)
+    ids = [name for name in sampled(folder) if name not in found or not _counts(found[name])]
     pieces = range(0, len(ids), _PIECE)
     return tuple(Sample(number, tuple(ids[i : i + _PIECE])) for number, i in enumerate(pieces))
 
 
-def _sampled(folder: RunFolder) -> list[str]:
+def sampled(folder: RunFolder) -> list[str]:
     """Ids of the sample that are of this folder's share, in the plan's order."""
-    experiments = plan_file.read_all(folder.path)
-    wanted = {experiment.id for experiment in sample(experiments, folder.head["seed"])}
-    shard, place, ids = folder.shard, 0, []
-    for index, (_, _, count) in enumerate(folder.head["chunks"]):
-        if shard is None or shard.has(index):
-            ids += [e.id for e in experiments[place : place + count] if e.id in wanted]
-        place += count
-    return ids
+    wanted = {experiment.id for experiment in sample(plan_file.read_all(folder.path), folder.head["seed"])}
+    return [name for name in folder.share() if name in wanted]
 
 
 def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
@@ -98,7 +91,7 @@ def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
     reference engine."""
     if not (folder.path / FOLDER).is_dir():
         return None
-    found = read_records(folder.path, FOLDER)
+    found = folder.records(FOLDER)
     same, errors = 0, []
     for name, truth in found.items():
         record = records.get(name)
@@ -109,16 +102,17 @@ def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
             continue
         if record != truth:
             raise CheckFailed(
-                f"experiment {name} is another one on the reference engine: {_difference(record, truth)}",
+                f"experiment {name} is another one on the reference engine: {difference(record, truth)}",
                 where=folder.path,
                 expected="the same record from every engine",
                 remedy="do not trust this run: run it anew with --engine reference, and report this",
             )
         same += 1
-    return Proof(sampled=len(_sampled(folder)), same=same, errors=tuple(sorted(errors)))
+    return Proof(sampled=len(sampled(folder)), same=same, errors=tuple(sorted(errors)))
 
 
-def _difference(record: Record, truth: Record) -> str:
+def difference(record: Record, truth: Record) -> str:
+    """The first field in which a record differs from what it should be."""
     names = [name for name in Record.__slots__ if getattr(record, name) != getattr(truth, name)]
     return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(truth, names[0])!r}"
 

@@ -1,13 +1,13 @@
 """The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import raising_disk_full, read_json, write_json
+from mutator._common.files import DiskFull, json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
@@ -20,8 +20,9 @@ from mutator.mutants.building import InvalidMutant, build
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
+from mutator.store.digests import Digest
 from mutator.store.records import Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
@@ -62,6 +63,13 @@ def run_checks(
     return results
 
 
+def are_there(folder: RunFolder) -> bool:
+    """Whether a run folder holds results of checks and all golden runs."""
+    places = (folder.golden(scenario, tuple(changes)) for scenario, changes in folder.head["goldens"])
+    goldens = (place / name for place in places for name in folder.head["golden_files"])
+    return all(path.is_file() for path in (folder.path / FILE, *goldens))
+
+
 class _Checks:
     """The checks of one run folder."""
 
@@ -73,10 +81,7 @@ class _Checks:
         self.models = workspace.fault_models()
         self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
         self.seed: int = head["seed"]
-        fault = plan_file.fault_from(head["canary"]["fault"])
-        self.canary: Experiment = plan_file.experiment_from(
-            head["canary"] | {"fault": fault.id}, {fault.id: fault}
-        )
+        self.canary: Experiment = folder.canary
         self.hazard: str = head["canary_hazard"]
         now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
         self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
@@ -97,19 +102,19 @@ class _Checks:
         as they were; they are then here."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
-        place = preflight_cache.entry(self.digest)
+        copy = self._kept
         try:
-            found = read_json(place / FILE, SCHEMA)
-            results = self._passed(found, place)
+            with raising_disk_full(copy):
+                preflight_cache.copy(preflight_cache.entry(self.digest), copy, FILE)
+            found = read_json(copy / FILE, SCHEMA)
+            results = self._passed(found, copy)
+        except DiskFull:
+            raise
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # none is there, or a damaged one
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            try:
-                with raising_disk_full(self.folder.path):
-                    preflight_cache.copy(place, self.folder.path, FILE)
-            except OSError:
-                return None  # it was deleted meanwhile
+            self._install((copy / FILE).read_bytes())
         return results
 
     def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
@@ -130,20 +135,34 @@ class _Checks:
         results = [anchors, *self._judge(runs)]
         goldens = {golden_key(*key): runs[_GOLDEN, key].digest for key in self.keys}
         self._check_same_as_before(goldens)
-        self._put_in_place(goldens)
         cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
-        write_json(
-            self.folder.path / FILE,
-            {
-                "schema": SCHEMA,
-                "digest": self.digest,
-                "results": [asdict(result) for result in results],
-                "goldens": goldens,
-                "packages": self._packages(runs),
-                "run_cpu_s": sum(cpu) / len(cpu),
-            },
-        )
+        checks = {
+            "schema": SCHEMA,
+            "digest": self.digest,
+            "results": [asdict(result) for result in results],
+            "goldens": goldens,
+            "packages": self._packages(runs),
+            "run_cpu_s": sum(cpu) / len(cpu),
+        }
+        self._install(json_bytes(checks))
         yield from results
+
+    @property
+    def _kept(self) -> Path:
+        """Where golden runs are until they are known to be the run's."""
+        return self.folder.work / "kept"
+
+    def _install(self, checks: bytes) -> None:
+        """Make the kept golden runs and these results those of the run folder."""
+        run, golden = self.folder.path, self._kept / "golden"
+        golden.mkdir(parents=True, exist_ok=True)
+        files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
+        new = {name: Digest.of(path.read_bytes()) for name, path in files.items() if path.is_file()}
+        gone = {name: None for name in digests.read(run).names if name.startswith("golden/")}
+        with digests.rewriting(run, {**gone, **new, FILE: Digest.of(checks)}):
+            shutil.rmtree(run / "golden", ignore_errors=True)
+            golden.rename(run / "golden")
+            write_atomic(run / FILE, checks)
 
     def _before(self) -> dict[str, Any] | None:
         path = self.folder.path / FILE
@@ -151,10 +170,10 @@ class _Checks:
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
         """A run that has records must not go on with other golden runs (of another processor, say)."""
-        before = self._before()
-        started = any((self.folder.path / "records").glob("*.jsonl"))
-        other = [key for key in goldens if before and before["goldens"].get(key) != goldens[key]]
-        if started and other:
+        run, before = self.folder.path, (self._before() or {}).get("goldens", {})
+        known = {key: before.get(key) or _digest_of(self.manifest, run / "golden" / key) for key in goldens}
+        other = [key for key in goldens if known[key] not in ("", goldens[key])]
+        if other and any((run / "records").glob("*.jsonl")):
             raise CheckFailed(
                 f"the golden run {other[0]} is not the one this run began with",
                 where=self.folder.path,
@@ -167,10 +186,9 @@ class _Checks:
         jobs = dict(self._jobs())
         runs: dict[tuple[str, Any], CheckRun] = {}
         work = self.folder.work / "checks"
-        shutil.rmtree(work, ignore_errors=True)
+        for scratch in (work, self._kept):
+            shutil.rmtree(scratch, ignore_errors=True)
         work.mkdir(parents=True)
-        shutil.rmtree(self._kept(""), ignore_errors=True)
-        self._kept("").mkdir()
         base = prepare_base(self.manifest, self.folder.base)
         engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
         notify(Progress(stage="checks", total=len(jobs)))
@@ -222,7 +240,9 @@ class _Checks:
             execution = engine.execute(job, scratch)
             run = self._look(execution)
             if name[0] == _GOLDEN and not run.problem:
-                execution.out.rename(self._kept(golden_key(*name[1])))
+                place = self._kept / "golden" / golden_key(*name[1])
+                place.parent.mkdir(parents=True, exist_ok=True)
+                execution.out.rename(place)
             return run
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
@@ -247,18 +267,6 @@ class _Checks:
             cpu_s=execution.cpu_s,
             modules=execution.modules,
         )
-
-    def _kept(self, key: str) -> Path:
-        """Where a golden run waits until it is known to be that of before."""
-        return self.folder.work / "golden" / key
-
-    def _put_in_place(self, keys: Iterable[str]) -> None:
-        for key in keys:
-            place = self.folder.path / "golden" / key
-            shutil.rmtree(place, ignore_errors=True)
-            if self._kept(key).is_dir():
-                place.parent.mkdir(exist_ok=True)
-                self._kept(key).rename(place)
 
     def _packages(self, runs: Mapping[tuple[str, Any], CheckRun]) -> list[str]:
         """What the golden runs loaded that is neither the target's nor the standard library's."""

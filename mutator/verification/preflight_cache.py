@@ -22,6 +22,7 @@ def entry(key: str) -> Path:
 def copy(source: Path, to: Path, file: str) -> None:
     """Copy golden runs and results (`file`, last) from one folder into another."""
     shutil.rmtree(to / "golden", ignore_errors=True)
+    to.mkdir(parents=True, exist_ok=True)
     shutil.copytree(source / "golden", to / "golden")
     shutil.copy(source / file, to / file)
 
@@ -32,7 +33,6 @@ def store(place: Path, run: Path, file: str) -> None:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:
             made = Path(scratch) / "entry"
-            made.mkdir()
             copy(run, made, file)
             shutil.rmtree(place, ignore_errors=True)  # it was not there, or was damaged
             made.rename(place)

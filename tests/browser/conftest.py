@@ -19,7 +19,8 @@ from mutator.mutants.building import build
 from mutator.outcomes import results
 from mutator.report import building, series
 from mutator.report.panels import figures
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -8,16 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.merging import merge
 from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
+from mutator.verification.seal import seal
 from mutator.workspace import Workspace
 
 Runs = dict[str, Path]
+Reseal = Callable[..., None]
 DERIVED = ("results.csv", "results.parquet", "plan.csv", "plan/experiments.jsonl")
 
 
@@ -58,6 +60,13 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
     assert heads[0] == heads[1]
     same = [{k: v for k, v in stretch.items() if k != "records"} for stretch in chain(*stretches)]
     assert len(stretches[0]) == 2 and same == [same[0]] * 3
+
+
+def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
+    """The seal does not depend on how many machines computed; a shard has another one."""
+    merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
+    seals = [seal(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
+    assert seals[0] is not None and seals[0] == seals[1] != seals[2]
 
 
 def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
@@ -110,59 +119,73 @@ def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...
     assert not (tmp_path / "out").exists()
 
 
-def test_shards_of_something_else_are_told(copies: Runs, tmp_path: Path) -> None:
+def test_shards_of_something_else_are_told(
+    copies: Runs, toy: Workspace, tmp_path: Path, reseal: Reseal
+) -> None:
     """Another plan, other sources or another number of shards is refused, with the folder's name."""
     two = copies["2/2"]
     head = json.loads((two / "run.json").read_text())
     for change, told in (
-        ({"plan": "0" * 64}, "another plan"),
+        ({"plan": "0" * 64}, "expected 0000000000000000"),
         ({"sources": head["sources"] | {"target": "0" * 64}}, "another source"),
-        ({"choices": head["choices"] | {"shard": "2/3"}}, "shard 2/3"),
     ):
         change_head(two, **head | change)
+        reseal(two)
         with pytest.raises(MutatorError, match=told) as caught:
             merge([copies["1/2"], two], tmp_path / "out")
         assert str(two) in str(caught.value)
+    third = freeze(make_plan(toy, "small", Choices(shard="2/3")), tmp_path / "third", toy).path
+    with pytest.raises(MutatorError, match=f"{third}: shard 2/3; expected one of 2 shards"):
+        merge([copies["1/2"], third], tmp_path / "out")
 
 
-def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path) -> None:
+def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
     """A shard that lacks a record, or holds one of another shard, is refused with what is wrong."""
     one, two = copies["1/2"], copies["2/2"]
     path = next((one / "records").iterdir())
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]))
+    reseal(one, finished=False)
     with pytest.raises(MutatorError, match=f"unfinished: {len(lines) - 2} of {len(lines) - 1}"):
         merge([one, two], tmp_path / "out")
     path.write_bytes(b"".join(lines))
+    reseal(one, finished=True)
     shutil.copy(path, two / "records" / "0009-main.jsonl")
-    with pytest.raises(MutatorError, match="not of this shard"):
+    reseal(two)
+    with pytest.raises(MutatorError, match=r"0009-main\.jsonl:2: a record of .*, which is not planned"):
         merge([one, two], tmp_path / "out")
 
 
-def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path) -> None:
+def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
     """Shards whose fault-free runs differ are not put together."""
     path = copies["2/2"] / "checks.json"
     checks = json.loads(path.read_text())
     path.write_text(json.dumps(checks | {"goldens": {"A": "0" * 64}}))
+    reseal(copies["2/2"])
     with pytest.raises(CheckFailed, match="golden run A"):
         merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
 
 
 @pytest.mark.parametrize("broken", ["1/2", "2/2"])
-def test_a_shard_whose_proof_failed_is_told(copies: Runs, tmp_path: Path, broken: str) -> None:
+def test_a_shard_whose_proof_failed_is_told(
+    copies: Runs, tmp_path: Path, broken: str, reseal: Reseal
+) -> None:
     """One experiment that is another one on the reference engine, in whichever shard, and nothing is merged;
     it is named, with the folder."""
     for path in (copies["1/2"], copies["2/2"]):
         shutil.copytree(path / "records", path / "proof")
+        reseal(path)
     path = next((copies[broken] / "proof").iterdir())
     head, first, *rest = path.read_text().splitlines()
     wrong = json.loads(first) | {"trace_digest": "0" * 64}
     path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
+    reseal(copies[broken])
     with pytest.raises(CheckFailed, match=f"experiment {wrong['experiment_id']} is another one") as caught:
         merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
     assert str(copies[broken]) in str(caught.value)
     assert not (tmp_path / "out").exists()
     path.write_text("\n".join([head, first, *rest, ""]))
+    reseal(copies[broken])
     assert merge([copies["1/2"], copies["2/2"]], tmp_path / "out").is_file()
 
 

@@ -62,7 +62,7 @@ def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
 
 def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
     """Two guided runs are shared by two scenarios each; random ones have times of their own."""
-    shared, apart = (load_plan(run) for run in runs)
+    shared, apart = (load_plan(RunFolder.open(run)) for run in runs)
     assert (len(shared.experiments), shared.runs) == (16, 14)
     assert (len(apart.experiments), apart.runs) == (16, 16)
     assert shared.cost().cpu_s / shared.run_cpu_s < apart.cost().cpu_s / apart.run_cpu_s  # type: ignore[operator]
@@ -85,7 +85,7 @@ def test_they_are_run_once(
     two_scenarios(toy, SHARED)
     summary = run_campaign(toy, "small", tmp_path / "run")
     assert summary.done == 16
-    ids = {e.id for e in load_plan(tmp_path / "run").experiments}
+    ids = {e.id for e in load_plan(RunFolder.open(tmp_path / "run")).experiments}
     assert sum(name in ids for name in driven) == 14
     assert (tmp_path / "run" / "results.csv").read_bytes() == (runs[0] / "results.csv").read_bytes()
 

@@ -85,11 +85,13 @@ def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
         "plan.csv",
         "plan",
         "checks.json",
+        "digests.json",
         "golden",
         "patches",
         "records",
         "timings",
         "results.csv",
+        "results.json",
         "results.parquet",
         "timings.parquet",
         "owner.lock",
@@ -131,7 +133,9 @@ def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -
         assert (tree / path).read_bytes() == data
 
 
-def test_rerun_gives_the_same_record_and_a_trace(toy: Workspace, finished: Path) -> None:
+def test_rerun_gives_the_same_record_and_a_trace(
+    toy: Workspace, finished: Path, reseal: Callable[[Path], None]
+) -> None:
     """Any experiment can be run again exactly, its trace kept; a changed record would be noticed."""
     for row in rows_of(finished)[:3]:
         single, same = rerun(toy, finished, row["experiment_id"][:8])
@@ -142,6 +146,7 @@ def test_rerun_gives_the_same_record_and_a_trace(toy: Workspace, finished: Path)
         assert not (single.faulty.parent / "work").exists()
     path = next((finished / "records").iterdir())
     path.write_text(path.read_text().replace('"outcome":"', '"outcome":"masked","x":"'))
+    reseal(finished)
     assert not rerun(toy, finished, single.experiment.id)[1]
 
 

@@ -17,7 +17,8 @@ from mutator.execution.running import run_campaign
 from mutator.exports import Format
 from mutator.store import plan_file
 from mutator.store.records import read_records
-from mutator.store.run_folder import SCHEMA, RunFolder
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import SCHEMA
 from mutator.workspace import Workspace
 
 FIXTURES = sorted((Path(__file__).parents[1] / "fixtures").glob("run-*"))

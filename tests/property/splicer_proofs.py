@@ -239,7 +239,9 @@ def _check_tree(tree: ast.Module, mutant: bytes, group: Sequence[_Placed]) -> No
 def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
     """The mutant in which a variable is set at an anchor, its names being as they were; empty if refused."""
     chosen = random.Random(f"{spot.location}")
-    known = sorted({n.id for n in ast.walk(spot.within) if isinstance(n, ast.Name)} - {"int"} | {"max", "new"})
+    known = sorted(
+        {n.id for n in ast.walk(spot.within) if isinstance(n, ast.Name)} - {"int"} | {"max", "new"}
+    )
     model, params = chosen.choice(_INJECTIONS)
     params = {name: chosen.choice(known) if value == _VARIABLE else value for name, value in params.items()}
     injection = Injection(location=spot.location, model=model, params=tuple(sorted(params.items())))

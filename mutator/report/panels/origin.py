@@ -6,6 +6,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.review import gate
 from mutator.store.stretches import package_versions, told
+from mutator.verification.seal import seal_or_why_not
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
 _HTML = """\
@@ -38,6 +39,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
         "experiments": f"{len(run.rows)} of {folder.planned} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
+        "seal": seal_or_why_not(folder),
         "campaign": head["campaign"],
         **_study(run),
         "plan": head["plan"],

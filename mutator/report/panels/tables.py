@@ -17,7 +17,6 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.sheets import run_sheets
-from mutator.store.records import read_records
 
 FOLDER = "tables"  # of the report
 NOTES = (
@@ -70,7 +69,7 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
 def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     """The statistics of a run, beside published counts if its study has some of its fault types."""
     published = run.study.published(run) if run.study else None
-    alerts = {name: record.alerts for name, record in read_records(run.folder.path).items()}
+    alerts = {name: record.alerts for name, record in run.folder.records().items()}
     return run_sheets(run.frame, published, alerts, run.ends())
 
 

@@ -1,14 +1,15 @@
 """The pictures a run drives through: a rendered road, or a folder of a user's frames. Grey, and read-only.
 
 Pictures are made or decoded once and kept in a cache folder, in a file whose name is the digest of all they
-follow from. Processes map that file and so share its memory. A file appears there whole or not at all.
-Without a cache, or with one that cannot be written, each process makes its own.
+follow from. Processes map that file and so share its memory. A file appears there whole or not at all, and
+each frame is compared with its digest when it is first looked at. Without a cache, or with one that cannot be
+written, each process makes its own.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
 from hashlib import sha256
-from io import SEEK_END, BytesIO
+from io import BytesIO
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
@@ -26,15 +27,15 @@ from selfdrive.sim.vision import Pictures
 
 FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, after which it repeats itself without a seam
 SPACING = PERIODS * DASH_PERIOD / FRAMES  # m from frame to frame: 1.342, which is 20 a second at 60 mph
-CHECK = np.dtype("<u8")  # a sum over all pixels ends the cache file
+DIGEST = sha256().digest_size  # bytes; one of each frame, then one of these and of the header, end the file
 
-Frames = Iterator[np.ndarray]
+Made = Iterator[np.ndarray]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageLibrary:
-    """Frames (number x rows x width, uint8) in the order they were taken, by `model`, each `spacing` m or,
-    where that is None, 1 / `fps` s after the one before; the first follows the last.
+    """Frames in the order they were taken, by `model`, each `spacing` m or, where that is None, 1 / `fps` s
+    after the one before; the first follows the last.
 
     `digest` stands for all that the frames follow from.
     """
@@ -42,7 +43,7 @@ class ImageLibrary:
     name: str
     digest: str
     model: CameraModel
-    frames: np.ndarray
+    frames: "Frames"
     spacing: float | None
     fps: float | None
 
@@ -51,6 +52,44 @@ class ImageLibrary:
         passed = t * self.fps if self.spacing is None else position / self.spacing
         number = int(passed + 1e-6) % len(self.frames)
         return Picture((self.digest, number), self.frames.shape[1:], lambda *_: self.frames[number])
+
+
+class Frames:
+    """Frames (rows x width, uint8) by number, read-only; those of a file are verified when first asked for.
+
+    `digests` are joined, one of each frame; frames in memory have none. `mend` makes the frames anew if one
+    is not what was written.
+    """
+
+    def __init__(
+        self, frames: np.ndarray, digests: bytes = b"", mend: "Callable[[], Frames] | None" = None
+    ) -> None:
+        self._frames, self._digests, self._mend = frames, digests, mend
+        self._sound = np.full(len(frames), not digests)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number, rows, width."""
+        return self._frames.shape
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, number: int) -> np.ndarray:
+        if not self._sound[number]:
+            self._verify(number)
+        return self._frames[number]
+
+    def _verify(self, number: int) -> None:
+        """Compare a frame with its digest; where it is another one, all frames are made anew."""
+        expected = self._digests[number * DIGEST : (number + 1) * DIGEST]
+        if sha256(self._frames[number].reshape(-1)).digest() == expected:
+            self._sound[number] = True
+        else:
+            mended = self._mend()
+            self._frames, self._digests, self._mend = mended._frames, mended._digests, mended._mend
+            self._sound = mended._sound
+            self[number]
 
 
 def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
@@ -66,7 +105,7 @@ def _rendered(model: CameraModel, marks: str, seed: int, cache: Path | None) -> 
     parts = [repr((marks, seed, astuple(model), FRAMES, PERIODS, cv2.__version__, np.__version__)).encode()]
     digest = _digest(parts + [Path(module.__file__).read_bytes() for module in made_by])
 
-    def draw() -> Frames:
+    def draw() -> Made:
         renderer = RoadRenderer(model, marks, seed, periods=PERIODS)
         return (renderer.grey(number * SPACING) for number in range(FRAMES))
 
@@ -90,53 +129,52 @@ def _own(folder: ImageFolder, cache: Path | None) -> ImageLibrary:
     )
 
 
-def cached(
-    cache: Path | None, digest: str, shape: tuple[int, int, int], make: Callable[[], Frames]
-) -> np.ndarray:
-    """The frames `make` gives, as a read-only array of this shape.
+def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: Callable[[], Made]) -> Frames:
+    """The frames `make` gives, of this shape (number, rows, width).
 
-    It is mapped from a file of the cache that is made where it is missing or damaged, by any number of
+    They are mapped from a file of the cache that is made where it is missing or damaged, by any number of
     processes at the same time. Without a cache that can be written the frames are made in memory.
     """
-    frames = _kept(cache, digest, shape, make) if cache is not None else None
-    return _in_memory(shape, make()) if frames is None else frames
 
+    def in_memory() -> Frames:
+        frames = np.empty(shape, np.uint8)
+        for number, frame in enumerate(make()):
+            frames[number] = frame
+        frames.flags.writeable = False
+        return Frames(frames)
 
-def _kept(
-    cache: Path, digest: str, shape: tuple[int, int, int], make: Callable[[], Frames]
-) -> np.ndarray | None:
-    """The frames in their file of the cache, made if need be; None where that cannot be."""
-    path = cache / f"frames-{digest[:32]}.npy"
-    try:
-        frames = _mapped(path, shape)
-        if frames is None:
+    def anew() -> Frames:
+        """In a file that is written now; whoever cannot rely on that one either keeps them in memory."""
+        try:
             cache.mkdir(parents=True, exist_ok=True)
             _write(path, shape, make())
-            frames = _mapped(path, shape)
+            found = _mapped(path, shape)
+        except OSError:
+            found = None
+        return Frames(*found, in_memory) if found else in_memory()
+
+    if cache is None:
+        return in_memory()
+    path = cache / f"frames-2-{digest[:32]}.npy"
+    try:
+        found = _mapped(path, shape)
     except OSError:
-        return None
-    return frames
+        return in_memory()
+    return Frames(*found, anew) if found else anew()
 
 
-def _in_memory(shape: tuple[int, int, int], made: Frames) -> np.ndarray:
-    frames = np.empty(shape, np.uint8)
-    for number, frame in enumerate(made):
-        frames[number] = frame
-    frames.flags.writeable = False
-    return frames
-
-
-def _write(path: Path, shape: tuple[int, int, int], frames: Frames) -> None:
+def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
     """Write all frames under another name, then give the file its own."""
     with NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as file:
         part = Path(file.name)
         try:
             file.write(_header(shape))
-            total = 0
+            digests = b""
             for frame in frames:
-                file.write(frame.tobytes())
-                total += _sum(frame)
-            file.write(_check(total))
+                data = frame.tobytes()
+                file.write(data)
+                digests += sha256(data).digest()
+            file.write(digests + _seal(shape, digests))
             file.close()
             part.chmod(0o644)
             part.replace(path)
@@ -144,22 +182,20 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Frames) -> None:
             part.unlink(missing_ok=True)
 
 
-def _mapped(path: Path, shape: tuple[int, int, int]) -> np.ndarray | None:
-    """The frames in that file; None where there is no such file, or not a whole one."""
+def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes] | None:
+    """The frames in that file and their digests; None where there is no such file, or not a whole one."""
     header = _header(shape)
     end = len(header) + _size(shape)
     try:
         with path.open("rb") as file:
             begins = file.read(len(header))
-            file.seek(0, SEEK_END)
-            if begins != header or file.tell() != end + CHECK.itemsize:
-                return None
             file.seek(end)
-            check = file.read()
-            frames = np.memmap(file, np.uint8, "r", len(header), shape)
+            digests, seal, more = file.read(shape[0] * DIGEST), file.read(DIGEST), file.read(1)
+            if begins != header or seal != _seal(shape, digests) or more:
+                return None
+            return np.memmap(file, np.uint8, "r", len(header), shape).view(np.ndarray), digests
     except FileNotFoundError:
         return None
-    return frames.view(np.ndarray) if check == _check(_total(frames)) else None
 
 
 def _header(shape: tuple[int, int, int]) -> bytes:
@@ -169,21 +205,9 @@ def _header(shape: tuple[int, int, int]) -> bytes:
     return header.getvalue()
 
 
-def _total(frames: np.ndarray) -> int:
-    """The sum of all frames' sums; of all at once where no frame ends within a word, which is quicker."""
-    return _sum(frames) if frames[0].size % CHECK.itemsize == 0 else sum(map(_sum, frames))
-
-
-def _sum(frame: np.ndarray) -> int:
-    """A sum over the frame's bytes, taken eight at a time."""
-    flat = frame.view(np.ndarray).reshape(-1)
-    words = flat.size // CHECK.itemsize * CHECK.itemsize
-    return int(flat[:words].view(CHECK).sum()) + int(flat[words:].sum())
-
-
-def _check(total: int) -> bytes:
-    """What ends a file whose frames have that sum; never all zeros where the frames are."""
-    return ((total + 1) % 2**64).to_bytes(CHECK.itemsize, "little")
+def _seal(shape: tuple[int, int, int], digests: bytes) -> bytes:
+    """What ends a file whose frames have these digests."""
+    return sha256(_header(shape) + digests).digest()
 
 
 def _size(shape: tuple[int, int, int]) -> int:

@@ -17,7 +17,8 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.model import Experiment, Outcome, Status
 from mutator.store import plan_file
-from mutator.store.records import SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -100,7 +101,9 @@ def driven_once(
     patch = folder.patch(experiment.id)
     patch.parent.mkdir(parents=True)
     (root / "single" / "mutant.patch").rename(patch)
-    lines = LineWriter(folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA})
+    lines = LineWriter(
+        folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+    )
     lines.append(dataclasses.asdict(single.record))
     lines.close()
     return folder.path

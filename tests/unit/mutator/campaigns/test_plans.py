@@ -212,7 +212,7 @@ def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> N
     """What is frozen comes back equal, with plan.csv beside it."""
     plan = make_plan(toycar, "toy", Choices(limit=9))
     folder = freeze(plan, tmp_path / "run", toycar)
-    back = load_plan(folder.path)
+    back = load_plan(folder)
     for name in ("experiments", "chunks", "canary", "digest", "seed", "reading", "choices"):
         assert getattr(back, name) == getattr(plan, name)
     rows = list(csv.DictReader((folder.path / "plan.csv").open()))

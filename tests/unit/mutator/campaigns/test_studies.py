@@ -174,7 +174,7 @@ def test_a_run_opens_without_its_study(
     asking(toycar, "crash_tests")
     folder = freeze(make_plan(toycar, "small"), tmp_path / "planned", toycar)
     monkeypatch.setattr(studies, "entry_points", EntryPoints().select)
-    assert load_plan(folder.path).campaign.study == "crash_tests"
+    assert load_plan(folder).campaign.study == "crash_tests"
     with pytest.raises(MutatorError, match="'crash_tests' is not installed; expected no study"):
         make_plan(toycar, "small")
 

@@ -17,7 +17,7 @@ from mutator.comparison.differences import facts
 from mutator.comparison.sides import read_side
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Outcome, Status
-from mutator.store.run_folder import HEAD
+from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
 
@@ -63,13 +63,16 @@ def test_what_differs_is_told(found: Comparison) -> None:
     assert found.remarks == ()
 
 
-def test_a_run_planned_before_files_were_written_down(runs: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_run_planned_before_files_were_written_down(
+    runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
+) -> None:
     """Runs whose head has no list of files are compared; that it is not known is told."""
     old = shutil.copytree(runs[0], tmp_path / "old")
     head = old / HEAD
     told = json.loads(head.read_text())
     del told["target_files"]
     head.write_text(json.dumps(told))
+    reseal(old)
     assert "is not known" in pages.files_text(compare(old, runs[1]))
 
 
@@ -141,12 +144,15 @@ def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
         compare(*runs, only="value == -1")
 
 
-def test_a_failed_proof_is_not_compared(runs: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_failed_proof_is_not_compared(
+    runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
+) -> None:
     """A run whose engine was proved wrong is refused."""
     after = shutil.copytree(runs[1], tmp_path / "after")
     (after / "proof").mkdir()
     lines = (after / "records" / "0001-a.jsonl").read_text().replace('"outcome":"masked"', '"outcome":"sdc"')
     (after / "proof" / "0001-a.jsonl").write_text(lines)
+    reseal(after)
     with pytest.raises(CheckFailed, match="reference engine"):
         compare(runs[0], after)
 

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -9,10 +10,14 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from mutator._common.files import write_atomic
 from mutator.campaigns.plans import freeze, make_plan
+from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.outcomes import results
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.store import plan_file
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -104,7 +109,9 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
     plan = make_plan(toycar, "toy")
     folder = freeze(plan, tmp_path / "run", toycar)
     for i in (0, 1):
-        writer = LineWriter(folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA})
+        writer = LineWriter(
+            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+        )
         timings = LineWriter(folder.path / "timings" / f"0001-gw{i}.jsonl", {"schema": TIMINGS_SCHEMA})
         for experiment in plan.experiments[i:22:2]:
             writer.append(asdict(record(experiment.id, max_dev=(("gas", 0.5), ("wheel_turn", 0.25)))))
@@ -143,30 +150,94 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
     assert timings.column("experiment_id").to_pylist() == ids
 
 
-def test_tables_are_the_same_bytes_each_time(folder: RunFolder) -> None:
+def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
     """Made again, or from records in other files, the tables have the same bytes."""
     tables = results.build(folder.path), folder.path / "results.parquet"
     before = [table.read_bytes() for table in tables]
     one, two = sorted((folder.path / "records").iterdir())
-    one.rename(one.with_name("0003-x.jsonl"))
-    two.rename(two.with_name("0002-x.jsonl"))
+    heads, lines = zip(*(path.read_text().split("\n", 1) for path in (one, two)), strict=True)
+    for path, head, line in zip((one, two), heads, reversed(lines), strict=True):
+        path.write_text("\n".join((head, line)))
+    reseal(folder.path)
     results.build(folder.path)
     assert [table.read_bytes() for table in tables] == before
 
 
-@pytest.mark.parametrize("changed", ["records/0001-main.jsonl", "run.json", "results.parquet", None])
-def test_tables_are_built_when_they_are_old_or_gone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str | None
+def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
+    built: list[Path] = []
+    monkeypatch.setattr(results, "build", lambda run: built.append(run) or run / results.CSV)
+    assert results.ensure(folder.path) == folder.path / results.CSV
+    return bool(built)
+
+
+def test_tables_stay_while_they_follow_from_what_is_there(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Derived files newer than what they are made from stay as they are; else they are built."""
-    monkeypatch.setattr(results, "build", lambda run: run / "built")
-    (tmp_path / "records").mkdir()
-    names = ("run.json", "records/0001-main.jsonl", "results.csv", "results.parquet", "timings.parquet")
-    for second, name in enumerate(names, start=1):
-        (tmp_path / name).write_text("")
-        os.utime(tmp_path / name, (second, second))
-    if changed == "results.parquet":
-        (tmp_path / changed).unlink()
-    elif changed is not None:
-        os.utime(tmp_path / changed, (3, 3))
-    assert results.ensure(tmp_path) == tmp_path / ("built" if changed else "results.csv")
+    """Times of files say nothing: as long as input and tables have their digests, nothing is built."""
+    results.build(folder.path)
+    os.utime(folder.path / "records" / "0001-gw0.jsonl")
+    os.utime(folder.path / "results.csv", (1, 1))
+    assert not is_rebuilt(folder, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    ["more records", "fewer timings", "results.csv", "results.parquet", "timings.parquet", "results.json"],
+)
+@pytest.mark.parametrize("gone", [True, False])
+def test_tables_are_built_when_anything_of_them_changed(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
+) -> None:
+    """Other records or timings, and a table or stamp that is edited or deleted, make them be built."""
+    results.build(folder.path)
+    if changed == "more records":
+        head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+        LineWriter(folder.path / "records" / "0002-gw0.jsonl", head).close()
+    elif changed == "fewer timings":
+        (folder.path / "timings" / "0001-gw1.jsonl").unlink()
+    elif gone:
+        (folder.path / changed).unlink()
+    else:
+        path = folder.path / changed
+        path.write_bytes(path.read_bytes().replace(b"1", b"2", 1))
+    assert is_rebuilt(folder, monkeypatch)
+
+
+@pytest.mark.parametrize("stamp", [True, False])
+def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -> None:
+    """Who edited a table learns in one line that it is not what was found, also if its stamp is gone."""
+    table = results.build(folder.path)
+    made = table.read_bytes()
+    table.write_bytes(made.replace(b"masked", b"hazard", 1))
+    if not stamp:
+        (folder.path / results.STAMP).unlink()
+    with pytest.warns(MutatorWarning, match=r"results\.csv: not what was made .* made anew"):
+        results.ensure(folder.path)
+    assert table.read_bytes() == made
+
+
+def test_a_table_that_a_kill_left_is_no_edited_one(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
+) -> None:
+    """Killed before any of its tables was written, a build leaves what the next one builds without a word,
+    also after more records came."""
+    results.build(folder.path)
+    planned = plan_file.read_all(folder.path)
+    for killed_before, number in ((results.CSV, 2), (results.PARQUET, 3)):
+        head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+        lines = LineWriter(folder.path / "records" / f"000{number}-gw0.jsonl", head)
+        lines.append(asdict(record(planned[20 + number].id, max_dev=(("gas", 0.5),))))
+        lines.close()
+
+        def write(path: Path, data: bytes, stop: str = killed_before) -> None:
+            if path.name == stop:
+                raise KeyboardInterrupt
+            write_atomic(path, data)
+
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(results, "write_atomic", write)
+            results.ensure(folder.path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        results.ensure(folder.path)
+    assert (folder.path / results.CSV).read_bytes().count(b"\n") == 25

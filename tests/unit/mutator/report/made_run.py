@@ -19,6 +19,7 @@ HEAD = {
     "target": "openpilot",
     "goldens": [],
     "experiments": 3,
+    "chunks": [],
     "runs": 2,
     "sources": {"target": "cd" * 32},
     "provenance": {
@@ -67,9 +68,9 @@ CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 def make_run(folder: Path, **head: object) -> Path:
-    """A run folder with a hazard, a crash and a harness error; the hazard has its patch and a still.
+    """A run folder of before there were digests, with a hazard, a crash and a harness error.
 
-    `head` is added to its run.json.
+    The hazard has its patch and a still. `head` is added to its run.json.
     """
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     with (folder / "results.csv").open("w", newline="") as file:

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from mutator._common.files import write_json
 from mutator.errors import MutatorError
 from mutator.report import building
 from mutator.report.panels import failed
@@ -99,9 +100,8 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
     """Approvals that a run kept are told in both forms, and one that has none says nothing of them."""
     assert "reviewed" not in building.write(run, None).markdown.read_text()
-    gate.write_approvals(
-        run, {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
-    )
+    approvals = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
+    write_json(run / gate.FILE, approvals)
     written = building.ensure(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "all of 2 groups approved, by Jane (1), Joe (1)" in text

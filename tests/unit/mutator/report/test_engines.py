@@ -1,5 +1,6 @@
 """What a report says of how experiments were run, and of their proof."""
 
+import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -10,7 +11,8 @@ from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.results import build
 from mutator.report import building, engines, stamp
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, LineWriter
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -48,10 +50,9 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
         plan = make_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
         freeze(plan, run, toycar)
         records = [record(experiment) for experiment in plan.experiments]
-        write(run / "records/0001-main.jsonl", SCHEMA, [asdict(r) for r in records])
+        write_records(run / "records/0001-main.jsonl", records)
         if proven is not None:
-            again = [asdict(change(r)) for r in records[:proven]]
-            write(run / "proof/0001-main.jsonl", SCHEMA, again)
+            write_records(run / "proof/0001-main.jsonl", [change(r) for r in records[:proven]])
         lines = [timing(r.experiment_id) for r in records]
         if ways is WAYS:
             pairs = zip(lines, WAYS, strict=True)
@@ -66,8 +67,13 @@ def timing(name: str) -> dict[str, object]:
     return {"experiment_id": name, "cpu_s": 0.1, "wall_s": 0.1, "host": "here", "worker": "0001-main"}
 
 
+def write_records(path: Path, records: list[Record]) -> None:
+    write(path, SCHEMA, [asdict(record) for record in records])
+
+
 def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
-    writer = LineWriter(path, {"schema": schema})
+    plan = json.loads((path.parents[1] / "run.json").read_text())["plan"]
+    writer = LineWriter(path, {"schema": schema, "plan": plan})
     for line in lines:
         writer.append(line)
     writer.close()
@@ -154,13 +160,14 @@ def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
     assert before != stamp.made_from(RunFolder.open(run), None)
 
 
-def test_a_report_is_made_from_its_records(finish: Finish) -> None:
+def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Path], None]) -> None:
     """A trace digest, which the proof compares, is in no result; another one makes the report out of date."""
     run = finish(4)
     build(run)
     results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
     path = run / "records/0001-main.jsonl"
     path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
+    reseal(run)
     build(run)
     assert (run / "results.csv").read_bytes() == results
     assert before != stamp.made_from(RunFolder.open(run), None)

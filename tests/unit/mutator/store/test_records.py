@@ -1,18 +1,16 @@
 """Records on disk: nothing that was finished is lost, nothing half-written is believed."""
 
-import errno
 import json
-import os
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from mutator._common.files import DiskFull
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Outcome, Record, RunError, Status
-from mutator.store.records import SCHEMA, LineWriter, Tail, read_records
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, Tail, read_records
 
 HEAD = {"schema": SCHEMA, "plan": "p"}
 MakeRecord = Callable[..., Record]
@@ -65,16 +63,12 @@ def test_a_file_killed_at_birth_is_empty(tmp_path: Path, content: bytes) -> None
     assert read_records(tmp_path) == {}
 
 
-def test_damage_elsewhere_is_told_with_its_line(tmp_path: Path, record: MakeRecord) -> None:
-    """A line in the middle that is no record is no kill's doing, and is not passed over."""
-    path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
-    lines = path.read_bytes().splitlines(keepends=True)
-    for damage in (b"\0\0\0\n", b"[1]\n", b'{"experiment_id": 3}\n'):
-        path.write_bytes(lines[0] + damage + lines[2])
-        with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: damaged line"):
-            read_records(tmp_path)
-    path.write_bytes(b"[1]\n" + lines[2])
-    with pytest.raises(MutatorError, match="expected 'records/1'"):
+def test_a_line_that_is_no_record_is_told(tmp_path: Path) -> None:
+    """A line whose checksum fits and that is no record all the same is an error with its line."""
+    writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
+    writer.append({"experiment_id": 3})
+    writer.close()
+    with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
         read_records(tmp_path)
 
 
@@ -100,68 +94,31 @@ def test_any_record_goes_before_a_harness_error(
 def test_two_different_records_of_one_experiment_fail(tmp_path: Path, record: MakeRecord) -> None:
     """The same experiment with two results is an alarm, not a choice."""
     write(tmp_path, "0001-gw0.jsonl", record())
-    write(tmp_path, "0002-gw0.jsonl", record())
-    assert len(read_records(tmp_path)) == 1
     write(tmp_path, "0003-gw0.jsonl", record(outcome=Outcome.SDC, t_manifest=2.5))
     with pytest.raises(CheckFailed, match="two records that differ"):
         read_records(tmp_path)
 
 
-@pytest.mark.parametrize("written", [0, 40])
-def test_a_line_that_does_not_fit_is_taken_back(
-    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch, written: int
-) -> None:
-    """A disk that fills up in the middle of a line loses that line only, and says so."""
-    writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
-    writer.append(asdict(record("a" * 16)))
-    real, calls = os.write, []
-
-    def full(fd: int, data: bytes) -> int:
-        calls.append(len(data))
-        if written and len(calls) == 1:
-            return real(fd, data[:written])
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "write", full)
-        with pytest.raises(DiskFull):
-            writer.append(asdict(record("b" * 16)))
-    writer.append(asdict(record("c" * 16)))
-    writer.close()
-    assert set(read_records(tmp_path)) == {"a" * 16, "c" * 16}
+def test_a_second_record_of_an_experiment_is_told(tmp_path: Path, record: MakeRecord) -> None:
+    """What finished is never run again, so a second record is a stranger's, even an equal one."""
+    write(tmp_path, "0001-gw0.jsonl", record())
+    write(tmp_path, "0002-gw0.jsonl", record())
+    with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:2: a second record of experiment e{16}"):
+        read_records(tmp_path)
 
 
-def test_a_full_disk_on_sync_is_told(
-    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """File systems that allocate late say it at the sync; the record is still there to be read."""
-    writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
-    writer.append(asdict(record()))
-
-    def full(fd: int) -> None:
-        raise OSError(errno.EDQUOT, "Quota exceeded")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(DiskFull):
-        writer.close()
-    assert len(read_records(tmp_path)) == 1
-
-
-def test_records_are_synced_in_batches(
-    tmp_path: Path, record: MakeRecord, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """100 records cost a few syncs, not 100."""
-    synced = []
-    monkeypatch.setattr(os, "fsync", synced.append)
-    write(tmp_path, "0001-gw0.jsonl", *(record(f"{i:016x}") for i in range(100)))
-    assert 3 <= len(synced) <= 6
-
-
-def test_a_file_is_never_shared(tmp_path: Path) -> None:
-    """Two writers cannot have the same file."""
-    LineWriter(tmp_path / "a.jsonl", HEAD).close()
-    with pytest.raises(FileExistsError):
-        LineWriter(tmp_path / "a.jsonl", HEAD)
+def test_records_of_before_there_were_checksums_are_read(tmp_path: Path, record: MakeRecord) -> None:
+    """A folder of an earlier schema has plain lines; one of this schema must not, and the other way round."""
+    path = write(tmp_path, "0001-gw0.jsonl", record())
+    old = [{"schema": "records/1"}, {k: v for k, v in asdict(record()).items() if k != "patch"}]
+    path.write_text("".join(f"{json.dumps(line)}\n" for line in old))
+    assert read_records(tmp_path, checksums=False) == {record().experiment_id: record()}
+    with pytest.raises(MutatorError, match="jsonl:1: a damaged line"):
+        read_records(tmp_path)
+    path.unlink()
+    write(tmp_path, "0001-gw0.jsonl", record())
+    with pytest.raises(MutatorError, match="schema 'records/2' in a run folder of another"):
+        read_records(tmp_path, checksums=False)
 
 
 def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> None:

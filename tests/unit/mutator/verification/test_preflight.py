@@ -10,7 +10,8 @@ from mutator.campaigns import machine
 from mutator.campaigns.plans import freeze, load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.store.records import SCHEMA, LineWriter, Progress
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, Progress
 from mutator.store.run_folder import RunFolder
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
@@ -42,7 +43,7 @@ def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: p
     }
     assert all(r.passed for r in results)
     assert (told[-1].stage, told[-1].done, told[-1].total) == ("checks", 7, 7)
-    assert load_plan(folder.path).cost(2).measured
+    assert load_plan(folder).cost(2).measured
     monkeypatch.setattr(ReferenceEngine, "execute", None)
     assert run_checks(toycar, folder) == results
 
@@ -128,7 +129,9 @@ def test_other_golden_runs_than_before_are_refused(
     """A run with records does not go on where golden is another one, and keeps the golden runs it has."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
-    LineWriter(folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA}).close()
+    LineWriter(
+        folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+    ).close()
     monkeypatch.setattr(machine, "cpu", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))
     shutil.rmtree(folder.work)

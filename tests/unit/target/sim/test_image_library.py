@@ -10,6 +10,7 @@ import pytest
 import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
+from selfdrive.sim import image_library
 from selfdrive.sim.image_library import FRAMES, SPACING, ImageLibrary, cached, open_library
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
@@ -72,7 +73,7 @@ def test_frames_are_made_once(tmp_path):
     assert np.array_equal(first, np.stack(list(noise()))) and np.array_equal(first, again)
     assert not np.array_equal(first, other)
     with pytest.raises(ValueError, match="read-only"):
-        again[0, 0, 0] = 1
+        again[0][0, 0] = 1
     assert len(list(tmp_path.iterdir())) == 2
 
 
@@ -84,20 +85,51 @@ def test_frames_are_made_once(tmp_path):
         lambda data: b"",
         lambda data: data + b"0",
         lambda data: data[:200] + bytes([data[200] ^ 1]) + data[201:],
+        lambda data: data[:128] + data[191:254] + data[128:191] + data[254:],
+        lambda data: data[:128] + data[133:134] + data[129:133] + data[128:129] + data[134:],
+        lambda data: data[:-40] + bytes([data[-40] ^ 1]) + data[-39:],
         lambda data: b"no array of numbers",
         lambda data: data[:128] + bytes(len(data) - 128),
         lambda data: b"PK\x03\x04" + data[4:],
         lambda data: data[:80] + b"(" + data[81:],
     ],
-    ids=["short", "header only", "empty", "long", "one bit", "other content", "zeros", "archive", "header"],
+    ids=[
+        *("short", "header only", "empty", "long", "one bit", "frames swapped", "bytes swapped", "digest"),
+        *("other content", "zeros", "archive", "header"),
+    ],
 )
 def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
-    """A cache file that is not whole is replaced, and then sound again."""
+    """A cache file that is not what was written is replaced, and then sound again."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     path.write_bytes(harm(path.read_bytes()))
     assert np.array_equal(cached(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
-    cached(tmp_path, DIGEST, SHAPE, refuse)
+    assert len(list(cached(tmp_path, DIGEST, SHAPE, refuse))) == 5
+
+
+def test_only_frames_that_are_looked_at_are_verified(tmp_path):
+    """Mapping a file costs next to nothing; a frame that is damaged is made anew when it is asked for."""
+    cached(tmp_path, DIGEST, SHAPE, noise)
+    (path,) = tmp_path.iterdir()
+    data = path.read_bytes()
+    path.write_bytes(data[:128] + bytes([data[128] ^ 1]) + data[129:])
+    frames, sound = cached(tmp_path, DIGEST, SHAPE, refuse), np.stack(list(noise()))
+    assert np.array_equal(frames[4], sound[4])
+    with pytest.raises(AssertionError, match="made again"):
+        frames[0]
+
+
+def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch):
+    """A file that is damaged again as soon as it is written: the frames are kept in memory."""
+    cached(tmp_path, DIGEST, SHAPE, noise)
+    real = image_library._mapped
+
+    def mapped(path, shape):
+        frames, digests = real(path, shape)
+        return np.zeros_like(frames), digests
+
+    monkeypatch.setattr(image_library, "_mapped", mapped)
+    assert np.array_equal(cached(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
 
 
 def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
@@ -120,7 +152,7 @@ def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, p
     frames = cached(cache, DIGEST, SHAPE, noise)
     assert np.array_equal(frames, cached(tmp_path / "sound", DIGEST, SHAPE, noise))
     with pytest.raises(ValueError, match="read-only"):
-        frames[0, 0, 0] = 1
+        frames[0][0, 0] = 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "sound"]
 
 
@@ -131,7 +163,7 @@ def test_processes_may_make_the_same_frames_at_once(tmp_path):
         "from selfdrive.sim.image_library import cached\n"
         "make = lambda: iter(np.random.default_rng(1).integers(0, 256, (40, 97, 101), dtype=np.uint8))\n"
         f"frames = cached(pathlib.Path(sys.argv[1]), {DIGEST!r}, (40, 97, 101), make)\n"
-        "print(hashlib.sha256(frames.tobytes()).hexdigest())\n"
+        "print(hashlib.sha256(np.stack(list(frames)).tobytes()).hexdigest())\n"
     )
     root = str(Path(selfdrive.__path__[0]).parent)
 

@@ -27,7 +27,7 @@ def run(tmp_path: Path) -> RunFolder:
     (tmp_path / "results.csv").write_text("\n".join([HEADER, *map(line.format, ("guided", "random")), ""]))
     (tmp_path / "golden" / "S1").mkdir(parents=True)
     np.savez(tmp_path / "golden" / "S1" / "trace.npz", t=np.arange(3000) / 100)
-    return RunFolder.open(tmp_path)
+    return RunFolder.unverified(tmp_path)
 
 
 def names(run: RunFolder, suffix: str) -> set[str]:

@@ -1,0 +1,157 @@
+"""Audits: does a run folder hold what was found, and does it all follow from its plan and sources?"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common.arguments import check_type, check_whole
+from mutator._common.hashing import digest
+from mutator._common.tables import Table
+from mutator._common.text import counted
+from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.errors import MutatorError
+from mutator.execution.spot_check import drawn, driven_again
+from mutator.store.run_folder import RunFolder
+from mutator.verification.audit import Check, audit
+from mutator.verification.repairing import repair as put_aside
+from mutator.verification.seal import seal as seal_of
+from mutator.workspace import Workspace
+
+SHOWN = 20  # differences that the page lists
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Audit:
+    """What an audit of a run folder found.
+
+    `facts` say what was audited, `checks` what was looked at, `seal` is computed from the content (None: not
+    finished, or not verifiable), `repaired` says what was put aside.
+    """
+
+    run: Path
+    facts: Mapping[str, str]
+    checks: tuple[Check, ...]
+    seal: str | None
+    repaired: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Audit of {self.run.name}: {self._outcome}>"
+
+    def __str__(self) -> str:
+        """One page to be printed or attached."""
+        width = max(map(len, self.facts))
+        rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
+        table = Table(heads=("checked", "of", "differences"), rows=rows, right=(1, 2))
+        found = [str(one).replace(f"{self.run}/", "") for one in self.differences[:SHOWN]]
+        more = len(self.differences) - SHOWN
+        listed = [*found, *([f"and {more} more"] if more > 0 else [])]
+        parts = [
+            "\n".join(f"{name.ljust(width)}  {value}" for name, value in self.facts.items()),
+            table.as_text(),
+            "\n".join(f"- {text}" for text in listed),
+            "\n".join(f"repaired: {text}" for text in self.repaired),
+            self._outcome,
+        ]
+        return "\n\n".join(filter(None, parts))
+
+    @property
+    def _outcome(self) -> str:
+        return counted(len(self.differences), "difference") if self.differences else "no difference"
+
+    @property
+    def differences(self) -> tuple[MutatorError, ...]:
+        """Everything that is not as it should be, each once."""
+        found = (difference for check in self.checks for difference in check.differences)
+        return tuple({str(difference): difference for difference in found}.values())
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is no difference."""
+        return not self.differences
+
+
+def verify(
+    run: str | Path,
+    *,
+    rerun: int = 0,
+    expect: str | None = None,
+    repair: bool = False,
+    workspace: WorkspaceLike = None,
+) -> Audit:
+    """Audit the run folder at `run`, finished or not, also one that does not open any more.
+
+    `rerun` experiments, drawn by lot, are driven again on the reference engine. `expect` is the seal that the
+    run must have. With `repair` what is damaged is put aside, so that the same `run` fills the gap. Without
+    it nothing is written. MutatorError when `run` is no run folder, or its run.json cannot be read.
+    """
+    check_whole("rerun", rerun)
+    if expect is not None:
+        check_type("expect", expect, str, "a seal")
+        if not re.fullmatch(r"[0-9a-f]{64}", expect):
+            raise MutatorError(f"'{expect}'", argument="expect", expected="a seal: 64 hex digits")
+    folder = RunFolder.unverified(Path(run))
+    found = _workspace(workspace)
+    checks = audit(folder, found)
+    facts = _facts(folder)
+    if rerun:
+        checks.append(_rerun(folder, found, rerun, facts))
+    seal = _seal(folder, checks)
+    facts["seal"] = seal or "none"
+    if expect is not None:
+        wrong = MutatorError(f"seal {seal or 'none'}", where=folder.path, expected=expect)
+        facts["expected"] = expect
+        checks.append(Check(what="seal as expected", count=1, differences=() if seal == expect else (wrong,)))
+    damaged = any(check.differences for check in checks)
+    repaired = put_aside(folder) if repair and damaged else []
+    return Audit(run=folder.path, facts=facts, checks=tuple(checks), seal=seal, repaired=tuple(repaired))
+
+
+def _workspace(given: WorkspaceLike) -> Workspace | None:
+    """The workspace; None where none is named and none is found."""
+    try:
+        return open_workspace(given)
+    except MutatorError:
+        if given is not None:
+            raise
+        return None
+
+
+def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
+    """Drive some again; which, joins the facts."""
+    what = "experiments driven again on the reference engine"
+    if workspace is None:
+        raise MutatorError("no library here", argument="rerun", expected="the sources of the run")
+    try:
+        ids = drawn(folder, count)
+    except MutatorError as err:
+        return Check(what=what, count=0, differences=(err,))
+    facts["drawn by lot"] = ", ".join(ids)
+    return Check.of(what, len(ids), driven_again(workspace, folder, ids))
+
+
+def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
+    """The seal; None where content is missing that it stands for."""
+    try:
+        return seal_of(folder)
+    except (MutatorError, OSError):
+        if not any(check.differences for check in checks):
+            raise
+        return None
+
+
+def _facts(folder: RunFolder) -> dict[str, str]:
+    """What is audited, and what it was made with."""
+    head: Any = folder.head
+    made = head["provenance"]
+    packages = made["packages"]
+    return {
+        "run": folder.path.name,
+        "campaign": f"{head['campaign']} of {head['target']}, {head['reading']}, seed {head['seed']}",
+        "experiments": f"{folder.planned}{f' of shard {folder.shard}' if folder.shard else ''}",
+        "plan": head["plan"],
+        **{f"digest of {name}": value for name, value in head["sources"].items()},
+        "made with": f"mutator {made['mutator']}, Python {made['python']}, {made['machine']}",
+        "packages": f"{len(packages)}, with digest {digest(packages)}",
+    }

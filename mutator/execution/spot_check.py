@@ -1,0 +1,47 @@
+"""Experiments of a run, drawn by lot and driven again on the reference engine: are their records the same?"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from random import SystemRandom
+from tempfile import TemporaryDirectory
+
+from mutator.errors import MutatorError
+from mutator.execution.single_run import manifest_of, run_single
+from mutator.model import Status
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.verification import equivalence
+from mutator.workspace import Workspace
+
+
+def drawn(folder: RunFolder, count: int) -> list[str]:
+    """Ids of `count` experiments that have a result, or of all if there are fewer. The draw follows from no
+    seed: nobody can know it beforehand."""
+    records = folder.records().values()
+    ids = sorted(record.experiment_id for record in records if record.status is not Status.HARNESS_ERROR)
+    return SystemRandom().sample(ids, min(count, len(ids)))
+
+
+def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
+    """Drive these experiments; what is not the same as in their records. Nothing is written to the folder."""
+    manifest, records = manifest_of(workspace, folder), folder.records()
+    experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
+    with TemporaryDirectory(prefix="mutator-verify-") as scratch:
+        for name in ids:
+            experiment = experiments[name]
+            golden = folder.golden(experiment.scenario, experiment.changes)
+            single = run_single(
+                workspace,
+                manifest,
+                experiment,
+                Path(scratch) / name,
+                limits=folder.limits,
+                golden=golden if golden.is_dir() else None,
+            )
+            known, found = records[name], folder.comparable(single.record)
+            if known != found:
+                yield MutatorError(
+                    f"{name} driven again: {equivalence.difference(found, known)}",
+                    where=folder.path,
+                    expected="the same record again",
+                )

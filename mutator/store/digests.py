@@ -1,0 +1,169 @@
+"""`digests.json`: size and SHA-256 of every file of a run folder that counts, so that a change is found.
+
+The owner of the folder alone writes it. What is about to be rewritten is announced first, with its old and
+its new digest, and confirmed afterwards: a kill in between leaves a folder in which each file is either.
+"""
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic, write_json
+from mutator._common.hashing import digest
+from mutator.errors import MutatorError
+from mutator.store.lines import read_segment
+
+SCHEMA, FILE = "digests/1", "digests.json"
+SEGMENTS = ("records", "proof")  # folders of append-only files; each file is entered once it is closed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Digest:
+    """What a file was when it was written; `lines` of a segment only."""
+
+    size: int  # in bytes
+    sha256: str
+    lines: int | None = None
+
+    @classmethod
+    def of(cls, data: bytes, lines: int | None = None) -> "Digest":
+        return cls(size=len(data), sha256=digest(data), lines=lines)
+
+    @classmethod
+    def of_file(cls, path: Path) -> "Digest | None":
+        """Of the file there; None where there is none."""
+        try:
+            with path.open("rb") as file:
+                return cls(
+                    sha256=hashlib.file_digest(file, "sha256").hexdigest(),
+                    size=os.fstat(file.fileno()).st_size,
+                )
+        except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+            return None
+
+    def is_of(self, found: "Digest | None") -> bool:
+        """Whether a file that was found is still what it was."""
+        return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ledger:
+    """What `digests.json` says: files by their names in the run folder; those that are being rewritten, and
+    what they become (None: they go); whether every experiment has a record that counts."""
+
+    files: Mapping[str, Digest]
+    rewriting: Mapping[str, Digest | None] = field(default_factory=dict)
+    finished: bool = False
+
+    def accepts(self, name: str, found: Digest | None) -> bool:
+        """Whether a file may be what was found; one that is being rewritten is the old, the new or gone."""
+        known = self.files.get(name)
+        if name not in self.rewriting:
+            return known.is_of(found) if known else found is None
+        coming = self.rewriting[name]
+        return found is None or any(one is not None and one.is_of(found) for one in (known, coming))
+
+    @property
+    def names(self) -> list[str]:
+        """Every file that is known, or about to be."""
+        return [*self.files, *(name for name in self.rewriting if name not in self.files)]
+
+
+def read(run: Path) -> Ledger:
+    """The ledger of a run folder; MutatorError when it is missing or not as it was written."""
+    path = run / FILE
+    remedy = "take it from a copy of the run folder; without it nothing vouches for the results"
+    if not path.is_file():
+        raise MutatorError("missing", where=path, expected="the digests of all files", remedy=remedy)
+    data = read_json(path, SCHEMA)
+    as_written = path.read_bytes() == json_bytes(data)
+    if data.pop("sum", None) != digest(data) or not as_written:
+        raise MutatorError("not as it was written", where=path, expected="its own checksum", remedy=remedy)
+    try:
+        return Ledger(
+            files={name: Digest(**value) for name, value in data["files"].items()},
+            rewriting={name: value and Digest(**value) for name, value in data["rewriting"].items()},
+            finished=data["finished"],
+        )
+    except (KeyError, TypeError, AttributeError) as err:
+        raise MutatorError(f"no ledger ({err})", where=path, remedy=remedy) from None
+
+
+def write(run: Path, ledger: Ledger) -> None:
+    """Write the ledger, whole or not at all."""
+    data: dict[str, Any] = {
+        "schema": SCHEMA,
+        "finished": ledger.finished,
+        "files": {name: _plain(ledger.files[name]) for name in sorted(ledger.files)},
+        "rewriting": {name: one and _plain(one) for name, one in sorted(ledger.rewriting.items())},
+    }
+    write_json(run / FILE, {"schema": SCHEMA, "sum": digest(data), **data})
+
+
+def _plain(one: Digest) -> dict[str, Any]:
+    return {key: value for key, value in asdict(one).items() if value is not None}
+
+
+@contextmanager
+def rewriting(run: Path, coming: Mapping[str, Digest | None]) -> Iterator[None]:
+    """Within it these files become what is said (None: they go). Whoever is killed within it leaves a folder
+    that opens, and that can be rewritten again."""
+    before = settled(run)
+    write(run, replace(before, rewriting=coming))
+    yield
+    files = {name: one for name, one in before.files.items() if name not in coming}
+    write(run, replace(before, files=files | {name: one for name, one in coming.items() if one}))
+
+
+def rewrite(run: Path, name: str, data: bytes) -> None:
+    """Write one file of a run folder anew, and its digest."""
+    with rewriting(run, {name: Digest.of(data)}):
+        write_atomic(run / name, data)
+
+
+def settled(run: Path) -> Ledger:
+    """The ledger without announcements: what a killed command left of them is taken as it is."""
+    known = read(run)
+    files = dict(known.files)
+    for name, coming in known.rewriting.items():
+        found = Digest.of_file(run / name)
+        if found is None:
+            files.pop(name, None)
+        elif coming is not None and coming.is_of(found):
+            files[name] = coming
+    return replace(known, files=files, rewriting={})
+
+
+def close_segments(run: Path, *, finished: bool | None = None) -> None:
+    """Enter the segments that nobody appends to any more, with the bytes that count: a torn last line goes.
+
+    `finished` says whether the run is, from now on; None: as before. MutatorError for a damaged line.
+    """
+    before = settled(run)
+    files = dict(before.files)
+    for name in segments(run):
+        if name not in files:
+            files[name] = _closed(run / name)
+    after = replace(before, files=files, finished=before.finished if finished is None else finished)
+    if after != read(run):
+        write(run, after)
+
+
+def segments(run: Path) -> list[str]:
+    """Names of the segments in a run folder."""
+    return sorted(f"{kind}/{path.name}" for kind in SEGMENTS for path in (run / kind).glob("*.jsonl"))
+
+
+def _closed(path: Path) -> Digest:
+    with raising_disk_full(path), path.open("rb+") as file:
+        data = file.read()
+        segment = read_segment(path, data)
+        if segment.damaged:
+            raise segment.problem(segment.damaged[0])
+        file.truncate(segment.end)
+        os.fsync(file.fileno())
+    return Digest.of(data[: segment.end], lines=len(segment.lines))

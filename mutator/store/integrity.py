@@ -1,0 +1,200 @@
+"""Is a run folder what was written? Asked whenever one is opened, before anything of it is believed.
+
+Files are compared with `digests.json`, lines with their checksums, the records with the plan. A folder of an
+earlier schema has neither digests nor checksums; of it only the ids are checked.
+"""
+
+from collections.abc import Collection, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from mutator._common.files import is_half_written
+from mutator.errors import MutatorError
+from mutator.model import Status
+from mutator.store import digests, plan_file
+from mutator.store.digests import Digest, Ledger
+from mutator.store.lines import Segment, read_segment
+from mutator.store.records import SCHEMA, second_record
+from mutator.store.run_head import CAMPAIGN, HEAD, Head
+from mutator.store.shards import Shard
+
+SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has nothing unknown
+WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # cannot be made again
+TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
+_MANY = 5  # experiments that one message names
+
+
+def problems(run: Path, head: Head, ledger: Ledger | None, shard: Shard | None) -> Iterator[MutatorError]:
+    """All that is wrong in a run folder, of which `shard` is run in it."""
+    if ledger is not None:
+        yield from file_problems(run, ledger)
+        yield from _open_segments(run, ledger)
+        if ledger.finished:
+            for path in strangers(run, ledger):
+                yield MutatorError(
+                    f"not named in {digests.FILE}",
+                    where=path,
+                    expected="only what the finished run wrote",
+                    remedy=_remedy(run, ""),
+                )
+    try:
+        planned = share(run, head, shard)
+    except MutatorError as err:
+        yield err
+        return
+    yield from id_problems(run, head, ledger, planned)
+
+
+def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
+    """Ids and places of the experiments of a plan that a run folder is to run, in the plan's order.
+
+    MutatorError for a plan that has one twice, or another number than its chunks have.
+    """
+    path = run / plan_file.EXPERIMENTS
+    places: dict[str, int] = {}
+    for place, name in enumerate(plan_file.ids(run)):
+        if places.setdefault(name, place) != place:
+            raise MutatorError(
+                f"experiment {name} a second time", where=path, line=place + 1, remedy=_remedy(run, HEAD)
+            )
+    counts = [count for _, _, count in head["chunks"]]
+    if sum(counts) != len(places):
+        raise MutatorError(
+            f"{len(places)} experiments",
+            where=path,
+            expected=f"{sum(counts)}, as the chunks of {HEAD} have",
+            remedy=_remedy(run, HEAD),
+        )
+    if shard is None:
+        return places
+    ours = [shard.has(chunk) for chunk, count in enumerate(counts) for _ in range(count)]
+    return {name: place for name, place in places.items() if ours[place]}
+
+
+def file_problems(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
+    """Files that are missing, or have other bytes than were written."""
+    for name in ledger.names:
+        found = Digest.of_file(run / name)
+        if ledger.accepts(name, found):
+            continue
+        if found is None:
+            yield MutatorError(
+                "missing", where=run / name, expected=f"as {digests.FILE} has it", remedy=_remedy(run, name)
+            )
+        else:
+            yield from _changed(run, name, ledger.files[name], found)
+
+
+def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[MutatorError]:
+    """What is wrong with a file of other bytes: its damaged lines, if it has lines."""
+    path = run / name
+    if known.lines is not None:
+        segment = read_segment(path)
+        if segment.damaged:
+            yield from map(segment.problem, segment.damaged)
+            return
+        got = f"{len(segment.lines)} lines, all with their checksums"
+        yield MutatorError(
+            got, where=path, line=len(segment.lines), expected=_told(known), remedy=_remedy(run, name)
+        )
+        return
+    line = None
+    if name in (plan_file.EXPERIMENTS, plan_file.FAULTS):
+        with suppress(MutatorError):  # the other one is missing
+            line = next((one.line for one in plan_file.problems(run) if one.where == str(path)), None)
+    yield MutatorError(
+        f"changed: {_told(found)}", where=path, line=line, expected=_told(known), remedy=_remedy(run, name)
+    )
+
+
+def _told(one: Digest) -> str:
+    lines = "" if one.lines is None else f"{one.lines} lines, "
+    return f"{lines}{one.size} bytes with SHA-256 {one.sha256[:16]}"
+
+
+def _remedy(run: Path, name: str) -> str:
+    if name in WHOLE:
+        return "take it from a copy of the run folder, or run into a new one"
+    return f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
+
+
+def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
+    """Damaged lines of segments that are still appended to, or that a killed command left."""
+    for name in digests.segments(run):
+        if name not in ledger.files:
+            segment = read_segment(run / name)
+            yield from map(segment.problem, segment.damaged)
+
+
+def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
+    """Files of a finished run, where only those belong that the ledger names, that it does not name."""
+    known = {*ledger.files, *ledger.rewriting}
+    paths = [run / name for name in TOP]
+    paths += [path for folder in SEALED for path in sorted((run / folder).rglob("*"))]
+    for path in paths:
+        ours = path.relative_to(run).as_posix() in known or is_half_written(path.name)
+        if path.is_file() and not ours:
+            yield path
+
+
+def id_problems(
+    run: Path, head: Head, ledger: Ledger | None, planned: Collection[str]
+) -> Iterator[MutatorError]:
+    """Records of experiments that are not planned here, two of one experiment, and missing ones."""
+    for kind in digests.SEGMENTS:
+        done: dict[str, int] = {}  # id -> hash of its final record
+        for path in sorted((run / kind).glob("*.jsonl")):
+            segment = read_segment(path, checksums=ledger is not None)
+            yield from _head_problem(segment, head["plan"])
+            yield from _id_problems(segment, planned, done)
+        missing = [name for name in planned if name not in done]
+        if ledger is not None and ledger.finished and kind == "records" and missing:
+            more = f" and {len(missing) - _MANY} more" if len(missing) > _MANY else ""
+            yield MutatorError(
+                f"no record of {', '.join(missing[:_MANY])}{more}",
+                where=run / kind,
+                expected="one of each planned experiment, as the run is finished",
+                remedy=_remedy(run, ""),
+            )
+
+
+def _head_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
+    """A segment of another run, or in another's place."""
+    try:
+        segment.check_head(SCHEMA)
+        if 1 in segment.lines and (found := segment.content(1).get("plan")) != plan:
+            yield MutatorError(
+                f"records of plan {str(found)[:16]}",
+                where=segment.path,
+                line=1,
+                expected=plan[:16],
+                remedy="put the file back where it came from",
+            )
+    except MutatorError as err:
+        yield err
+
+
+def _id_problems(segment: Segment, planned: Collection[str], done: dict[str, int]) -> Iterator[MutatorError]:
+    """Those of one segment; `done` is what the segments before it had, and is added to."""
+    for number in segment.lines:
+        if number == 1:
+            continue
+        try:
+            data = segment.content(number)
+            name, status = str(data["experiment_id"]), data["status"]
+        except (MutatorError, KeyError):
+            yield segment.problem(number)
+            continue
+        if name not in planned:
+            yield MutatorError(
+                f"a record of {name}, which is not planned for this run",
+                where=segment.path,
+                line=number,
+                expected=f"experiments of {plan_file.EXPERIMENTS}, those of this shard",
+                remedy=_remedy(segment.path.parent.parent, ""),
+            )
+        elif status != Status.HARNESS_ERROR.value:
+            content = hash(segment.body(number))
+            if name in done:
+                yield second_record(segment.path, number, name, same=done[name] == content)
+            done[name] = content

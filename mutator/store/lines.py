@@ -1,0 +1,179 @@
+"""Files of checksummed lines: each appended by one process, verified over raw bytes before any is parsed.
+
+A line is a JSON object whose first key is its checksum, `{"sum":"<16 hex>",...}`: SHA-256, shortened, of the
+checksum that the line before states and of all bytes after its own. So a line that was changed, dropped,
+doubled or moved is found by its number, and the lines after it still verify.
+"""
+
+import json
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import check_schema, raising_disk_full
+from mutator._common.hashing import canonical
+from mutator.errors import MutatorError
+
+_BATCH = 32  # lines between two syncs
+_BATCH_S = 2.0  # and at most this long
+_KEY, _WIDTH, _AFTER = b'{"sum":"', 16, b'",'
+_SUM = slice(len(_KEY), len(_KEY) + _WIDTH)
+_BODY = len(_KEY) + _WIDTH + len(_AFTER)
+
+
+class LineWriter:
+    """Appends JSON lines to a new file of its own: whole lines, checksummed, synced in batches.
+
+    `head`, with the schema, is the first line; the file's name joins it. A line that does not fit on the disk
+    is taken back, so the file stays readable; DiskFull is raised.
+    """
+
+    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+        self.path = path
+        self._unsynced = 0
+        self._synced_at = time.monotonic()
+        with raising_disk_full(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        self._end = 0
+        self._last = b""
+        self.append(_head(path, head))
+
+    def append(self, value: Mapping[str, Any]) -> None:
+        """Append one line; it is on the disk after the next `sync` at the latest."""
+        data = _line(self._last, canonical(value).encode()[1:])
+        with raising_disk_full(self.path):
+            try:
+                written = 0
+                while written < len(data):
+                    written += os.write(self._fd, data[written:])
+            except OSError:
+                os.ftruncate(self._fd, self._end)
+                raise
+        self._end += len(data)
+        self._last = data[_SUM]
+        self._unsynced += 1
+        if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _BATCH_S:
+            self.sync()
+
+    def sync(self) -> None:
+        """Make sure that what was appended survives a power cut."""
+        with raising_disk_full(self.path):
+            os.fsync(self._fd)
+        self._unsynced = 0
+        self._synced_at = time.monotonic()
+
+    def close(self) -> None:
+        try:
+            self.sync()
+        finally:
+            os.close(self._fd)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """What is in such a file: the lines that are as they were written, by number from 1; the numbers of those
+    that are not; and where the last whole line ends. What comes after it is torn: a kill left it."""
+
+    path: Path
+    checksums: bool
+    lines: Mapping[int, bytes]
+    damaged: tuple[int, ...]
+    end: int
+
+    def problem(self, number: int) -> MutatorError:
+        """What is said of a line that is not as it was written."""
+        run = self.path.parent.parent
+        mend = f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
+        return MutatorError(
+            "a damaged line",
+            where=self.path,
+            line=number,
+            expected="the bytes that its checksum was taken of" if self.checksums else "a whole JSON object",
+            remedy=mend if self.checksums else "take the file from a copy of the run folder",
+        )
+
+    def content(self, number: int) -> dict[str, Any]:
+        """The object on a line, without its checksum; MutatorError when it is none."""
+        try:
+            value = json.loads(self.lines[number])
+        except (ValueError, RecursionError):
+            value = None
+        if not isinstance(value, dict):
+            raise self.problem(number)
+        value.pop("sum", None)
+        return value
+
+    def body(self, number: int) -> bytes:
+        """A line without its checksum: the same in every file that it is in."""
+        return self.lines[number][_BODY if self.checksums else 0 :]
+
+    def check_head(self, schema: str) -> None:
+        """MutatorError for a file of another schema, or one that was written under another name."""
+        if 1 not in self.lines:
+            return
+        head = self.content(1)
+        check_schema(head.get("schema"), schema, self.path)
+        if self.checksums != (head["schema"] == schema):
+            raise MutatorError(f"schema {head['schema']!r} in a run folder of another", where=self.path)
+        if self.checksums and head.get("file") != _name(self.path):
+            raise MutatorError(
+                f"was written as {head.get('file')}",
+                where=self.path,
+                line=1,
+                remedy="give it that name again, or put it back where it came from",
+            )
+
+    def objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Number and content of each line after the head; MutatorError for a damaged line, and for a file of
+        another schema or name."""
+        if self.damaged:
+            raise self.problem(self.damaged[0])
+        self.check_head(schema)
+        yield from ((number, self.content(number)) for number in self.lines if number > 1)
+
+
+def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
+    """Verify the lines of a file; `data` are its bytes, if they were read already.
+
+    Without `checksums` (a run folder of before there were any) every whole line counts as written.
+    """
+    data = path.read_bytes() if data is None else data
+    end = data.rfind(b"\n") + 1
+    lines: dict[int, bytes] = {}
+    damaged: list[int] = []
+    last = b""
+    for number, line in enumerate(data[:end].split(b"\n")[:-1], start=1):
+        if not checksums or line == _line(last, line[_BODY:])[:-1]:
+            lines[number] = line
+        else:
+            damaged.append(number)
+        last = line[_SUM]
+    return Segment(path=path, checksums=checksums, lines=lines, damaged=tuple(damaged), end=end)
+
+
+def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
+    """What a file at `path` holds to which `values` were appended."""
+    lines = [b""]
+    for value in (_head(path, head), *values):
+        lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
+    return b"".join(lines)
+
+
+def _line(last: bytes, body: bytes) -> bytes:
+    """A line: its checksum, which follows on `last`, and `body`, the object without its first brace."""
+    checksum = sha256(last + body).hexdigest()[:_WIDTH].encode()
+    return b"".join((_KEY, checksum, _AFTER, body, b"\n"))
+
+
+def _head(path: Path, head: Mapping[str, Any]) -> dict[str, Any]:
+    return {**head, "file": _name(path)}
+
+
+def _name(path: Path) -> str:
+    """The file's name in its run folder: `records/0001-gw0.jsonl`."""
+    return f"{path.parent.name}/{path.name}"

@@ -1,0 +1,79 @@
+"""`run.json`, read and checked: a damaged one is told by its key, whichever version wrote it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import read_json
+from mutator.errors import MutatorError
+from mutator.model import Limits
+
+SCHEMA = "run/2"
+HEAD, CAMPAIGN = "run.json", "campaign.yaml"
+_REMEDY = "the run folder is damaged: take the file from a copy of it"
+_TEXTS = {str: str}
+# What keys hold: a type, or several; `[x]` a list of x; `{str: x}` names with x.
+_SHAPES: dict[str, Any] = {
+    "plan": str,
+    "campaign": str,
+    "campaign_digest": str,
+    "target": str,
+    "seed": int,
+    "reading": str,
+    "choices": {str: str | int | None},
+    "experiments": int,
+    "runs": int,
+    "limits": {str: int},
+    "hazards": [str],
+    "compared": [str],
+    "goldens": [list],
+    "golden_files": [str],
+    "canary": {str: object},
+    "canary_hazard": str,
+    "sources": _TEXTS,
+    "target_files": _TEXTS,
+    "provenance": {str: str | dict},
+    "stretches": [{str: object}],
+    "chunks": [[int]],
+}
+_SIZES = {"goldens": 2, "chunks": 3}  # of each item
+
+
+class Head(dict[str, Any]):
+    """The content of a run.json; MutatorError for a key that it should have and does not."""
+
+    def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
+        super().__init__(content)
+        self.path = path
+
+    def __missing__(self, key: str) -> Any:
+        raise MutatorError(f"no '{key}'", where=self.path, expected="all keys of a run", remedy=_REMEDY)
+
+
+def read_head(run: Path) -> Head:
+    """The head of a run folder; MutatorError when it is damaged, or of a newer schema."""
+    path = run / HEAD
+    head = Head(path, read_json(path, SCHEMA))
+    if wrong := next(_wrong(head), ""):
+        raise MutatorError(f"damaged at '{wrong}'", where=path, remedy=_REMEDY)
+    if "provenance" in head:
+        head["provenance"] = Head(path, head["provenance"])
+    return head
+
+
+def _wrong(head: Head) -> Iterator[str]:
+    """The keys with something that they cannot hold."""
+    yield from (key for key, shape in _SHAPES.items() if key in head and not _fits(head[key], shape))
+    known = {field.name for field in fields(Limits)}
+    if not head.get("limits", {}).keys() <= known:
+        yield "limits"
+    yield from (key for key, size in _SIZES.items() if any(len(item) != size for item in head.get(key, ())))
+
+
+def _fits(value: object, shape: Any) -> bool:
+    if isinstance(shape, list):
+        return isinstance(value, list) and all(_fits(item, shape[0]) for item in value)
+    if isinstance(shape, dict):
+        return isinstance(value, dict) and all(_fits(item, shape[str]) for item in value.values())
+    return isinstance(value, shape)

@@ -1,0 +1,160 @@
+"""An audit of a run folder: does all that it says follow from what it holds? Nothing of it is executed.
+
+Digests and checksums first, then content: ids and plan, golden runs, sources, trees and patches, verdicts,
+proof, tables. Each step lists every difference that it finds.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from mutator._common.files import read_json
+from mutator._common.hashing import digest
+from mutator.campaigns.plans import CSV, load_plan, plan_csv, plan_digest
+from mutator.campaigns.provenance import sources
+from mutator.errors import MutatorError
+from mutator.store import digests, plan_file
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.targets.manifest import TargetManifest
+from mutator.verification.audited_records import mutants, proof, recorded, verdicts
+from mutator.verification.audited_tables import tables
+from mutator.verification.seal import golden_digests, not_verifiable
+from mutator.workspace import Workspace
+
+Problems = Iterator[MutatorError]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One thing that an audit looked at: what must hold, of how many things, and where it does not."""
+
+    what: str
+    count: int
+    differences: tuple[MutatorError, ...] = ()
+
+    @classmethod
+    def of(cls, what: str, count: int, problems: Problems) -> "Check":
+        """With all problems that are found; one that is raised is the last."""
+        found = []
+        try:
+            for problem in problems:
+                found.append(problem)
+        except MutatorError as err:
+            found.append(err)
+        return cls(what=what, count=count, differences=tuple(found))
+
+
+def audit(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
+    """Look at all of a run folder. Without a `workspace`, and with other sources in it than those of the run,
+    trees and patches cannot be compared, and that is a difference, too."""
+    head = folder.head
+    here = Check.of("sources that are those of the run", len(head["sources"]), _sources(folder, workspace))
+    manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
+    records, proven = recorded(folder, "records"), recorded(folder, "proof")
+    checks = [
+        Check.of("files, lines and ids that are as they were written", _files(folder), _content(folder)),
+        Check.of(
+            "ids, plan digest and run.json that follow from the plan", head["experiments"], _plan(folder)
+        ),
+        Check.of(
+            "golden runs that are those of the checks", len(head["goldens"]), _goldens(folder, manifest)
+        ),
+        here,
+    ]
+    if workspace and manifest:
+        compared = mutants(folder, records, manifest, workspace.fault_models())
+        checks.append(Check.of("trees and patches that follow from plan and sources", len(records), compared))
+    checks += [
+        Check.of(
+            "verdicts that follow from what was recorded", len(records), verdicts(head, records, manifest)
+        ),
+        Check.of(
+            "records of the proof that are those of the run", len(proven), proof(folder, records, proven)
+        ),
+        Check.of("tables that follow from the records", *tables(folder)),
+    ]
+    return checks
+
+
+def _files(folder: RunFolder) -> int:
+    """Files that are verified by digests."""
+    try:
+        return len(digests.read(folder.path).names) if folder.verifiable else 0
+    except MutatorError:
+        return 0
+
+
+def _content(folder: RunFolder) -> Problems:
+    if not folder.verifiable:
+        yield MutatorError(not_verifiable(folder), where=folder.path / HEAD, expected="a run of this version")
+    yield from folder.problems()
+
+
+def _plan(folder: RunFolder) -> Problems:
+    """The ids follow from the plan's lines, the digest from the ids, run.json and plan.csv from all."""
+    run, head = folder.path, folder.head
+    yield from plan_file.problems(run)
+    plan = load_plan(folder)
+    campaign = plan.campaign
+    follows = {
+        "plan": plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
+        "experiments": len(plan.experiments),
+        "campaign": campaign.name,
+        "campaign_digest": digest(campaign.source),
+        "target": campaign.target,
+        "limits": asdict(campaign.limits),
+        "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "canary_hazard": campaign.canary.hazard,
+    }
+    for key, value in follows.items():
+        if head[key] != value:
+            expected = f"{value}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
+            yield MutatorError(f"{key} {head[key]}", where=run / HEAD, expected=expected)
+    if (run / CSV).read_bytes() != plan_csv(plan):
+        yield MutatorError("not the plan", where=run / CSV, expected=f"what {plan_file.EXPERIMENTS} has")
+
+
+def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
+    """Every check has passed, and the golden runs are those that it was about."""
+    path = folder.path / CHECKS
+    if not path.exists():  # they have not run yet
+        return
+    checks = read_json(path, CHECKS_SCHEMA)
+    for result in checks["results"]:
+        if not result["passed"]:
+            yield MutatorError(f"check `{result['name']}` failed: {result['detail']}", where=path)
+    old = [manifest.trace_file, manifest.record_file] if manifest else []
+    for name, found in golden_digests(folder, folder.head.get("golden_files", old)).items():
+        if checks["goldens"].get(name) != found:
+            known = str(checks["goldens"].get(name))
+            got = f"golden run {name} with digest {found[:16]}"
+            yield MutatorError(got, where=folder.path / "golden" / name, expected=known[:16])
+
+
+def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
+    """Target, manifest, templates and scenarios are those that the run was planned with."""
+    where, head = folder.path / HEAD, folder.head
+    if workspace is None:
+        yield MutatorError(
+            "no library here",
+            where=where,
+            expected="the sources of the run: trees and patches were not compared",
+        )
+        return
+    manifest = workspace.manifest(head["target"])
+    now = sources(workspace, manifest, {scenario for scenario, _ in head["goldens"]})
+    for name, known in head["sources"].items():
+        if now.get(name) != known:
+            yield MutatorError(
+                f"{name} {known[:16]}",
+                where=where,
+                expected=f"{str(now.get(name))[:16]}, as it is here",
+                remedy="verify with the sources of the run: without them no tree or patch was compared",
+            )
+    for path, known in head.get("target_files", {}).items():
+        if (found := manifest.tree.digests.get(path)) != known:
+            yield MutatorError(
+                f"{path} {known[:16]}", where=where, expected=f"{str(found)[:16]}, as it is here"
+            )

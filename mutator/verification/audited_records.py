@@ -1,0 +1,187 @@
+"""What an audit finds out of records: do trees, patches and verdicts follow from what else is known?"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common.hashing import digest
+from mutator.engines.jobs import RunMode
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Activation, Fault, Record, Status, Trigger
+from mutator.mutants.building import InvalidMutant, build
+from mutator.outcomes.verdicts import Events, judge
+from mutator.store import plan_file
+from mutator.store.lines import read_segment
+from mutator.store.records import record_from
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.verification import equivalence
+
+_DIGEST = 64  # hex digits
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A record and where it is stored."""
+
+    path: Path
+    line: int
+    record: Record
+
+    def difference(self, got: str, expected: str) -> MutatorError:
+        """Something that does not follow."""
+        name = self.record.experiment_id
+        return MutatorError(f"{name}: {got}", where=self.path, line=self.line, expected=expected)
+
+
+def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
+    """The records of one kind that can be read, harness errors left out."""
+    found = []
+    for path in sorted((folder.path / kind).glob("*.jsonl")):
+        segment = read_segment(path, checksums=folder.verifiable)
+        for number in segment.lines:
+            try:
+                record = record_from(segment.content(number))
+            except (
+                MutatorError,
+                KeyError,
+                TypeError,
+                ValueError,
+            ):  # a head, or damage that is told elsewhere
+                continue
+            if record.status is not Status.HARNESS_ERROR:
+                found.append(Recorded(path, number, record))
+    return found
+
+
+def mutants(
+    folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
+) -> Iterator[MutatorError]:
+    """Trees and patches that are not those of the mutants, which are built for it; stored patches that are
+    missing, others, or nobody's."""
+    experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
+    built: dict[tuple[str, Trigger], tuple[str, str]] = {}
+    for one in records:
+        if (experiment := experiments.get(one.record.experiment_id)) is None:
+            continue
+        key = (experiment.fault.id, experiment.trigger)
+        if key not in built:
+            built[key] = _built(manifest, models, experiment.fault, experiment.trigger)
+        tree, patch = built[key]
+        if one.record.tree != tree:
+            yield one.difference(f"tree {one.record.tree[:16] or 'none'}", tree[:16] or "none")
+        if folder.verifiable and one.record.patch != patch:
+            yield one.difference(f"patch {one.record.patch[:16] or 'none'}", patch[:16] or "none")
+        stored = folder.patch(one.record.experiment_id)
+        found = digest(stored.read_bytes()) if stored.is_file() else ""
+        if found != patch:
+            got = f"a patch with SHA-256 {found[:16]}" if found else "missing"
+            yield MutatorError(got, where=stored, expected=f"that of the mutant, {patch[:16] or 'none'}")
+    known = {one.record.experiment_id for one in records}
+    for stored in sorted((folder.path / "patches").rglob("*.patch")):
+        if folder.verifiable and folder.finished and stored.stem not in known:
+            yield MutatorError("a patch of no experiment", where=stored, expected="one of each that ran")
+
+
+def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:
+    """Digests of tree and patch of a mutant; empty for one that cannot be made."""
+    try:
+        mutant = build(manifest, models, fault, trigger)
+    except InvalidMutant:
+        return "", ""
+    return mutant.tree_digest, digest(mutant.patch_bytes)
+
+
+def verdicts(
+    head: Mapping[str, Any], records: Sequence[Recorded], manifest: TargetManifest | None
+) -> Iterator[MutatorError]:
+    """Fields of records that contradict each other."""
+    tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
+    for one in records:
+        flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
+        for got, expected in (*flaws, *_flaws_of_names(one.record, head, tolerances)):
+            yield one.difference(got, expected)
+
+
+Flaws = Iterator[tuple[str, str]]  # what was found, what would follow
+
+
+def _flaws_of_end(record: Record) -> Flaws:
+    """Of a run that ended well."""
+    activation = record.activation
+    follows = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
+    if record.outcome != follows:
+        yield f"outcome {record.outcome}", f"{follows}, which follows from its times"
+    if record.t_manifest is not None and (activation is None or record.t_manifest < activation.first):
+        yield f"manifested at {record.t_manifest} s", "a time at or after the activation"
+    for what, events in (("hazards", record.hazards), ("alerts", record.alerts)):
+        if not _in_order(events, activation):
+            yield f"{what} {events}", "each once, in order, at or after the activation"
+    if activation and not (activation.first <= activation.last and activation.count > 0):
+        yield f"active from {activation.first} to {activation.last} s", "a first time, then a last one"
+    if len(record.trace_digest) != _DIGEST:
+        yield f"trace digest '{record.trace_digest}'", "that of the recorded trace"
+
+
+def _flaws_of_bad_end(record: Record) -> Flaws:
+    """Of a run that has no outcome."""
+    told = {
+        "outcome": record.outcome,
+        "t_manifest": record.t_manifest,
+        "max_dev": record.max_dev,
+        "hazards": record.hazards,
+        "alerts": record.alerts,
+        "trace_digest": record.trace_digest,
+    }
+    for name, value in told.items():
+        if value:
+            yield f"{name} {value}", f"none, as it ended as {record.status.value}"
+
+
+def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
+    """Hazards and channels are those of the target, and differences beyond the tolerance are manifested."""
+    strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
+    if strangers:
+        yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
+    channels = [name for name, _ in record.max_dev]
+    if record.status is Status.OK and channels != list(head["compared"]):
+        yield f"differences of {', '.join(channels)}", f"those of {', '.join(head['compared'])}"
+    beyond = [name for name, value in record.max_dev if value > tolerances.get(name, float("inf"))]
+    if beyond and record.t_manifest is None:
+        yield f"{beyond[0]} differs, and was not manifested", "the time of the first difference"
+
+
+def _in_order(events: Events, activation: Activation | None) -> bool:
+    """Whether events are as a record has them."""
+    if activation is None:
+        return not events
+    times = [time for _, time in events]
+    once = len({name for name, _ in events}) == len(events)
+    return once and times == sorted(times) and all(time >= activation.first for time in times)
+
+
+def proof(
+    folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
+) -> Iterator[MutatorError]:
+    """Records of the proof that are others than the run's or not of its sample, and missing ones."""
+    place = folder.path / equivalence.FOLDER
+    if not place.is_dir():
+        modes = {str(line.get("engine")) for line in folder.timings().values()}
+        if forked := sorted(modes & {RunMode.FORK.value, RunMode.WARM.value}):
+            yield MutatorError("missing", where=place, expected=f"a proof of the engine `{forked[0]}`")
+        return
+    known = {one.record.experiment_id: one.record for one in records}
+    sampled = set(equivalence.sampled(folder))
+    for one in proven:
+        record = known.get(one.record.experiment_id)
+        if record is not None and record != one.record:
+            yield one.difference(equivalence.difference(one.record, record), "what the run recorded")
+        if one.record.experiment_id not in sampled:
+            yield one.difference("in the proof", "the sample that follows from the plan")
+    missing = sorted(sampled - {one.record.experiment_id for one in proven})
+    if folder.verifiable and folder.finished and missing:
+        yield MutatorError(
+            f"no record of {missing[0]}", where=place, expected="one of each sampled experiment"
+        )

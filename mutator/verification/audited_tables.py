@@ -1,0 +1,53 @@
+"""Do the tables that are stored follow from plan, records and timings? They are made again to be compared."""
+
+import io
+from collections.abc import Iterator
+from itertools import zip_longest
+from pathlib import Path
+
+from mutator.errors import MutatorError
+from mutator.outcomes import results
+from mutator.store.run_folder import RunFolder
+
+_REMEDY = "`mutator report` makes it anew"
+
+
+def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
+    """How many tables are there, and where they differ. A missing one is made when it is needed."""
+    names = (results.CSV, results.PARQUET, results.TIMINGS_PARQUET)
+    there = [name for name in names if (folder.path / name).is_file()]
+    return len(there), _differences(folder, there)
+
+
+def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
+    if not there:
+        return
+    made = results.tables(folder)
+    for name in there:
+        path = folder.path / name
+        if name == results.CSV:
+            yield from _cells(path, made[name])
+        elif not _same_content(path, made[name]):
+            yield MutatorError("not what the records give", where=path, remedy=_REMEDY)
+
+
+def _cells(path: Path, made: bytes) -> Iterator[MutatorError]:
+    """The lines that differ, each by its first cell that does."""
+    found, wanted = (data.decode("utf-8", "replace").split("\n") for data in (path.read_bytes(), made))
+    for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
+        if got == expected:
+            continue
+        cells = zip_longest((got or "").split(","), (expected or "").split(","), fillvalue="nothing")
+        one, other = next(pair for pair in cells if pair[0] != pair[1])
+        yield MutatorError(f"'{one}'", where=path, line=number, expected=f"'{other}'", remedy=_REMEDY)
+
+
+def _same_content(path: Path, made: bytes) -> bool:
+    """Whether a Parquet file has the rows of one that was made now, maybe by another version of pyarrow."""
+    import pyarrow as pa  # type: ignore[import-untyped]
+    from pyarrow import parquet
+
+    try:
+        return bool(parquet.read_table(path).equals(parquet.read_table(io.BytesIO(made))))
+    except (pa.ArrowException, OSError):
+        return False

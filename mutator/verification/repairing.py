@@ -1,0 +1,184 @@
+"""Puts aside what is damaged in a run folder, so that the same `run` fills the gap.
+
+Of a segment the intact lines stay. What nothing can make again (run.json, campaign.yaml, the plan) is left as
+it is: only a copy of the folder has it.
+"""
+
+import shutil
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import make_folder, raising_disk_full, write_atomic
+from mutator._common.locks import owned
+from mutator._common.text import counted
+from mutator.campaigns.plans import CSV, load_plan, plan_csv
+from mutator.errors import MutatorError
+from mutator.model import Status
+from mutator.store import digests, integrity
+from mutator.store.digests import Digest, Ledger
+from mutator.store.lines import Segment, read_segment, written
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.verification.audited_records import recorded
+
+ASIDE = "damaged"  # folder of what was put aside
+SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
+_Change = tuple[str, bytes | None, str]  # a file, what it becomes (None: it goes), and that in words
+
+
+def repair(folder: RunFolder) -> list[str]:
+    """Put damaged files, lines and patches of a run folder into `damaged/`; what was done, a sentence each.
+
+    MutatorError while a command works in the folder, for one of an earlier schema, and for a damaged plan.
+    """
+    if not folder.verifiable:
+        raise MutatorError(
+            f"{folder.head['schema']} has no checksums",
+            where=folder.path,
+            expected="a run of this version",
+            remedy="take the damaged file from a copy of the run folder",
+        )
+    with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
+        renewed = list(_renewed_ledger(folder))
+        ledger = digests.settled(folder.path)
+        lost = _lost_patches(folder)
+        changes = [*_files(folder, ledger), *_segments(folder, ledger, lost)]
+        for name in [name for name, *_ in changes] + [_patch(folder, one) for one in lost]:
+            _put_aside(folder.path, name)
+        _carry_out(folder.path, changes, ledger)
+    return [*renewed, *(said for *_, said in changes), *(f"patch of {one} put aside" for one in lost)]
+
+
+def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
+    """A ledger of the files as they are, where the ledger itself is damaged."""
+    run = folder.path
+    try:
+        digests.read(run)
+    except MutatorError:
+        inside = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
+        paths = [*(run / name for name in integrity.TOP), *inside]
+        found = {path.relative_to(run).as_posix(): Digest.of_file(path) for path in paths}
+        _put_aside(run, digests.FILE)
+        digests.write(run, Ledger(files={name: one for name, one in found.items() if one}))
+        yield f"{digests.FILE} made anew of the files as they are: only a seal known before vouches for them"
+
+
+def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
+    """Files that can be made again, and those that do not belong here."""
+    run = folder.path
+    for name, known in ledger.files.items():
+        if known.lines is not None or name in integrity.WHOLE or known.is_of(Digest.of_file(run / name)):
+            continue
+        if name == CSV and known.is_of(Digest.of(data := plan_csv(load_plan(folder)))):
+            yield name, data, f"{name} made anew from the plan"
+        else:
+            yield name, None, f"{name} put aside: `mutator run` makes it again"
+    if ledger.finished:
+        for path in integrity.strangers(run, ledger):
+            name = path.relative_to(run).as_posix()
+            yield name, None, f"{name} put aside: the finished run had no such file"
+
+
+def _lost_patches(folder: RunFolder) -> list[str]:
+    """Experiments whose stored patch is not the one that their record names."""
+    lost = []
+    for one in recorded(folder, "records"):
+        try:
+            folder.read_patch(one.record.experiment_id, one.record)
+        except MutatorError:
+            lost.append(one.record.experiment_id)
+    return lost
+
+
+def _patch(folder: RunFolder, experiment_id: str) -> str:
+    return folder.patch(experiment_id).relative_to(folder.path).as_posix()
+
+
+def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:
+    """Segments with lines that do not count: what stays of them."""
+    run, planned = folder.path, folder.share()
+    strangers = set(integrity.strangers(run, ledger)) if ledger.finished else set()
+    for kind, schema in SCHEMAS.items():
+        done: set[str] = set()
+        for path in sorted({*(run / kind).glob("*.jsonl")} - strangers):
+            name, data = path.relative_to(run).as_posix(), path.read_bytes()
+            segment, known = read_segment(path, data), ledger.files.get(name)
+            dropped = lost if kind == "records" else ()
+            kept = list(_kept(_trusted(segment, known, data), planned, dropped, done))
+            gone = max(0, data.count(b"\n") - 1 - len(kept))
+            if gone or segment.damaged or not _in_place(segment, schema, known, data):
+                head = {"schema": schema, "plan": folder.head["plan"]}
+                said = f"{name}: {counted(gone, 'line')} put aside, {len(kept)} kept"
+                yield name, written(path, head, kept), said
+    for name, known in ledger.files.items():
+        if known.lines is not None and not (run / name).is_file():
+            yield name, None, f"{name} is gone"
+
+
+def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) -> bool:
+    """Whether a segment is where it was written, and what it was when it was closed."""
+    try:
+        segment.check_head(schema)
+    except MutatorError:
+        return False
+    return known is None or known.is_of(Digest.of(data))
+
+
+def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[str, Any]]:
+    """The content of the lines after the head that are as they were written.
+
+    Where every checksum fits although the file is not the one that was closed, somebody has computed them
+    anew: only a file that was cut, or added to, has lines to be believed.
+    """
+    numbers = list(segment.lines)
+    whole = segment.damaged or known is None or known.is_of(Digest.of(data))
+    if not whole and known is not None and known.lines is not None and len(numbers) >= known.lines:
+        numbers = numbers[: known.lines]
+        first = b"".join(segment.lines[number] + b"\n" for number in numbers)
+        numbers = numbers if known.is_of(Digest.of(first)) else []
+    return [segment.content(number) for number in numbers if number > 1]
+
+
+def _kept(
+    lines: list[dict[str, Any]], planned: Collection[str], lost: Collection[str], done: set[str]
+) -> Iterator[dict[str, Any]]:
+    """Lines of planned experiments, one final record of each; `done` is what the lines before them had."""
+    for line in lines:
+        name = str(line.get("experiment_id"))
+        final = line.get("status") not in (None, Status.HARNESS_ERROR.value)
+        if name in planned and name not in lost and not (final and name in done):
+            yield line
+            if final:
+                done.add(name)
+
+
+def _put_aside(run: Path, name: str) -> None:
+    """Copy a file to where it harms nobody, under a name that is free."""
+    if not (run / name).is_file():
+        return
+    place = run / ASIDE / name
+    make_folder(place.parent)
+    number = 1
+    while place.exists():
+        number += 1
+        place = (run / ASIDE / name).with_name(f"{Path(name).name}.{number}")
+    shutil.copy2(run / name, place)
+
+
+def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
+    """Make the changes. The run is finished no more, unless only plan.csv was made anew."""
+    coming = {
+        name: None
+        if data is None
+        else Digest.of(data, data.count(b"\n") if name.endswith(".jsonl") else None)
+        for name, data, _ in changes
+        if not name.startswith("timings/")
+    }
+    with digests.rewriting(run, coming):
+        for name, data, _ in changes:
+            if data is None:
+                (run / name).unlink(missing_ok=True)
+            else:
+                write_atomic(run / name, data)
+    digests.close_segments(run, finished=ledger.finished and {*coming} <= {CSV})

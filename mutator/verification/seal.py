@@ -1,0 +1,72 @@
+"""The seal of a finished run: one digest of everything that counts, whoever computed it on how many machines.
+
+It is a function of content alone: of the plan and the sources, of the versions of Python and packages, of the
+checks and golden runs, and of each record with its patch. Costs, hosts, processors and the git commit are not
+in it, nor is how the work was cut into sessions, workers and shards.
+"""
+
+from collections.abc import Sequence
+
+from mutator._common.files import read_json
+from mutator._common.hashing import canonical, digest
+from mutator.model import Status
+from mutator.store import digests
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.lines import read_segment
+from mutator.store.run_folder import RunFolder, golden_key
+
+SCHEMA = "seal/1"
+
+
+def seal(folder: RunFolder) -> str | None:
+    """The seal of a run folder, computed from what it holds: 64 hex digits. None for a run that is not
+    finished, or not verifiable."""
+    if not folder.finished:
+        return None
+    head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
+    facts = {key: head[key] for key in ("plan", "campaign_digest", "sources")}
+    facts |= {
+        "checks": checks["results"],
+        "goldens": golden_digests(folder, head["golden_files"]),
+        "versions": _versions(folder),
+    }
+    return digest([SCHEMA, facts, *(_records(folder, kind) for kind in digests.SEGMENTS)])
+
+
+def seal_or_why_not(folder: RunFolder) -> str:
+    """The seal, or in a few words why there is none."""
+    none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
+    return seal(folder) or f"none: {none}"
+
+
+def not_verifiable(folder: RunFolder) -> str:
+    """What is said of a run folder of an earlier schema."""
+    return f"not verifiable, as {folder.head['schema']} has no digests"
+
+
+def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
+    """Digest of the files called `names`, trace and record, of each golden run."""
+    found = {}
+    for scenario, changes in folder.head["goldens"]:
+        place = folder.golden(scenario, tuple(changes))
+        files = [digest((place / name).read_bytes()) for name in names]
+        found[golden_key(scenario, changes)] = digest(files)
+    return found
+
+
+def _versions(folder: RunFolder) -> list[str]:
+    """Each set of versions that computed anything, once, as canonical text."""
+    return sorted({canonical([one.python, one.packages]) for one in folder.stretches})
+
+
+def _records(folder: RunFolder, kind: str) -> dict[str, str]:
+    """Digest of each record that counts, by experiment id: of its line, without the checksum."""
+    found = {}
+    for path in sorted((folder.path / kind).glob("*.jsonl")):
+        segment = read_segment(path)
+        for number in segment.lines:
+            data = segment.content(number)
+            if number > 1 and data["status"] != Status.HARNESS_ERROR.value:
+                found[str(data["experiment_id"])] = digest(segment.body(number))
+    return found

@@ -1,0 +1,245 @@
+"""Opening a run folder: whatever is not as it was written is told with its file, and nothing else is."""
+
+import json
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Status
+from mutator.store import digests, integrity, plan_file
+from mutator.store.digests import Digest
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+Write = Callable[..., Path]
+Make = Callable[..., object]
+
+
+@pytest.fixture(scope="module")
+def made(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
+) -> Path:
+    """A finished run with golden runs, checks and a proof, all made up."""
+    place = tmp_path_factory.mktemp("made")
+    run = write_run(copy_toycar(place), place / "run")
+    (run / "proof").mkdir()
+    head, *lines = (json.loads(line) for line in (run / "records" / "0001-a.jsonl").open())
+    writer = LineWriter(run / "proof" / "0001-a.jsonl", {k: v for k, v in head.items() if k != "sum"})
+    for line in lines[:3]:
+        writer.append({k: v for k, v in line.items() if k != "sum"})
+    writer.close()
+    new = {
+        "checks.json": b'{"schema": "checks/1"}',
+        "golden/A/log.npz": b"steps",
+        "golden/A/said.json": b"{}",
+    }
+    with digests.rewriting(run, {name: Digest.of(data) for name, data in new.items()}):
+        (run / "golden" / "A").mkdir(parents=True)
+        for name, data in new.items():
+            (run / name).write_bytes(data)
+    digests.close_segments(run, finished=True)
+    return run
+
+
+@pytest.fixture
+def run(made: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(made, tmp_path / "run")
+
+
+def problem(run: Path) -> MutatorError:
+    with pytest.raises(MutatorError) as caught:
+        RunFolder.open(run)
+    return caught.value
+
+
+SEALED = (
+    "run.json",
+    "campaign.yaml",
+    "plan.csv",
+    "checks.json",
+    "digests.json",
+    *(plan_file.EXPERIMENTS, plan_file.FAULTS),
+    *("golden/A/log.npz", "golden/A/said.json"),
+    *("records/0001-a.jsonl", "proof/0001-a.jsonl"),
+)
+
+
+def test_what_is_sealed_is_all_of_it(run: Path) -> None:
+    """The folder opens, and has no file that the tests below leave out."""
+    folder = RunFolder.open(run)
+    assert folder.verifiable and folder.finished and folder.problems() == []
+    found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
+    assert found == {*SEALED, "owner.lock"}
+
+
+@pytest.mark.parametrize("name", SEALED)
+def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
+    """Flipped bits, lost and added ends, zeroed bytes, an empty and a missing file."""
+    path = run / name
+    data, draw = path.read_bytes(), random.Random(name)
+    damaged = [data + b"\n", data + data, b"", data[: draw.randrange(len(data))]]
+    for _ in range(20):
+        place = draw.randrange(len(data))
+        damaged.append(data[:place] + bytes([data[place] ^ 1 << draw.randrange(8)]) + data[place + 1 :])
+    damaged += [data[:place] + bytes(len(data) - place) for place in (0, len(data) // 2)]
+    for content in damaged:
+        path.write_bytes(content)
+        assert problem(run).where == str(path)
+    path.unlink()
+    assert "no run folder" in str(problem(run)) if name == "run.json" else problem(run).where == str(path)
+
+
+@pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS, plan_file.FAULTS])
+def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
+    """One digit in the middle of a long file is found by whoever is to look at it."""
+    path = run / name
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[2] = lines[2].replace(b"0", b"1", 1)
+    path.write_bytes(b"".join(lines))
+    assert (problem(run).where, problem(run).line) == (str(path), 3)
+
+
+def test_lost_lines_are_counted(run: Path) -> None:
+    """A segment that ends too early, at a line's end, says how many lines it has and had."""
+    path = run / "records" / "0001-a.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-2]))
+    assert f"{len(lines) - 2} lines, all with their checksums; expected {len(lines)} lines" in str(
+        problem(run)
+    )
+
+
+@pytest.mark.parametrize("name", ["records/0002-a.jsonl", "proof/x.jsonl", "golden/A/more", "plan/old"])
+def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
+    """Nothing joins a run that is finished."""
+    (run / name).write_bytes(b"")
+    assert str(problem(run)).startswith(f"{run / name}: not named in digests.json")
+
+
+@pytest.mark.parametrize(
+    "name", ["timings/x.jsonl", "traces/a", "plots/a.svg", "report/index.html", "notes.txt"]
+)
+def test_what_is_outside_the_seal_is_left_alone(run: Path, name: str) -> None:
+    """Costs, pictures, reports and what people put beside them do not make a folder wrong."""
+    (run / name).parent.mkdir(exist_ok=True)
+    (run / name).write_text("anything")
+    assert RunFolder.open(run).finished
+
+
+def test_swapped_files_are_told(run: Path) -> None:
+    """Two files that took each other's place are no longer what they were."""
+    a, b = run / "golden" / "A" / "log.npz", run / "golden" / "A" / "said.json"
+    content = a.read_bytes()
+    a.write_bytes(b.read_bytes())
+    b.write_bytes(content)
+    assert {error.where for error in RunFolder.unverified(run).problems()} == {str(a), str(b)}
+
+
+def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
+    """The run as a killed session left it: `lines` are in a segment that nobody has closed."""
+    digests.close_segments(run, finished=False)
+    head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head["plan"]}
+    writer = LineWriter(run / "records" / "0002-a.jsonl", head)
+    for line in lines:
+        writer.append(line)
+    writer.close()
+    return writer.path
+
+
+def test_a_segment_that_a_kill_left_is_read(run: Path) -> None:
+    """Its whole lines count, a torn last one does not, and a damaged one is told."""
+    again = {"experiment_id": next(plan_file.ids(run)), "status": "harness_error"}
+    path = unsealed(run, again, again)
+    path.write_bytes(path.read_bytes() + b'{"sum"')
+    assert RunFolder.open(run).problems() == []
+    path.write_bytes(path.read_bytes().replace(b"harness", b"hardest", 1))
+    assert (problem(run).where, problem(run).line) == (str(path), 2)
+
+
+def test_records_of_another_plan_are_told(run: Path) -> None:
+    """A segment of another run folder is no part of this one, whatever its name."""
+    path = unsealed(run, plan="0" * 64)
+    assert str(problem(run)).startswith(f"{path}:1: records of plan 0000000000000000")
+
+
+def test_a_record_of_nothing_planned_is_told(run: Path) -> None:
+    """There are not 25 of 24 experiments done."""
+    path = unsealed(run, {"experiment_id": "0" * 16, "status": "ok"})
+    assert str(problem(run)).startswith(f"{path}:2: a record of {'0' * 16}, which is not planned")
+
+
+def test_a_second_record_is_told(run: Path) -> None:
+    """An experiment has one final record; a harness error beside it does not count."""
+    lines = (run / "records" / "0001-a.jsonl").read_text().splitlines()
+    one = {k: v for k, v in json.loads(lines[1]).items() if k != "sum"}
+    path = unsealed(run, one | {"status": Status.HARNESS_ERROR.value}, one)
+    assert str(problem(run)).startswith(f"{path}:3: a second record of experiment {one['experiment_id']}")
+
+
+def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path], None]) -> None:
+    """Who drops a record, and computes all digests anew, is still told which is missing."""
+    path = run / "records" / "0001-a.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:4], *lines[5:]]))
+    reseal(run)
+    assert f"no record of {json.loads(lines[4])['experiment_id']}" in str(problem(run))
+
+
+def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable[[Path], None]) -> None:
+    """So is one with more or fewer experiments than its chunks."""
+    path = run / plan_file.EXPERIMENTS
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:-1], lines[0]]))
+    reseal(run)
+    assert f"{path}:24: experiment {json.loads(lines[0])['id']} a second time" in str(problem(run))
+    path.write_text("".join(lines[:-1]))
+    reseal(run)
+    assert f"{path}: 23 experiments; expected 24" in str(problem(run))
+
+
+def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
+    """Who calls it one of before there were digests is told, with the ledger or without."""
+    head = run / "run.json"
+    head.write_text(head.read_text().replace('"run/2"', '"run/1"'))
+    assert "run/1 in a folder with digests.json" in str(problem(run))
+    (run / digests.FILE).unlink()
+    folder = RunFolder.unverified(run)
+    assert not folder.verifiable
+    with pytest.raises(MutatorError, match="schema 'records/2' in a run folder of another"):
+        folder.records()
+
+
+def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who opens a folder while its owner rewrites a file sees the old or the new one, never damage."""
+    real, seen = integrity.problems, []
+
+    def look(*arguments: object) -> list[MutatorError]:
+        found = list(real(*arguments))  # type: ignore[arg-type]
+        if not seen:
+            seen.append("the owner was faster")
+            digests.rewrite(run, "plan.csv", b"other")
+            return [MutatorError("plan.csv changed")]
+        return found
+
+    monkeypatch.setattr(integrity, "problems", look)
+    assert RunFolder.open(run).verifiable
+
+
+@pytest.mark.parametrize("key", ["limits", "goldens", "chunks", "sources", "choices", "provenance", "plan"])
+def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> None:
+    """Nothing verifies the run.json of an older version; what cannot be is told all the same."""
+    data = json.loads((run / "run.json").read_text()) | {"schema": "run/1"}
+    (run / digests.FILE).unlink()
+    for value in (3, [3], [[3]], {"a": [None]}):
+        (run / "run.json").write_text(json.dumps(data | {key: value}))
+        assert f"run.json: damaged at '{key}'" in str(problem(run))
+    del data[key]
+    (run / "run.json").write_text(json.dumps(data))
+    with pytest.raises(MutatorError, match=rf"run\.json: no '{key}'"):
+        _ = RunFolder.unverified(run).head[key]

@@ -1,0 +1,154 @@
+"""Checksummed lines: nothing that was written is lost, nothing that was not is believed."""
+
+import errno
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator._common.files import DiskFull
+from mutator.errors import MutatorError
+from mutator.store.lines import LineWriter, Segment, read_segment
+
+SCHEMA = "records/2"
+HEAD = {"schema": SCHEMA, "plan": "p"}
+
+
+def write(path: Path, *values: object) -> Path:
+    writer = LineWriter(path, HEAD)
+    for value in values:
+        writer.append({"value": value})
+    writer.close()
+    return path
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file of a head and six lines."""
+    return write(tmp_path / "records" / "0001-gw0.jsonl", *range(6))
+
+
+def values(segment: Segment) -> list[object]:
+    return [line["value"] for _, line in segment.objects(SCHEMA)]
+
+
+def test_lines_come_back_as_they_were(tmp_path: Path) -> None:
+    """Any JSON value is read as it was appended, each with the number of its line."""
+    given = [1.5, float("inf"), None, 'ü\n"sum"', {"sum": "0" * 16}, [[], {}]]
+    segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
+    assert values(segment) == given
+    assert [number for number, _ in segment.objects(SCHEMA)] == [2, 3, 4, 5, 6, 7]
+    assert (segment.damaged, segment.end) == ((), segment.path.stat().st_size)
+
+
+def test_every_line_is_json_that_begins_with_its_checksum(path: Path) -> None:
+    """Other programs read the file without knowing of checksums."""
+    for line in path.read_text().splitlines():
+        assert next(iter(json.loads(line))) == "sum" and len(json.loads(line)["sum"]) == 16
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_every_flipped_bit_is_found_at_its_line(path: Path, bit: int) -> None:
+    """Whichever bit of a file is flipped, its line is named; at the file's end it may be taken for torn."""
+    data = path.read_bytes()
+    for place in range(len(data)):
+        path.write_bytes(data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :])
+        line = data[:place].count(b"\n") + 1
+        segment = read_segment(path)
+        if place == len(data) - 1:
+            assert (values(segment), segment.end < len(data)) == ([0, 1, 2, 3, 4], True)
+        else:
+            assert segment.damaged[0] == line
+
+
+CHANGES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], tuple[int, ...]]] = {
+    "dropped": (lambda x: [*x[:2], *x[3:]], (3,)),
+    "doubled": (lambda x: [*x[:3], *x[2:]], (4,)),
+    "swapped": (lambda x: [*x[:2], x[3], x[2], *x[4:]], (3, 4, 5)),
+    "emptied": (lambda x: [*x[:2], b"\n", *x[3:]], (3, 4)),
+    "zeroed": (lambda x: [*x[:2], b"\0" * len(x[2]), *x[3:]], (3, 4)),
+    "without head": (lambda x: x[1:], (1,)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_lines_that_are_not_where_they_were_are_found(path: Path, change: str) -> None:
+    """Only lines at the place of the damage are lost: those after it still verify."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    make, damaged = CHANGES[change]
+    path.write_bytes(b"".join(make(lines)))
+    segment = read_segment(path)
+    assert segment.damaged == damaged
+    with pytest.raises(MutatorError, match=rf"0001-gw0\.jsonl:{damaged[0]}: a damaged line; .* --repair"):
+        values(segment)
+
+
+@pytest.mark.parametrize("keep", [1, 20, -1, -2])
+def test_a_torn_last_line_is_no_damage(path: Path, keep: int) -> None:
+    """Whatever part of the last line a kill left: the lines before it count, it does not."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
+    segment = read_segment(path)
+    assert values(segment) == [0, 1, 2, 3, 4] and segment.end == len(b"".join(lines[:-1]))
+
+
+def test_a_file_in_another_place_is_found(path: Path) -> None:
+    """A file says what it was written as: one that was renamed, or swapped with another, is told."""
+    moved = path.rename(path.with_name("0002-gw0.jsonl"))
+    with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:1: was written as records/0001-gw0\.jsonl"):
+        values(read_segment(moved))
+
+
+@pytest.mark.parametrize("written", [0, 20])
+def test_a_line_that_does_not_fit_is_taken_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
+) -> None:
+    """A disk that fills up in the middle of a line loses that line only, and says so."""
+    writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
+    writer.append({"value": 1})
+    real, calls = os.write, []
+
+    def full(fd: int, data: bytes) -> int:
+        calls.append(len(data))
+        if written and len(calls) == 1:
+            return real(fd, data[:written])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", full)
+        with pytest.raises(DiskFull):
+            writer.append({"value": 2})
+    writer.append({"value": 3})
+    writer.close()
+    assert values(read_segment(writer.path)) == [1, 3]
+
+
+def test_a_full_disk_on_sync_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """File systems that allocate late say it at the sync; the record is still there to be read."""
+    writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
+    writer.append({"value": 1})
+
+    def full(fd: int) -> None:
+        raise OSError(errno.EDQUOT, "Quota exceeded")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(DiskFull):
+        writer.close()
+    assert values(read_segment(writer.path)) == [1]
+
+
+def test_records_are_synced_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """100 records cost a few syncs, not 100."""
+    synced = []
+    monkeypatch.setattr(os, "fsync", synced.append)
+    write(tmp_path / "a.jsonl", *range(100))
+    assert 3 <= len(synced) <= 6
+
+
+def test_a_file_is_never_shared(tmp_path: Path) -> None:
+    """Two writers cannot have the same file."""
+    LineWriter(tmp_path / "a.jsonl", HEAD).close()
+    with pytest.raises(FileExistsError):
+        LineWriter(tmp_path / "a.jsonl", HEAD)
