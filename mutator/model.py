@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from mutator._common.hashing import added_values, content_id
+from mutator._common.hashing import added, added_values, content_id
 
 Value = int | float | str | bool | None
 
@@ -188,13 +188,14 @@ class Experiment:
 class Limits:
     """What one run may use before it is stopped.
 
-    Seconds of CPU and of wall time, MiB of address space, observed simulation steps.
+    Seconds of CPU and of wall time, MiB of address space, observed simulation steps, MiB that it writes.
     """
 
     cpu_s: int = 60
     wall_s: int = 300
     memory_mb: int = 4096
     steps: int = 20_000
+    disk_mb: int = added(1024)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ import fcntl
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full
@@ -35,7 +35,12 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
             os.ftruncate(fd, 0)
             os.write(fd, f"{os.getpid()}\n".encode())
         _wait_for_workers(run, patience_s)
-        yield
+        try:
+            yield
+        finally:
+            living_workers(run)
+            with suppress(OSError):  # some are still ending, or there were none
+                (run / WORKERS).rmdir()
     finally:
         os.close(fd)
 
@@ -54,7 +59,10 @@ def living_workers(run: Path) -> list[int]:
     """Process ids of the workers in `run`; entries of dead workers are removed."""
     living = []
     for path in sorted((run / WORKERS).glob("[0-9]*")):
-        fd = os.open(path, os.O_RDWR)
+        try:
+            fd = os.open(path, os.O_RDWR)
+        except FileNotFoundError:  # another looked, too
+            continue
         try:
             if _try_lock(fd):
                 path.unlink(missing_ok=True)
