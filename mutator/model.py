@@ -188,13 +188,14 @@ class Experiment:
 class Limits:
     """What one run may use before it is stopped.
 
-    Seconds of CPU and of wall time, MiB of address space, observed simulation steps.
+    Seconds of CPU and of wall time, MiB of address space, observed simulation steps, MiB that it writes.
     """
 
     cpu_s: int = 60
     wall_s: int = 300
     memory_mb: int = 4096
     steps: int = 20_000
+    disk_mb: int = added(1024)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ import fcntl
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full
@@ -41,7 +41,12 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
                 expected="a folder without workers",
                 remedy="wait for them or end them, then give the same command again",
             )
-        yield
+        try:
+            yield
+        finally:
+            living_workers(run)
+            with suppress(OSError):  # some are still ending, or there were none
+                (run / WORKERS).rmdir()
     finally:
         os.close(fd)
 
@@ -60,7 +65,10 @@ def living_workers(run: Path) -> list[int]:
     """Process ids of the workers in `run`; entries of dead workers are removed."""
     living = []
     for path in sorted((run / WORKERS).glob("[0-9]*")):
-        fd = os.open(path, os.O_RDWR)
+        try:
+            fd = os.open(path, os.O_RDWR)
+        except FileNotFoundError:  # another looked, too
+            continue
         try:
             if _try_lock(fd):
                 path.unlink(missing_ok=True)

@@ -161,6 +161,11 @@ class _LimitsModel(StrictModel, title="Limits"):
     wall_s: int = Field(default=300, ge=1, description="Seconds of wall time.")
     memory_mb: int = Field(default=4096, ge=256, description="MiB of address space.")
     steps: int = Field(default=20_000, ge=1, description="Steps of simulation.")
+    disk_mb: int = Field(
+        default=1024,
+        ge=1,
+        description="MiB in its output folder and TMPDIR together, and in any single file that it writes.",
+    )
 
 
 class CampaignModel(StrictModel, title="The file"):

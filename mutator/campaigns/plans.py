@@ -307,7 +307,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "choices": asdict(plan.choices),
         "experiments": len(plan.experiments),
         "runs": plan.runs,
-        "limits": asdict(plan.campaign.limits),
+        "limits": plain(plan.campaign.limits),
         "hazards": list(manifest.hazards),
         "compared": [channel.name for channel in manifest.compared],
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],

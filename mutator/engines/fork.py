@@ -20,11 +20,11 @@ from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
 from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting
 from mutator.engines.jobs import Execution, Job, RunMode, Setting
 from mutator.engines.processes import (
+    PATIENCE_S,
     Ended,
     inactive,
     is_full,
-    judge_report,
-    judge_silent,
+    judge,
     read_report,
     tail,
     was_active,
@@ -37,7 +37,6 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import OBSERVED
 from mutator.triggers.kinds import always
 
-_MORE_S = 60.0  # beyond the wall limit of a run, until its process in the server must have answered
 _Key = tuple[str, int, tuple[str, ...]]
 
 
@@ -62,7 +61,7 @@ class ForkEngine:
         self._parent = parent
         self._null = null
         self._warm = warm
-        self._patience_s = limits.wall_s + _MORE_S
+        self._patience_s = limits.wall_s + PATIENCE_S
         self._pool: Pool | None = None
         self._pools = 0
         self._unfit = "" if manifest.stepwise else f"target {manifest.name} is not stepwise"
@@ -149,6 +148,7 @@ class ForkEngine:
             "args": self._arguments(job, self._running().home if watch else out),  # begun as waiting ones are
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
+            "disk_mb": self._limits.disk_mb,
             "steps": self._limits.steps,
             "probe_name": probe_module(self._manifest.package),
             "probe": swap.probe,
@@ -156,23 +156,23 @@ class ForkEngine:
             "probe_state": state_after(start.observed, start.began, start.t),
             "watch": OBSERVED if watch else (),
         }
-        asked = {"do": "mutant", "job": marshal.dumps(request), "wall_s": self._limits.wall_s}
+        limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
+        asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
         said, _ = waiting.ask(asked, self._patience_s)
         if said["threads"] != 1:
             raise Refused(f"it has {said['threads']} threads, and only one can be forked")
-        ended = Ended(
-            code=said["code"], cpu_s=said["cpu_s"], wall_s=said["wall_s"], out_of_wall=said["out_of_wall"]
-        )
+        if said["touched"]:
+            self.close()
+            raise Refused("it writes into its own tree")
+        ended = Ended(**{name: said[name] for name in Ended.__slots__})
         return replace(self._judged(job, folder, ended), start=start.step)
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
         """What came of a child; Refused where the reference engine is to say it."""
         report = read_report(folder / "report.json")
-        if report is None or ended.out_of_wall:
-            status, detail = judge_silent(self._limits, ended)
-        else:
+        if report is not None:
             self._check(job, report)
-            status, detail = judge_report(self._limits, report)
+        status, detail = judge(self._limits, ended, report)
         if status is not Status.OK and is_full(self._work, report):
             raise disk_full(self._work)
         if status is Status.CRASHED:
@@ -193,9 +193,6 @@ class ForkEngine:
         """Refused unless the child was the job's mutant and left the server as it was."""
         if report["ended"] == "swap refused":
             raise Refused(report["why"])
-        if report["touched"]:
-            self.close()
-            raise Refused("it writes into its own tree")
         if report["outside"]:
             raise Refused(f"the package was also imported from {', '.join(report['outside'])}")
         if report["threads"] != 1:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.hashing import digest
-from mutator.engines.processes import environment, raised_in
+from mutator.engines.processes import end, environment, raised_in
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
@@ -25,7 +25,6 @@ _MOST = 8  # waiting processes; each keeps some 20 MB of its own
 _NEAR = 100  # steps; a process so little behind is moved on rather than kept: it is soon made again
 _LOOK_UP_S = 0.5  # how often one who waits looks whether its own parent is still there
 _START_S = 120.0
-_END_S = 10.0
 
 
 class Lost(Exception):
@@ -119,7 +118,6 @@ class Pool:
         self._waiting: list[Waiting] = []
         shutil.copytree(base, self.tree)
         start = {
-            "parent": os.getpid(),
             "tree": str(self.tree),
             "home": str(home),
             "package": manifest.package,
@@ -158,6 +156,8 @@ class Pool:
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
         """A process that waits before `step` of a golden run, with these modules loaded."""
+        if self._process.poll() is not None:
+            raise Lost("the fork server is gone")
         mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
         if not mine:
             self.first.load(modules, patience_s)
@@ -197,11 +197,7 @@ class Pool:
         """End all of its processes."""
         for waiting in (self.first, *self._waiting):
             waiting.close()
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end(self._process)
         shutil.rmtree(self.home, ignore_errors=True)
 
 

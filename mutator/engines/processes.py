@@ -3,16 +3,19 @@
 import json
 import os
 import re
-import select
 import signal
-import time
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
 from mutator.model import Limits, Status
 
+LOST = "lost"  # nobody is left to say how it ended
+PATIENCE_S = 60.0  # beyond the wall limit of a run, until who guards it must have said how it ended
+_END_S = 10.0
 _REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
 _LOG_TAIL = 4000
 _LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
@@ -22,29 +25,44 @@ _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """How a child process ended: wait status, its CPU and wall time, and whether its engine killed it."""
+    """How a run's process ended: exit code (of a signal, its negative number), CPU and wall time, and why it
+    was stopped (WALL or DISK of `guard`, LOST, or "")."""
 
     code: int
     cpu_s: float
     wall_s: float
-    out_of_wall: bool
+    stopped: str
 
 
-def judge_silent(limits: Limits, ended: Ended) -> tuple[Status, str]:
-    """Status and detail of a run that was stopped, or that ended without a report."""
-    if ended.out_of_wall:
-        return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
-    if ended.code == -signal.SIGXCPU or (ended.code == -signal.SIGKILL and ended.cpu_s >= limits.cpu_s):
-        return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
-    if ended.code < 0 and -ended.code in _OUTSIDE_SIGNALS:
-        return Status.HARNESS_ERROR, f"killed from outside by {signal.Signals(-ended.code).name}"
+def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
+    """Status and detail of a run, of the right tree if it came to report how it ended."""
+    if stopped := _judge_stopped(limits, ended):
+        return stopped
+    if report is not None:
+        return _judge_report(limits, report)
     if ended.code < 0:
         return Status.CRASHED, f"killed by {signal.Signals(-ended.code).name}"
     return Status.CRASHED, f"left with status {ended.code} without a report"
 
 
-def judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
-    """Status and detail of a run of the right tree that reported how it ended."""
+def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
+    """Status and detail of a run that a limit or somebody else stopped, be it after its report."""
+    killed = signal.Signals(-ended.code) if ended.code < 0 else None
+    if ended.stopped == LOST:
+        return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ended.code})"
+    if ended.stopped == guard.WALL:
+        return Status.TIMEOUT, f"wall time limit of {limits.wall_s} s"
+    if ended.stopped == guard.DISK:
+        return Status.TIMEOUT, f"disk limit of {limits.disk_mb} MiB"
+    if killed is signal.SIGXCPU or (killed is signal.SIGKILL and ended.cpu_s >= limits.cpu_s):
+        return Status.TIMEOUT, f"CPU time limit of {limits.cpu_s} s"
+    if killed in _OUTSIDE_SIGNALS:
+        return Status.HARNESS_ERROR, f"killed from outside by {killed.name}"
+    return None
+
+
+def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
+    """Status and detail of a run that reported how it ended."""
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
     if raised := raised_in(report):
@@ -74,26 +92,13 @@ def environment(hash_seed: int, folder: Path) -> dict[str, str]:
     }
 
 
-def ended_within(pid: int, seconds: float) -> bool:
-    """Whether the child ended within that time; it is not reaped."""
-    if not hasattr(os, "pidfd_open"):
-        time.sleep(min(seconds, 0.02))
-        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
-    handle = os.pidfd_open(pid)
+def end(guarding: subprocess.Popen[bytes]) -> None:
+    """Wait for a process that guards others; it ends by itself, as its connection is closed."""
     try:
-        poll = select.poll()
-        poll.register(handle, select.POLLIN)
-        return bool(poll.poll(seconds * 1000))
-    finally:
-        os.close(handle)
-
-
-def kill_group(pid: int) -> None:
-    """Kill the child and whatever it started; nothing happens when all are gone."""
-    try:
-        os.killpg(pid, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        return
+        guarding.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        guarding.kill()
+        guarding.wait()
 
 
 def tail(path: Path) -> str:

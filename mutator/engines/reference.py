@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import time
@@ -16,14 +17,14 @@ from mutator._common.hashing import digest
 from mutator.engines import bytecode
 from mutator.engines.jobs import Execution, Job, Setting
 from mutator.engines.processes import (
+    LOST,
+    PATIENCE_S,
     Ended,
-    ended_within,
+    end,
     environment,
     inactive,
     is_full,
-    judge_report,
-    judge_silent,
-    kill_group,
+    judge,
     raised_in,
     read_report,
     steady,
@@ -36,6 +37,7 @@ from mutator.targets.manifest import TargetManifest
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
 _LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
+_LONGEST = 4096  # bytes of what the guard tells
 
 
 class ReferenceEngine:
@@ -80,7 +82,7 @@ class ReferenceEngine:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
         with raising_disk_full(self.work):
             request = self._prepare(job, folder)
-        ended = self._spawn(request, folder, job.hash_seed)
+        ended = self._run(request, folder, job.hash_seed)
         log = tail(folder / "log")
         report = read_report(folder / "report.json")
         status, detail = self._judge(job, ended, report)
@@ -115,7 +117,7 @@ class ReferenceEngine:
             independent=self._independent or self.manifest.reads_any(job.files),
         )
         request = {
-            "parent": os.getpid(),
+            "home": str(folder),
             "tree": str(tree),
             "package": self.manifest.package,
             "module": self.manifest.entry_module,
@@ -125,57 +127,60 @@ class ReferenceEngine:
             "report": str(folder / "report.json"),
             "inactive": str(inactive(folder)),
             "cpu_s": self.limits.cpu_s,
+            "wall_s": self.limits.wall_s,
             "memory_mb": self.limits.memory_mb,
+            "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
         }
         path = folder / "job.json"
         path.write_text(json.dumps(request), encoding="utf-8")
         return path
 
-    def _spawn(self, request: Path, folder: Path, hash_seed: int) -> Ended:
+    def _run(self, request: Path, folder: Path, hash_seed: int) -> Ended:
+        """Run the job in a process that another one guards; both end when the connection is closed."""
         began = time.monotonic()
-        with (folder / "log").open("wb") as log:
-            child = subprocess.Popen(
-                [sys.executable, "-P", "-s", str(_CHILD), str(request)],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=environment(hash_seed, folder),
-                start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
-            )
-        try:
-            out_of_wall = not self._wait(child.pid, began + self.limits.wall_s)
-        finally:
-            kill_group(child.pid)
-            _, code, usage = os.wait4(child.pid, 0)
-            child.returncode = os.waitstatus_to_exitcode(code)
-        return Ended(
-            code=child.returncode,
-            cpu_s=usage.ru_utime + usage.ru_stime,
-            wall_s=time.monotonic() - began,
-            out_of_wall=out_of_wall,
-        )
+        ours, theirs = socket.socketpair()
+        with ours:
+            with theirs, (folder / "log").open("wb") as log:
+                guarding = subprocess.Popen(
+                    [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())],
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=environment(hash_seed, folder),
+                    pass_fds=[theirs.fileno()],
+                    start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
+                )
+            try:
+                told = self._told(ours, began + self.limits.wall_s + PATIENCE_S)
+            finally:
+                ours.close()
+                end(guarding)
+        if not told:
+            seconds = time.monotonic() - began
+            return Ended(code=guarding.returncode, cpu_s=0.0, wall_s=seconds, stopped=LOST)
+        return Ended(**json.loads(told))
 
-    def _wait(self, pid: int, deadline: float) -> bool:
-        """Wait until the process ended (true) or the deadline passed; leave if our own parent is gone."""
-        while (left := deadline - time.monotonic()) > 0:
-            if ended_within(pid, min(left, _LOOK_UP_S)):
-                return True
-            if self._parent is not None and os.getppid() != self._parent:
-                raise SystemExit("the process that started this one is gone")
-        return False
+    def _told(self, connection: socket.socket, deadline: float) -> bytes:
+        """How the run ended, in JSON; nothing if nobody tells in time. Leave if our own parent is gone."""
+        connection.settimeout(_LOOK_UP_S)
+        while time.monotonic() < deadline:
+            try:
+                return connection.recv(_LONGEST)
+            except TimeoutError:
+                if self._parent is not None and os.getppid() != self._parent:
+                    raise SystemExit("the process that started this one is gone") from None
+        return b""
 
     def _judge(self, job: Job, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-        if report is None or ended.out_of_wall:
-            return judge_silent(self.limits, ended)
-        if problem := self._wrong_tree(job, report):
+        if report is not None and (problem := self._wrong_tree(job, report)):
             self._restore_base()
             return Status.HARNESS_ERROR, problem
-        status, detail = judge_report(self.limits, report)
-        expected = status is Status.OK or report["probe"] is not None
-        if expected and (problem := job.problem_of(report["probe"])):
-            return Status.HARNESS_ERROR, problem
-        return status, detail
+        status, detail = judge(self.limits, ended, report)
+        if report is None or (status is not Status.OK and report["probe"] is None):
+            return status, detail
+        problem = job.problem_of(report["probe"])
+        return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
 
     def _restore_base(self) -> None:
         """Make the pristine tree pristine again, should a run have written through its links."""

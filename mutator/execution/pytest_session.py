@@ -1,6 +1,7 @@
 """Campaigns as pytest sessions: the command's side, the xdist worker's side, and the items (chunks)."""
 
 import os
+import shlex
 import signal
 import sys
 import traceback
@@ -17,7 +18,7 @@ from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
 from mutator.execution.session import Session, Summary, open_session
-from mutator.execution.worker import Assignment, Worker, bind_to_parent
+from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
 
@@ -151,6 +152,12 @@ class Controller:
     def __init__(self, begun: Session | None = None) -> None:
         self.begun = begun
         self._worker: LazyWorker | None = None
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_xdist_setupnodes(self, specs: Sequence[Any]) -> None:
+        for spec in specs:
+            if spec.popen and not spec.python:
+                spec.python = shlex.join(dying_python(os.getpid()))
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:

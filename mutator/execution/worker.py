@@ -1,7 +1,5 @@
 """The process that runs chunks: an xdist worker, or the command itself when there are none."""
 
-import ctypes
-import os
 import signal
 import socket
 import sys
@@ -12,6 +10,7 @@ from pathlib import Path
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
+from mutator.engines.in_target import guard
 from mutator.engines.jobs import Engine, Setting
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
@@ -24,8 +23,6 @@ from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
-
-_PR_SET_PDEATHSIG = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,10 +145,12 @@ class Worker:
         return self.folder.path / kind / f"{self._name}.jsonl"
 
 
+def dying_python(parent: int) -> list[str]:
+    """The beginning of a Python command line whose process dies with `parent` from its first moment on."""
+    return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
+
+
 def bind_to_parent(parent: int) -> None:
-    """End with the process `parent`: the kernel kills this one when it dies, and Ctrl-C is its business."""
+    """End with the process `parent`, to whom Ctrl-C is left, too."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:
-        os._exit(1)
+    guard.die_with_parent(parent)

@@ -2,9 +2,12 @@
 
 import os
 import random
+import re
 import shutil
 import signal
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -151,6 +154,42 @@ def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> 
     assert "died" in printed
     assert run_campaign(toy, "small", out).exit_code == 0
     assert results(out) == undisturbed
+
+
+@pytest.mark.parametrize("words", [["-m", "mutator", "run", "small", "-n", "1", "--out"], None])
+def test_a_worker_dies_with_its_command_from_its_first_moment(
+    toy: Workspace, tmp_path: Path, words: list[str] | None
+) -> None:
+    """A worker that has read nothing yet, and does not come to, is gone when its command is killed."""
+    out = tmp_path / "run"
+    command = Command(toy, out, *(pytest_words(out, workers=1) if words is None else [*words, str(out)]))
+    while not (started := [pid for pid, line in command.others() if re.match("[^ ]+ -u -c .*stdin", line)]):
+        assert command.process.poll() is None, command.end()
+    os.kill(started[0], signal.SIGSTOP)
+    try:
+        assert not command.workers()
+        command.process.kill()
+        deadline = time.monotonic() + 10.0
+        while list(command.others()):
+            assert time.monotonic() < deadline
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(started[0], signal.SIGKILL)
+        command.end()
+
+
+def test_registrations_of_workers_are_removed(toy: Workspace, tmp_path: Path) -> None:
+    """A run folder has no registrations when its command has ended, also those that killed workers left."""
+    out = tmp_path / "run"
+    command = Command(toy, out, *pytest_words(out))
+    command.wait_for_records(2)
+    assert len(command.workers()) == 2
+    command.process.kill()
+    command.end()
+    assert len(list((out / "workers").iterdir())) == 2
+    again = Command(toy, out, *pytest_words(out))
+    assert "12 of 12" in again.end()
+    assert not (out / "workers").exists()
 
 
 def test_the_command_line_is_the_same_thing(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:

@@ -3,47 +3,45 @@
 Every process of the server waits at a step boundary of a golden run (the first one before any run), answers
 on a socket of its own, and can be asked to fork: a child that goes on as a mutant, or another process that
 waits some steps further on. Messages are marshalled dicts, each after its length. A process has one thread,
-or does not fork. It ends when its socket is closed at the other end, or when the first process is gone.
+or does not fork. It ends when its socket is closed at the other end. All of them are guarded (see guard.py):
+they end when the socket of the first is closed, or when it is gone.
 """
 
 import array
+import atexit
 import gc
 import importlib
 import importlib.util
+import io
 import json
 import marshal
 import os
-import select
-import signal
 import socket
 import struct
 import sys
-import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-_PR_SET_CHILD_SUBREAPER = 36
-
-
-def _beside(name: str) -> Any:
-    """The module of that name in this file's folder, which is not on sys.path."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-child = _beside("run_once")
-swap = _beside("swap")
+_spec = importlib.util.spec_from_file_location("run_once", Path(__file__).with_name("run_once.py"))
+assert _spec and _spec.loader
+child: Any = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(child)
+swap, guard = child.beside("swap"), child.guard
 
 
 def main(connection: int, start_file: str) -> int:
-    start = marshal.loads(Path(start_file).read_bytes())
-    child.die_with_parent(start["parent"])
-    child.prctl(_PR_SET_CHILD_SUBREAPER, 1)  # who waits for a process that went away is this one
+    if guard.fork(connection) is not None:
+        return 0
+    try:
+        serve_first(connection, marshal.loads(Path(start_file).read_bytes()))
+    finally:
+        os._exit(0)  # what the target wants done at the end is for its runs to do
+
+
+def serve_first(connection: int, start: dict[str, Any]) -> None:
+    """Load the target, and wait before any run."""
     os.chdir(start["home"])
     sys.path.insert(0, start["tree"])
     sys.argv = [start["module"]]
@@ -53,16 +51,10 @@ def main(connection: int, start_file: str) -> int:
         server.begin = getattr(module, start["stepwise"])
     except BaseException as err:
         server.send({"failed": child.describe(err, start["tree"], None)})
-        return 1
+        return
     gc.collect()
     server.send({"files": child.tree_files(start["tree"]), "threads": threads()})
     server.serve()
-    os.close(server.life[1])
-    while True:  # the others end now: their time counts, too
-        try:
-            os.wait()
-        except ChildProcessError:
-            return 0
 
 
 class Abandoned(Exception):
@@ -75,7 +67,6 @@ class Process:
     def __init__(self, start: dict[str, Any], connection: socket.socket) -> None:
         self.start = start
         self.connection = connection
-        self.life = os.pipe()  # never written to: its end tells the others that the first process is gone
         self.places = child.places(start["tree"])
         self.stamp = child.stamp(self.places)
         self.outside: list[str] = []  # files of the package that were imported from elsewhere
@@ -90,7 +81,7 @@ class Process:
         self.connection.sendall(data)
 
     def serve(self) -> None:
-        """Answer until nobody asks any more; what runs for them then ends with it."""
+        """Answer until nobody asks any more."""
         answers: dict[str, Callable[..., dict[str, Any] | None]] = {
             "branch": self.branch,
             "advance": self.advance,
@@ -106,7 +97,6 @@ class Process:
                     self.send(reply)
 
     def receive(self) -> Any:
-        self.wait(self.connection.fileno(), None)
         return marshal.loads(self.read(struct.unpack("<I", self.read(4))[0]))
 
     def read(self, count: int) -> bytes:
@@ -121,23 +111,12 @@ class Process:
             data += part
         return data
 
-    def wait(self, handle: int, seconds: float | None) -> bool:
-        """Whether there is something on `handle` before the time is over. Ends this process when nobody waits
-        for it any more."""
-        ends = {self.life[0], self.connection.fileno()} - {handle}
-        poll = select.poll()
-        for one in (handle, *ends):
-            poll.register(one, select.POLLIN)
-        ready = {fd for fd, _ in poll.poll(None if seconds is None else seconds * 1000)}
-        if ready & ends:
-            raise Abandoned
-        return handle in ready
-
     def branch(self, step: int, args: list[str] | None = None) -> None:
         """Fork a process that waits before `step` of this golden run, or of the one that `args` begin. Its
         socket is the reply."""
         ours, theirs = socket.socketpair()
-        if not fork():
+        get_ready()
+        if not os.fork():
             try:
                 theirs.close()
                 self.connection.close()
@@ -151,9 +130,6 @@ class Process:
 
     def go_on(self, step: int, args: list[str] | None) -> None:
         """In a new process: get to its place, say so, and wait there."""
-        if self.life[1] >= 0:
-            os.close(self.life[1])
-            self.life = (self.life[0], -1)
         try:
             if args is not None:
                 sys.argv = [self.start["module"], *args]
@@ -181,40 +157,23 @@ class Process:
         gc.freeze()
         return {"threads": threads()}
 
-    def mutant(self, job: bytes, wall_s: float) -> dict[str, Any]:
-        """Fork a child that goes on as a mutant, and wait for it; how it ended. The child reads the job: what
+    def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
+        """Fork a child that goes on as a mutant, and guard it; how it ended. The child reads the job: what
         this process writes to, it must copy after each fork."""
-        began = time.monotonic()
-        count = threads()
-        if count != 1:
+        if (count := threads()) != 1:
             return {"threads": count}
-        parent, pid = os.getpid(), fork()
-        if not pid:
-            self.become(marshal.loads(job), parent)
-        handle = os.pidfd_open(pid)
-        try:
-            out_of_wall = not self.wait(handle, wall_s)
-        finally:
-            os.close(handle)
-            for kill in (os.killpg, os.kill):  # it may not have come to have a group yet
-                with suppress(ProcessLookupError, PermissionError):
-                    kill(pid, signal.SIGKILL)
-            _, code, usage = os.wait4(pid, 0)
-        return {
-            "code": os.waitstatus_to_exitcode(code),
-            "cpu_s": usage.ru_utime + usage.ru_stime,
-            "wall_s": time.monotonic() - began,
-            "out_of_wall": out_of_wall,
-            "threads": count,
-        }
+        space = guard.Space(home, disk_mb)
+        get_ready()
+        ended = guard.fork(self.connection.fileno(), wall_s=wall_s, space=space)
+        if ended is None:
+            self.become(marshal.loads(job))
+        if ended["stopped"] == guard.ABANDONED:
+            raise Abandoned
+        return {**ended, "threads": count, "touched": self.touched()}
 
-    def become(self, job: dict[str, Any], parent: int) -> None:
-        """In a new child: be a mutant of the run so far, finish it, report. Never returns."""
-        os.setsid()
-        child.die_with_parent(parent)
-        for handle in (*self.life, self.connection.fileno()):
-            if handle >= 0:
-                os.close(handle)
+    def become(self, job: dict[str, Any]) -> NoReturn:
+        """In a new child: be a mutant of the run so far, finish it, report."""
+        self.connection.close()
         log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         os.dup2(log, 1)
         os.dup2(log, 2)
@@ -224,11 +183,10 @@ class Process:
         os.chdir(job["out"])
         report = self.finish(job)
         report["outside"] = self.outside + self.elsewhere(child.imported_since(job["probe_name"]))
-        report["touched"] = self.touched()
         report["threads"] = threads()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
+        if report["threads"] == 1:  # with more it does not count
+            end()
         os._exit(0)
 
     def elsewhere(self, names: Iterable[str]) -> Any:
@@ -272,12 +230,25 @@ class Process:
         return report
 
 
-def fork() -> int:
-    """Fork a process of one thread, whose objects the collector of the new one leaves alone."""
+def get_ready() -> None:
+    """Before a fork: leave nothing for both to write, and no old object to the collector of the new one."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     gc.freeze()
-    return os.fork()
+
+
+def end() -> None:
+    """Do what an interpreter does at its end, but for taking itself apart, which costs more than many a run:
+    end what `threading` keeps, call the `atexit` handlers, write what open files hold back."""
+    if "threading" in sys.modules:
+        sys.modules["threading"]._shutdown()
+    atexit._run_exitfuncs()
+    for thing in gc.get_objects():  # none from before the fork: these are frozen
+        if isinstance(thing, io.IOBase):
+            with suppress(Exception):
+                thing.flush()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
 
 
 def threads() -> int:

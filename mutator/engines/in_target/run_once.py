@@ -1,36 +1,61 @@
-"""One run of a target in a fresh interpreter: `python -P -s child.py job.json`. Standard library only.
+"""One run of a target in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`. Standard library
+only: no code of the harness may change what the target does.
 
-Written to be read by nobody but this process: it imports nothing of the harness, so that no harness code can
-change what the target does. It limits itself, puts the tree first on sys.path, runs the entry module as
-`__main__`, and writes report.json: how the run ended, what the tree was (digests of its files), whether the
-package was also imported from elsewhere, and what the probe counted.
+At its first moment it forks. The parent guards the run (see guard.py) and sends into the socket how it ended.
+The child limits itself, puts the tree first on sys.path, runs the entry module as `__main__`, and writes
+report.json: how the run ended, what the tree was (digests of its files), whether the package was also
+imported from elsewhere, and what the probe counted.
 """
 
-import ctypes
 import errno
 import hashlib
 import importlib
+import importlib.util
 import json
 import os
 import resource
 import runpy
-import signal
 import sys
+import time
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-_PR_SET_PDEATHSIG = 1
-_FILE_LIMIT = 1 << 30  # bytes that a run may write into one file (a cache of pictures is large)
 _HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 _LONGEST = 2000  # characters of an exception's text
 _MOST_ERRORS = 50  # of which an exception came
 
 
-def main(job_file: str) -> int:
+def beside(name: str) -> Any:
+    """The module of that name in this file's folder, which is not on sys.path."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+guard = beside("guard")
+
+
+def main(job_file: str, connection: int) -> int:
     job = json.loads(Path(job_file).read_text(encoding="utf-8"))
-    die_with_parent(job["parent"])
+    space = guard.Space(job["home"], job["disk_mb"])
+    ended = guard.fork(connection, wall_s=job["wall_s"], space=space)
+    if ended is None:
+        os.close(connection)
+        run(job)
+    else:
+        ended["cpu_s"] += time.process_time()  # of the interpreter's start
+        with suppress(BrokenPipeError):
+            os.write(connection, json.dumps(ended).encode())
+        os._exit(0)
+    return 0
+
+
+def run(job: dict[str, Any]) -> None:
+    """Run the target as the job has it, and write the report."""
     limit_resources(job)
     os.chdir(job["out"])
     sys.path.insert(0, job["tree"])
@@ -50,26 +75,13 @@ def main(job_file: str) -> int:
     report["modules"] = third_party(known, job["package"])
     report["files"] = tree_files(job["tree"])
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
-    return 0
-
-
-def die_with_parent(parent: int) -> None:
-    """Have the kernel kill this process when its parent dies (not on Linux: the CPU limit ends it)."""
-    if sys.platform == "linux":
-        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
-
-
-def prctl(option: int, value: int) -> None:
-    ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def limit_resources(job: dict[str, Any]) -> None:
-    memory = job["memory_mb"] << 20
+    memory, disk = job["memory_mb"] << 20, job["disk_mb"] << 20
     resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + _HARD_CPU_EXTRA_S))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (_FILE_LIMIT, _FILE_LIMIT))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (disk, disk))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
@@ -210,4 +222,4 @@ def stamp(places: list[str]) -> list[tuple[int, int, int]]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(sys.argv[1], int(sys.argv[2])))

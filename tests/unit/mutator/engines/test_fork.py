@@ -38,7 +38,7 @@ def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
-    assert len(pids) >= 3, "the server, a golden run at its start, and some further on"
+    assert len(pids) >= 4, "the guard, the server, a golden run at its start, and some further on"
     for pid in pids:
         status = Path(f"/proc/{pid}/status").read_text()
         assert "\nThreads:\t1\n" in status
@@ -92,15 +92,25 @@ def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
         assert all(map(gone, victims)), "nothing is left of the server that was killed"
 
 
-@pytest.mark.slow
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
-    """All that waits ends when the first process is killed."""
+    """All that waits, and what guards it, ends when the first process is killed."""
     fork.run(fork.job(at_time(2.0)))
-    first, *waiting = fork.processes()
-    assert first == fork.pool._process.pid
+    guard, first, *waiting = fork.processes()
+    assert guard == fork.pool._process.pid
     assert waiting
     os.kill(first, signal.SIGKILL)
-    assert all(map(gone, waiting))
+    assert all(map(gone, (guard, *waiting)))
+
+
+def test_a_server_without_its_guard_is_not_used(fork: Fork) -> None:
+    """When the process that guards a server is killed, the next run says so, and nothing of it is left."""
+    fork.run(fork.job(at_time(2.0)))
+    pids = fork.processes()
+    os.kill(fork.pool._process.pid, signal.SIGKILL)
+    assert gone(fork.pool._process.pid)
+    execution = fork.run(fork.job(at_time(2.0)))
+    assert (execution.status, execution.detail) == (Status.HARNESS_ERROR, "the fork server is gone")
+    assert all(map(gone, pids))
 
 
 ENGINE = """
@@ -109,7 +119,7 @@ from pathlib import Path
 from mutator.workspace import Workspace
 sys.path.insert(0, sys.argv[4])
 from fork_on_toy import Fork
-from mutator.triggers.conditions import at_time
+from mutator.triggers.kinds import at_time
 toy = Workspace(library=Path(sys.argv[1]), templates=Path(sys.argv[2]))
 fork = Fork(toy, Path(sys.argv[3]))
 print(fork.run(fork.job(at_time(2.0))).mode, flush=True)

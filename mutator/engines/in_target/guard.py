@@ -1,0 +1,150 @@
+"""Runs code in a process of its own, within limits, and leaves nothing of what comes of it. Standard library
+only.
+
+The process that waits is a subreaper: whatever its descendants leave behind, in whatever session, becomes its
+own child, and is killed. As a script, `guard.py PARENT PROGRAM WORDS...` is that program, but dies with its
+parent.
+"""
+
+import ctypes
+import io
+import math
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import Any
+
+WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # why a process was stopped
+_PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
+_LOOK_S = 0.2  # how often a limit of space is looked at
+_LOOK_SHARE = 20  # of the time, one part in so many may be spent on that
+_BLOCK = 512  # bytes, the unit of st_blocks
+_libc = ctypes.CDLL(None)
+
+
+class Space:
+    """Room for `disk_mb` MiB more in the folder `home` than is in it now."""
+
+    def __init__(self, home: str, disk_mb: int) -> None:
+        self._home = home
+        self._most = used(home) + (disk_mb << 20)
+
+    def is_used_up(self) -> bool:
+        return used(self._home) >= self._most
+
+
+def fork(caller: int, *, wall_s: float = math.inf, space: Space | None = None) -> dict[str, Any] | None:
+    """Fork: None in the child, which leads a session of its own and dies with its parent.
+
+    In the parent, wait until the child ends, until a limit stops it, or until the other end of `caller`, a
+    pipe or socket, is closed; then nothing is left of it. Returns how it ended: `code` (of a signal, its
+    negative number), `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
+    """
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    began, parent, pid = time.monotonic(), os.getpid(), os.fork()
+    if not pid:
+        os.setsid()
+        die_with_parent(parent)
+        return None
+    try:
+        stopped = _wait(pid, caller, began + wall_s, space)
+    finally:
+        os.kill(pid, signal.SIGKILL)
+        _, code, usage = os.wait4(pid, 0)
+        _end_what_is_left()
+    if not stopped and space is not None and space.is_used_up():
+        stopped = DISK
+    return {
+        "code": os.waitstatus_to_exitcode(code),
+        "cpu_s": usage.ru_utime + usage.ru_stime,
+        "wall_s": time.monotonic() - began,
+        "stopped": stopped,
+    }
+
+
+def die_with_parent(parent: int) -> None:
+    """Have the kernel kill this process when its parent dies; it ends now if that is no longer `parent`."""
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def used(folder: str) -> int:
+    """Bytes on the disk of what is in a folder, as far as it can be looked at."""
+    total, folders = 0, [folder]
+    while folders:
+        with suppress(OSError), os.scandir(folders.pop()) as entries:
+            for entry in entries:
+                with suppress(OSError):
+                    total += entry.stat(follow_symlinks=False).st_blocks * _BLOCK
+                    if entry.is_dir(follow_symlinks=False):
+                        folders.append(entry.path)
+    return total
+
+
+def _prctl(option: int, value: int) -> None:
+    _libc.prctl(option, value, 0, 0, 0)
+
+
+def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
+    """Wait until the child ended (it is not reaped) or is to be stopped; why."""
+    handle, pause = os.pidfd_open(pid), _LOOK_S
+    poll = select.poll()
+    poll.register(handle, select.POLLIN)
+    poll.register(caller, 0)
+    try:
+        while True:
+            left = deadline - time.monotonic()
+            ready = {fd for fd, _ in poll.poll(max(0.0, min(left, pause)) * 1000)}
+            if ready:
+                return ABANDONED if caller in ready else ""
+            if left <= 0:
+                return WALL
+            began = time.monotonic()
+            if space is not None and space.is_used_up():
+                return DISK
+            pause = max(_LOOK_S, (time.monotonic() - began) * _LOOK_SHARE)
+    finally:
+        os.close(handle)
+
+
+def _end_what_is_left() -> None:
+    """Kill and reap children of other sessions than this process's, with all that came of them."""
+    session, spared = os.getsid(0), set[int]()  # spared: root's, when this process is not root's
+    while left := [pid for pid in _children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
+        for pid in _with_descendants(left):
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                continue
+            except PermissionError:
+                spared.add(pid)
+        for pid in set(left) - spared:
+            os.waitpid(pid, 0)
+
+
+def _with_descendants(pids: Iterable[int]) -> list[int]:
+    found = list(pids)
+    for pid in found:
+        found += _children(pid)
+    return found
+
+
+def _children(pid: int) -> list[int]:
+    """Processes whose parent is `pid`, dead ones that nobody waited for included."""
+    found: list[int] = []
+    with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # it may end meanwhile
+        for thread in threads:
+            with io.FileIO(f"{thread.path}/children") as file:
+                found += map(int, file.read().split())
+    return found
+
+
+if __name__ == "__main__":
+    die_with_parent(int(sys.argv[1]))
+    os.execv(sys.argv[2], sys.argv[2:])

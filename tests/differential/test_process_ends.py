@@ -1,0 +1,281 @@
+"""How the process of a run ends, and what is left of it: the same in every engine."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.jobs import Execution, RunMode
+from mutator.engines.kinds import ENGINES
+from mutator.model import Limits, Status
+from mutator.workspace import Workspace
+
+from .test_engines import LIMITS, MODELS, TRIGGERS, Engines, fault
+
+Misbehave = Callable[..., dict[str, tuple[Execution, dict[str, bytes]]]]
+RESULTS = {"log.npz", "said.json"}
+MEET_TROUBLE = """        self.rows.append("""
+TROUBLE = """        if self.sensor.reading[0] > 60.0:
+            import toycar.trouble
+        self.rows.append("""
+
+
+ACTIVE = (fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])
+
+
+def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: Limits) -> Engines:
+    """Engines on the toy; a mutant comes to execute the code `trouble`. `head` is run when it is loaded."""
+    package = toy.library.parent / "tree" / "toycar"
+    go = (package / "go.py").read_text()
+    assert MEET_TROUBLE in go
+    (package / "go.py").write_text(head + "\n" + go.replace(MEET_TROUBLE, TROUBLE))
+    (package / "trouble.py").write_text(trouble)
+    return Engines(toy, folder, limits)
+
+
+@pytest.fixture
+def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Iterator[Misbehave]:
+    """Runs a mutant in each engine that comes to execute the code `trouble`, in its output folder; what came
+    of it, and the files that it left. `head` is more code of the target, run when it is loaded."""
+    made: list[Engines] = []
+
+    def run(
+        trouble: str, head: str = "", limits: Limits = LIMITS
+    ) -> dict[str, tuple[Execution, dict[str, bytes]]]:
+        made.append(with_trouble(copy_toycar(tmp_path), tmp_path, trouble, head, limits))
+        job = made[0].job(*ACTIVE)
+        return {name: made[0].run(name, job) for name in ENGINES}
+
+    yield run
+    for engines in made:
+        engines.close()
+
+
+DAEMONS = """
+import os, signal, subprocess, sys, time
+from pathlib import Path
+
+NOTES, END = Path({notes!r}), time.monotonic() + 60
+
+def note():
+    (NOTES / str(os.getpid())).touch()
+
+def daemon(kind):
+    if os.fork():
+        return
+    os.setsid()
+    if os.fork():
+        os._exit(0)
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)
+    note()
+    while kind == "forks again and again" and time.monotonic() < END:
+        time.sleep(0.002)
+        if os.fork():
+            os._exit(0)
+        note()
+    if kind == "has children":
+        if not os.fork():
+            os.setpgid(0, 0)
+            note()
+    if kind == "is a program":
+        os.execvp("sleep", ["sleep", "60"])
+    time.sleep(60)
+    os._exit(0)
+
+before = len(list(NOTES.iterdir()))
+for kind in ["waits", "forks again and again", "has children", "is a program", "waits"] * 2:
+    daemon(kind)
+while len(list(NOTES.iterdir())) < before + 12:
+    time.sleep(0.01)
+"""
+
+
+def lives(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
+def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
+    """Of ten daemons that a mutant leaves (in sessions of their own, deaf to signals, some with children,
+    some forking again and again) none is there after the run, in any engine."""
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    told = misbehave(DAEMONS.format(notes=str(notes)))
+    seen = [int(path.name) for path in notes.iterdir()]
+    assert len(seen) > 3 * 12, "those that fork had the time to"
+    assert [pid for pid in seen if lives(pid)] == []
+    time.sleep(0.1)
+    assert len(list(notes.iterdir())) == len(seen), "none that left no note in time"
+    assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_daemons_of_a_killed_engine(
+    tmp_path: Path, copy_toycar: Callable[[Path], Workspace], name: str
+) -> None:
+    """When the process of an engine is killed in the middle of a run, the daemons of that run end, too."""
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    trouble = DAEMONS.format(notes=str(notes)) + "\n(NOTES.parent / 'all').touch()\ntime.sleep(60)\n"
+    pid = os.fork()
+    if not pid:
+        try:
+            engines = with_trouble(copy_toycar(tmp_path), tmp_path, trouble, "", LIMITS)
+            engines.run(name, engines.job(*ACTIVE))
+        finally:
+            os._exit(1)
+    deadline = time.monotonic() + 60.0
+    while not (tmp_path / "all").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    deadline = time.monotonic() + 10.0
+    while any(lives(int(path.name)) for path in notes.iterdir()):
+        assert time.monotonic() < deadline
+
+
+LATE_WORDS = """
+import atexit, logging, logging.handlers, tempfile, weakref
+from pathlib import Path
+
+def say(word):
+    with Path("late.txt").open("a") as file:
+        file.write(word + "\\n")
+
+class Thing:
+    pass
+
+thing = Thing()
+weakref.finalize(thing, say, "finalized")
+atexit.register(say, "first registered")
+atexit.register(say, "last registered")
+atexit.register(lambda: 1 / 0)
+held = Path("held.txt").open("w")
+held.write("x" * 100)
+kept = logging.handlers.MemoryHandler(1000, target=logging.FileHandler("log.txt"))
+logging.getLogger("toycar").addHandler(kept)
+logging.getLogger("toycar").warning("kept until the end")
+scratch = tempfile.TemporaryDirectory(dir=".")
+"""
+
+
+def test_what_is_done_at_the_end(misbehave: Misbehave) -> None:
+    """`atexit` handlers, finalizers and open files leave the same bytes in the output folder, in each
+    engine."""
+    told = misbehave(LATE_WORDS)
+    expected = {
+        "late.txt": b"last registered\nfirst registered\nfinalized\n",
+        "held.txt": b"x" * 100,
+        "log.txt": b"kept until the end\n",
+    }
+    _, reference = told["reference"]
+    assert {name: data for name, data in reference.items() if name not in RESULTS} == expected
+    for name, (execution, files) in told.items():
+        assert (execution.status, execution.mode) == (Status.OK, name)
+        assert files == reference
+
+
+def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) -> None:
+    """An `atexit` handler that the target registers when it is loaded is called once a run in each engine, in
+    the run's output folder, and not by the processes that wait."""
+    calls = tmp_path / "calls"
+    head = (
+        "import atexit, os\n"
+        f"atexit.register(lambda: open({str(calls)!r}, 'a').write(os.getcwd() + '\\n'))\n"
+        "atexit.register(lambda: open('end.txt', 'w').write('the end'))"
+    )
+    told = misbehave("", head)
+    assert all(files["end.txt"] == b"the end" for _, files in told.values())
+    folders = [Path(line).name for line in calls.read_text().splitlines()]
+    assert folders == ["out"] * 5  # the golden run, three mutants, a look at what the golden run observes
+
+
+def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
+    """A run whose `atexit` handler never returns is a timeout in each engine."""
+    waits = "import atexit, time\natexit.register(time.sleep, 100)"
+    told = misbehave(waits, limits=replace(LIMITS, wall_s=2))
+    assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "wall time limit of 2 s")}
+    assert [e.mode for e, _ in told.values()] == list(ENGINES)
+
+
+def test_a_handler_that_fails(misbehave: Misbehave) -> None:
+    """What breaks at the end of a run that has reported is no crash of it, whichever engine it has."""
+    told = misbehave("import atexit, os\natexit.register(os._exit, 3)")
+    assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
+
+
+def test_a_kill_from_outside_at_the_end(misbehave: Misbehave) -> None:
+    """A run that is killed from outside after its report did not end well: its files may be incomplete."""
+    told = misbehave("import atexit, os\natexit.register(os.kill, os.getpid(), 9)")
+    ends = {(e.status, e.detail) for e, _ in told.values()}
+    assert ends == {(Status.HARNESS_ERROR, "killed from outside by SIGKILL")}
+
+
+def test_a_thread_that_outlives_its_run(misbehave: Misbehave) -> None:
+    """A thread that the interpreter waits for may finish its work, in each engine."""
+    thread = (
+        "import threading, time\nfrom pathlib import Path\nhere = Path.cwd()\n"
+        "def work():\n    time.sleep(0.5)\n    (here / 'thread.txt').write_text('done')\n"
+        "threading.Thread(target=work).start()"
+    )
+    told = misbehave(thread)
+    assert {(e.status, files["thread.txt"]) for e, files in told.values()} == {(Status.OK, b"done")}
+
+
+FULL = {
+    "files": "for i in range(5):\n    open(f'{i}', 'wb').write(bytes(1 << 20))",
+    "one file": "open('x', 'wb').write(bytes(5 << 20))",
+    "one file in pieces": "f = open('x', 'wb')\nfor i in range(5): f.write(bytes(1 << 20))",
+    "both folders": (
+        "import tempfile\nkept = [tempfile.NamedTemporaryFile(delete=False) for i in range(2)]\n"
+        "for f in (*kept, open('x', 'wb')): f.write(bytes(1 << 20)); f.flush()"
+    ),
+    "at the end": (
+        "import atexit\ndef late():\n    for i in range(5): open(f'{i}', 'wb').write(bytes(1 << 20))\n"
+        "atexit.register(late)"
+    ),
+    "without end": (
+        "import itertools\nfor i in itertools.count():\n    open(f'{i}', 'wb').write(bytes(1 << 14))"
+    ),
+    "without end in folders": (
+        "import itertools, os\nfor i in itertools.count():\n"
+        "    os.makedirs(f'../a/{i}')\n    open(f'../a/{i}/x', 'wb').write(bytes(1 << 14))"
+    ),
+    "by another process": (
+        "import subprocess, sys, time\nsubprocess.Popen([sys.executable, '-c', "
+        "'for i in range(5): open(str(i), \"wb\").write(bytes(1 << 20))'], start_new_session=True).wait()"
+    ),
+}
+
+
+@pytest.mark.parametrize("how", FULL)
+def test_a_limit_of_space(misbehave: Misbehave, how: str) -> None:
+    """A run that writes more than it may into its output folder and TMPDIR is a timeout that names the limit,
+    in each engine."""
+    told = misbehave(FULL[how], limits=replace(LIMITS, disk_mb=3))
+    assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "disk limit of 3 MiB")}
+
+
+def test_what_stays_below_the_limit_of_space(misbehave: Misbehave) -> None:
+    """A run may write nearly as much as its limit; what lies there already does not count, nor do holes."""
+    body = (
+        "f = open('x', 'wb')\nf.write(bytes(2 << 20))\nf.close()\nimport os\nos.truncate('x', (3 << 20) - 1)"
+    )
+    told = misbehave(body, limits=replace(LIMITS, disk_mb=3))
+    assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
+
+
+def test_a_file_that_is_too_large(misbehave: Misbehave) -> None:
+    """No single file may be larger than the limit, holes or not: the run is told, and crashes on it."""
+    told = misbehave("f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()")
+    ends = {(e.status, e.detail) for e, _ in told.values()}
+    assert ends == {(Status.CRASHED, "OSError: [Errno 27] File too large (toycar/trouble.py:4)")}
