@@ -19,6 +19,13 @@ def keeps_names(source: bytes, mutant: bytes) -> bool:
     return all(homes.items() <= after[key].items() for key, homes in before)
 
 
+def is_carried_out(source: bytes, function: str, name: str) -> bool:
+    """Whether the bytecode of a function so called has a name: what is never reached has no bytecode."""
+    code = compile(source, "m.py", "exec", dont_inherit=True)
+    found = _homes(code, Lines.of(source))
+    return any(key[0].rpartition(".")[2] == function and name in homes for key, homes in found)
+
+
 def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int, int], dict[str, str]]]:
     """The names of each function that is not injected; functions are told apart by name, line and number."""
     stack, counts = [code], Counter[tuple[str, int]]()

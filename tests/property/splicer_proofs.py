@@ -25,7 +25,7 @@ from mutator.workspace import Workspace
 
 from .anchors_by_ast import AFTER, BEFORE, Spot, spots
 from .injected_statements import Beside, Lines, take_out
-from .names_in_bytecode import keeps_names
+from .names_in_bytecode import is_carried_out, keeps_names
 
 Run = Callable[[bytes], object]  # what a source does
 _MODELS = Workspace.find(root=Path(__file__).parents[2]).fault_models()
@@ -249,10 +249,9 @@ def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
         edit = injection_edit(file, _MODELS, injection, "abcd0123")
     except MutatorError as error:
         _expect(error.line is not None, f"no line: {error}")
-        if "the lines would make" in error.got:
-            _expect(
-                not keeps_names(file.data, _forced(file, spot, model, params)), f"no need to refuse: {error}"
-            )
+        if moved := re.match(r"the lines would make '(.+)' .* in (.+), where", error.got):
+            kept = keeps_names(file.data, _forced(file, spot, model, params))
+            _expect(not kept or not is_carried_out(file.data, moved[2], moved[1]), f"refused: {error}")
         figures.variables[_reason(error)] += 1
         return b""
     try:
