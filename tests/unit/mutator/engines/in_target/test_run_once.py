@@ -144,7 +144,7 @@ def test_the_first_activation_is_noted(tmp_path: Path) -> None:
 
 
 def test_a_probe_is_asked() -> None:
-    """What it reports is passed on, what it raises is how the run ended, what JSON cannot tell is no report."""
+    """What it reports is passed on, what it raises is how the run ended, the rest is no report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()
