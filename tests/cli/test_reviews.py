@@ -69,7 +69,7 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
     answer = cli("review", "show", longer)
     assert f"group {longer}: new" in answer.out
     assert "+            gap = gap ⟨by⟩  # fi:⟨id⟩" in answer.out
-    assert re.search(r"^sensor/distance/longer \d m +as_described +\+ \d\.0$", answer.out, re.MULTILINE)
+    assert re.search(r"^sensor/distance/longer \d m +as_described +\+ \d$", answer.out, re.MULTILINE)
     assert re.search(r"^  hwt .*\(near\)$", answer.out, re.MULTILINE)
     [group] = cli("review", "show", longer, "--json").json
     assert group["values"][0]["by"].startswith("+ ")

@@ -1,11 +1,58 @@
-"""What the process of a run tells of its modules."""
+"""What the process of a run tells of its modules, of how it ended, and of its probe."""
 
+import errno
 import sys
 import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from mutator.engines.in_target.run_once import imported_since
+from mutator.engines.in_target.run_once import asked, describe, imported_since, note_activation
+
+TREE = "/tree"
+CODE = {
+    "/tree/a.py": """
+def deep():
+    raise KeyError("deep")
+
+
+def wrap():
+    try:
+        deep()
+    except KeyError:
+        raise ValueError("wrapped") from None
+
+
+def several():
+    try:
+        deep()
+    except KeyError as error:
+        raise ExceptionGroup("several", [error, OSError(28, "full")])
+
+
+def again(n):
+    return again(n - 1) if n else deep()
+
+
+def unspeakable():
+    class Mute(Exception):
+        def __str__(self):
+            raise RuntimeError
+
+    raise Mute
+
+
+def stop():
+    raise StepLimit("more than 3 steps")
+
+
+class StepLimit(RuntimeError):
+    __module__ = "car._fi"
+""",
+    "/elsewhere/b.py": "def outside(call):\n    call()\n",
+}
 
 
 def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,3 +68,87 @@ def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_module_that_never_came_hides_none() -> None:
     """Where the probe was not installed, all modules are looked at."""
     assert set(imported_since("never.imported")) == set(sys.modules)
+
+
+@pytest.fixture
+def described() -> Callable[..., dict[str, Any]]:
+    """How a run is said to have ended in which a function of the tree was called, from outside of it."""
+    names: dict[str, Any] = {}
+    for file, text in CODE.items():
+        exec(compile(text, file, "exec"), names)
+
+    def describe_call(name: str, *arguments: object) -> dict[str, Any]:
+        try:
+            names["outside"](lambda: names[name](*arguments))
+        except BaseException as err:
+            return describe(err, TREE, "car._fi")
+        raise AssertionError
+
+    return describe_call
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "kind", "message", "stacks"),
+    [
+        ("deep", (), "KeyError", "'deep'", [[("a.py", 3)]]),
+        ("wrap", (), "ValueError", "wrapped", [[("a.py", 10)], [("a.py", 3), ("a.py", 8)]]),
+        ("again", (50,), "KeyError", "'deep'", [[("a.py", 3), ("a.py", 21)]]),
+        ("unspeakable", (), "Mute", "its text cannot be told (RuntimeError)", [[("a.py", 29)]]),
+    ],
+)
+def test_exceptions_are_described(
+    described: Callable[..., dict[str, Any]],
+    name: str,
+    arguments: tuple[object, ...],
+    kind: str,
+    message: str,
+    stacks: list[list[tuple[str, int]]],
+) -> None:
+    """Type, text and the lines of the tree that it passed, each once, innermost first; then those of what it
+    came of."""
+    found = described(name, *arguments)
+    assert found["ended"] == "error"
+    assert found["error"] == {"kind": kind, "message": message, "stacks": stacks}
+
+
+def test_what_is_in_a_group_counts(described: Callable[..., dict[str, Any]]) -> None:
+    """A group of exceptions comes of those that are in it."""
+    error = described("several")["error"]
+    assert error["kind"] == "ExceptionGroup"
+    assert [("a.py", 3), ("a.py", 15)] in error["stacks"]
+
+
+def test_the_limit_of_steps_is_no_error(described: Callable[..., dict[str, Any]]) -> None:
+    """The probe's own limit is told apart from an exception, whoever else may have a class of that name."""
+    assert described("stop") == {"ended": "steps"}
+
+
+def test_a_full_disk_is_told() -> None:
+    """An error for want of room says so."""
+    assert describe(OSError(errno.ENOSPC, "full"), TREE, None)["disk_full"]
+    assert not describe(OSError(errno.EACCES, "no"), TREE, None)["disk_full"]
+
+
+def test_the_first_activation_is_noted(tmp_path: Path) -> None:
+    """The file goes when an injection is first active, and the probe is itself again."""
+    inactive = tmp_path / "inactive"
+    inactive.touch()
+    answers = [False, False, True, False]
+    original = lambda fi: answers.pop(0)  # noqa: E731
+    probe = types.SimpleNamespace(active=original)
+    note_activation(probe, str(inactive))
+    for active, there in ((False, True), (False, True), (True, False)):
+        assert probe.active("a") is active
+        assert inactive.exists() is there
+    assert probe.active is original
+
+
+def test_a_probe_is_asked() -> None:
+    """What it reports is passed on, what it raises is how the run ended, the rest is no report."""
+    probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
+    assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
+    probe.report = lambda: object()
+    assert not isinstance(asked(probe, TREE, "car._fi")["probe"], dict)
+    probe.report = lambda: 1 / 0
+    told = asked(probe, TREE, "car._fi")
+    assert (told["probe"], told["ended"], told["error"]["kind"]) == (None, "error", "ZeroDivisionError")
