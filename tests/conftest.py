@@ -28,8 +28,9 @@ from mutator.model import (
 )
 from mutator.store import digests
 from mutator.store.digests import Digest
-from mutator.store.lines import LineWriter
-from mutator.store.records import SCHEMA
+from mutator.store.lines import LineWriter, read_segment
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
@@ -181,6 +182,39 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
             if fields is not None:
                 lines.append(dataclasses.asdict(record(experiment.id, **unchanged | fields)))
         lines.close()
+        return out
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
+    """Makes a finished run folder whose records, patches, checks, golden runs and proof are made up."""
+
+    def write(workspace: Workspace, out: Path, **given: Any) -> Path:
+        patch = b"diff --git a/a.py b/a.py\n"
+        write_run(workspace, out, lambda experiment: {"patch": digests.digest(patch)}, **given)
+        folder = RunFolder.open(out)
+        lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").objects(SCHEMA)]
+        for line in lines:
+            place = folder.patch(line["experiment_id"])
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(patch)
+        for kind, schema, some in (("proof", SCHEMA, lines[:3]), ("timings", TIMINGS_SCHEMA, lines)):
+            writer = LineWriter(out / kind / "0001-a.jsonl", {"schema": schema, "plan": folder.head["plan"]})
+            for line in some:
+                cost = {"experiment_id": line["experiment_id"], "cpu_s": 1.0, "wall_s": 2.0, "host": "h"}
+                writer.append(line if kind == "proof" else cost | {"worker": "a"})
+            writer.close()
+        new = {"checks.json": b'{"schema": "checks/1", "results": [], "goldens": {}}'}
+        for scenario, changes in folder.head["goldens"]:
+            place = folder.golden(scenario, tuple(changes)).relative_to(folder.path)
+            new |= {f"{place}/{name}": name.encode() for name in folder.head["golden_files"]}
+        with digests.rewriting(out, {name: Digest.of(data) for name, data in new.items()}):
+            for name, data in new.items():
+                (out / name).parent.mkdir(parents=True, exist_ok=True)
+                (out / name).write_bytes(data)
+        digests.close_segments(out, finished=True)
         return out
 
     return write

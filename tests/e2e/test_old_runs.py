@@ -4,8 +4,9 @@ tests/fixtures/ has one folder for each schema of run folders, with the library 
 """
 
 import json
+import random
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +17,6 @@ from mutator.cli.app import main
 from mutator.execution.running import run_campaign
 from mutator.exports import Format
 from mutator.store import plan_file
-from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import SCHEMA
 from mutator.workspace import Workspace
@@ -85,7 +85,7 @@ def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
     assert [*run.experiments] == [*plan_file.ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
     assert len(run.results) == EXPERIMENTS == len(run.experiments)
-    assert {*run.results.index} == {*read_records(run.path)} == {*read_records(run.path, "proof")}
+    assert {*run.results.index} == {*run.folder.records()} == {*run.folder.records("proof")}
     assert all("# fi:" in run.experiment(name).patch for name in run.experiments)
     assert len(run.golden("A")) == len(run.experiment(KEPT).traces().faulty) > 100
 
@@ -96,9 +96,28 @@ def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
     assert new.head["plan"] == old.head["plan"]
     assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
     assert_same_cells(fresh / "results.csv", old.path / "results.csv")
-    assert {name: record.trace_digest for name, record in read_records(new.path).items()} == {
-        name: record.trace_digest for name, record in read_records(old.path).items()
+    assert {name: record.trace_digest for name, record in new.records().items()} == {
+        name: record.trace_digest for name, record in old.records().items()
     }
+
+
+def test_it_says_whether_it_can_be_verified(cli: Cli, place: Path) -> None:
+    """Runs of before there were digests are marked wherever they are shown; later ones have a seal."""
+    old = is_old(place / "small")
+    run = load_run(place / "small")
+    assert (run.verifiable, run.seal is None, "not verifiable" in repr(run)) == (not old, old, old)
+    shutil.copytree(place / "small", copy := place / "told")
+    for words in (("show", KEPT, "--run", copy), ("compare", copy, copy), ("verify", copy)):
+        code, out, err = cli(*words)
+        assert (code == 1) == (old and words[0] == "verify"), err
+        assert ("not verifiable" in out) == old
+    assert cli("report", copy)[0] == 0
+    told = (copy / "report" / "REPORT.md").read_text()
+    assert f"| seal | {'none: not verifiable, as run/1 has no digests' if old else run.seal} |" in told
+
+
+def is_old(run: Path) -> bool:
+    return json.loads((run / "run.json").read_text())["schema"] == "run/1"
 
 
 def test_it_compares(cli: Cli, fresh: Path) -> None:
@@ -160,15 +179,54 @@ def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
-    for words in (("run",), ("plan",)):
-        code, _, err = cli(*words, "small", "--out", copy)
-        assert code == 2 and "was planned by mutator 0.1.0 (run/1)" in err and "can still be read" in err
-    monkeypatch.setattr("mutator.campaigns.provenance.VERSION", "0.1.0")
+    head = RunFolder.open(copy).head
+    made_by = f"was planned by mutator {head['provenance']['mutator']} ({head['schema']})"
+    with monkeypatch.context() as patch:
+        patch.setattr("mutator.campaigns.provenance.VERSION", "99.0")
+        for words in (("run",), ("plan",)):
+            code, _, err = cli(*words, "small", "--out", copy)
+            assert code == 2 and made_by in err and "can still be read" in err
     with (library / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("\n")
     with (library / "fault_library" / "targets" / "toycar.yaml").open("a") as file:
         file.write("\n")
     code, _, err = cli("run", "small", "--out", copy, "--root", library)
-    assert code == 2 and "changed since this run was planned: target, manifest" in err
+    assert code == 2
+    assert made_by in err or "changed since this run was planned: target, manifest" in err
     after = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
     assert [entry for entry in after if entry[0].name != "workers"] == before
+
+
+def damages(data: bytes, draw: random.Random) -> Iterator[bytes]:
+    """What may become of a file: a flipped bit, an end that is lost, bytes that are zero, lines that are
+    dropped, doubled or swapped."""
+    place = draw.randrange(len(data) or 1)
+    yield data[:place] + bytes([(data[place] if data else 0) ^ 1 << draw.randrange(8)]) + data[place + 1 :]
+    yield data[:place]
+    yield data[:place] + bytes(min(64, len(data) - place)) + data[place + 64 :]
+    lines = data.splitlines(keepends=True)
+    i, j = draw.randrange(len(lines) or 1), draw.randrange(len(lines) or 1)
+    yield b"".join([*lines[:i], *lines[i + 1 :]])
+    yield b"".join([*lines[:i], *lines[i : i + 1], *lines[i:]])
+    if lines:
+        lines[i], lines[j] = lines[j], lines[i]
+    yield b"".join(lines)
+
+
+READ = ("*.json", "*.jsonl", "*.yaml", "*.csv", "*.parquet", "*.npz", "*.patch")
+
+
+def test_a_damaged_one_never_ends_in_a_traceback(cli: Cli, place: Path) -> None:
+    """Whatever becomes of whichever file, readers answer in words, or with what is right."""
+    shutil.copytree(place / "small", copy := place / "damaged")
+    draw = random.Random(place.name)
+    files = sorted({path for pattern in READ for path in copy.rglob(pattern) if "report" not in path.parts})
+    for path in draw.sample(files, len(files) // 3):
+        data = path.read_bytes()
+        for damaged in draw.sample([*damages(data, draw)], 2):
+            path.write_bytes(damaged)
+            for words in (("show", KEPT, "--run", copy, "--no-plot"), ("export", copy, "--format", "junit")):
+                code, _, err = cli(*words)
+                assert code in (0, 1, 2) and "Traceback" not in err, (path, err)
+                assert code == 0 or err.startswith("error: "), (path, err)
+            path.write_bytes(data)

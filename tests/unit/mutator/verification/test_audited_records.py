@@ -1,0 +1,69 @@
+"""What an audit reads out of records: fields that contradict each other."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mutator.model import Activation, Outcome, Record, Status
+from mutator.targets.manifest import Channel
+from mutator.verification.audited_records import Recorded, verdicts
+
+HEAD = {"hazards": ["H1", "H3"], "compared": ["gas", "brake"]}
+MANIFEST: Any = SimpleNamespace(
+    compared=[Channel(name="gas", unit="-"), Channel(name="brake", unit="-", tolerance=0.5)]
+)
+MakeRecord = Callable[..., Record]
+FINE = {"max_dev": (("gas", 0.0), ("brake", 0.25)), "trace_digest": "f" * 64}
+BAD_END = {"outcome": None, "activation": None, "max_dev": (), "trace_digest": ""}
+
+
+def flaws(record: Record) -> list[str]:
+    return [str(one) for one in verdicts(HEAD, [Recorded(Path("r.jsonl"), 7, record)], MANIFEST)]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"outcome": Outcome.NOT_ACTIVATED, "activation": None},
+        {"outcome": Outcome.SDC, "t_manifest": 2.0},
+        {"outcome": Outcome.HAZARD, "hazards": (("H3", 2.5),), "alerts": (("fcw", 2.0), ("lane", 2.0))},
+        BAD_END | {"status": Status.TIMEOUT, "detail": "stopped"},
+        BAD_END | {"status": Status.CRASHED, "activation": Activation(first=2.0, last=3.0, count=5)},
+    ],
+)
+def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, Any]) -> None:
+    """Whatever a run may come to is no difference."""
+    assert flaws(record(**FINE | fields)) == []
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"outcome": Outcome.SDC}, "outcome sdc; expected masked, which follows from its times"),
+        ({"hazards": (("H1", 2.5),)}, "outcome masked; expected hazard"),
+        ({"outcome": Outcome.NOT_ACTIVATED}, "outcome not_activated; expected masked"),
+        ({"outcome": Outcome.SDC, "t_manifest": 1.5}, "manifested at 1.5 s; expected a time at or after"),
+        ({"outcome": Outcome.HAZARD, "hazards": (("H1", 1.0),)}, "hazards"),
+        ({"outcome": Outcome.HAZARD, "hazards": (("H1", 4.0), ("H3", 3.0))}, "hazards"),
+        ({"outcome": Outcome.HAZARD, "hazards": (("H9", 4.0),)}, "hazard H9; expected one of H1, H3"),
+        ({"alerts": (("fcw", 2.5), ("fcw", 3.0))}, "alerts"),
+        ({"outcome": Outcome.NOT_ACTIVATED, "activation": None, "alerts": (("fcw", 2.5),)}, "alerts"),
+        ({"activation": Activation(first=3.0, last=2.0, count=5)}, "active from 3.0 to 2.0 s"),
+        ({"activation": Activation(first=2.0, last=3.0, count=0)}, "active from"),
+        ({"trace_digest": ""}, "trace digest ''"),
+        ({"max_dev": (("gas", 0.0),)}, "differences of gas; expected those of gas, brake"),
+        ({"max_dev": (("gas", 0.1), ("brake", 0.0))}, "gas differs, and was not manifested"),
+        (BAD_END | {"status": Status.CRASHED, "outcome": Outcome.SDC}, "outcome sdc; expected none, as it"),
+        (BAD_END | {"status": Status.TIMEOUT, "trace_digest": "f"}, "trace_digest f; expected none"),
+    ],
+)
+def test_contradictions_are_told_with_their_line(
+    record: MakeRecord, fields: dict[str, Any], told: str
+) -> None:
+    """Each names experiment, file and line, what was found and what would follow."""
+    found = flaws(record(**FINE | fields))
+    assert any(f"r.jsonl:7: {'e' * 16}: {told}" in text for text in found), found

@@ -1,0 +1,112 @@
+"""The seal: one digest of all that counts, and of nothing else."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator._common.hashing import canonical
+from mutator.store import digests
+from mutator.store.lines import written
+from mutator.store.records import SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.verification.seal import seal, seal_or_why_not
+from mutator.workspace import Workspace
+
+Reseal = Callable[..., None]
+
+
+@pytest.fixture(scope="module")
+def made(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_finished: Callable[..., Path],
+) -> Path:
+    place = tmp_path_factory.mktemp("sealed")
+    return write_finished(copy_toycar(place), place / "run")
+
+
+@pytest.fixture
+def run(made: Path, tmp_path: Path) -> Path:
+    """A finished run that a test may change."""
+    return Path(shutil.copytree(made, tmp_path / "another place"))
+
+
+def seal_of(run: Path) -> str | None:
+    return seal(RunFolder.open(run))
+
+
+def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, reseal: Reseal) -> None:
+    """Other sessions, workers and orders of records, lost timings, another processor: the same seal."""
+    path = run / "records" / "0001-a.jsonl"
+    head, *lines = path.read_text().splitlines()
+    path.write_text("\n".join([head, *lines[12:], ""]))
+    (path.with_name("0007-gw9.jsonl")).write_text("\n".join([head, *reversed(lines[:12]), ""]))
+    shutil.rmtree(run / "timings")
+    data = json.loads((run / "run.json").read_text())
+    data["provenance"]["machine"] = "Linux on another one"
+    (run / "run.json").write_text(json.dumps(data))
+    reseal(run)
+    known = seal_of(made)
+    assert known is not None and len(known) == 64
+    assert seal_of(run) == known
+
+
+def test_tries_that_failed_are_not_in_it(made: Path, run: Path) -> None:
+    """A harness error that was tried again has left nothing that counts."""
+    folder = RunFolder.open(run)
+    name = next(iter(folder.share()))
+    head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+    path = run / "records" / "0002-a.jsonl"
+    digests.close_segments(run, finished=False)
+    path.write_bytes(written(path, head, [{"experiment_id": name, "status": "harness_error"}]))
+    digests.close_segments(run, finished=True)
+    assert seal_of(run) == seal_of(made)
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+CHANGES: dict[str, Callable[[Path], None]] = {
+    "a record": lambda run: edit(run / "records" / "0001-a.jsonl", '"count":5', '"count":6'),
+    "a patch": lambda run: edit(run / "records" / "0001-a.jsonl", '"patch":"', '"patch":"0'),
+    "the proof": lambda run: edit(run / "proof" / "0001-a.jsonl", '"count":5', '"count":6'),
+    "a golden run": lambda run: (run / "golden" / "A" / "log.npz").write_bytes(b"other"),
+    "a check": lambda run: edit(run / "checks.json", "[]", '["failed"]'),
+    "a source": lambda run: edit(run / "run.json", '"templates": "', '"templates": "0'),
+    "the campaign": lambda run: edit(run / "run.json", '"campaign_digest": "', '"campaign_digest": "0'),
+    "a package": lambda run: edit(run / "run.json", '"numpy": "', '"numpy": "0'),
+    "Python": lambda run: edit(run / "run.json", '"python": "3', '"python": "4'),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_all_that_counts_is_in_it(made: Path, run: Path, reseal: Reseal, change: str) -> None:
+    """Another record, patch, golden run, check, source or version, and the seal is another one."""
+    CHANGES[change](run)
+    reseal(run)
+    assert seal_of(run) not in (None, seal_of(made))
+
+
+def test_what_is_not_finished_has_none(run: Path) -> None:
+    """A seal stands for a whole run; an old one has nothing to be trusted."""
+    digests.close_segments(run, finished=False)
+    folder = RunFolder.open(run)
+    assert (seal(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
+    edit(run / "run.json", '"run/2"', '"run/1"')
+    folder = RunFolder.unverified(run)
+    assert seal_or_why_not(folder) == "none: not verifiable, as run/1 has no digests"
+
+
+def test_a_record_is_in_it_as_it_was_written(made: Path, run: Path) -> None:
+    """The seal is of bytes, not of what a version of mutator makes of them: a field that joins records later
+    changes no seal."""
+    path = run / "records" / "0001-a.jsonl"
+    lines = path.read_text().splitlines()
+    assert canonical(json.loads(lines[1])) != lines[1]  # the checksum comes first
+    assert seal_of(run) == seal_of(made)
