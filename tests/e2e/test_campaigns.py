@@ -95,7 +95,6 @@ def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
         "results.parquet",
         "timings.parquet",
         "owner.lock",
-        "workers",
     }
     assert summary.results is not None
     assert len(summary.results.read_text().splitlines()) == 1 + 12
