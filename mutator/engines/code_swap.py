@@ -4,7 +4,8 @@ A mutant's files differ from the pristine ones by inserted lines alone, so outsi
 but the import of the probe. Between two steps of a run no function of the target is at work. The code of the
 changed functions can then be swapped in place, and whatever refers to them (methods, closures, names imported
 elsewhere) goes on with the new code. Until its trigger first holds, such a program does what the pristine one
-does: the probe guards every inserted statement, and none of them hides a name.
+does: the probe guards every inserted statement, and no mutant is built in which one of them changes what a
+name means.
 """
 
 import re
@@ -149,24 +150,12 @@ def _check(old: CodeType, new: CodeType, name: str) -> None:
     before = _inner(old)
     if len(before) > sum(any(same(one, other) for other in _inner(new)) for one in before):
         raise NotSwappable(f"{name} has a function in it that is changed")
-    hidden = (_locals(new) - _locals(old)) & _read(old)
-    if hidden:
-        raise NotSwappable(f"{name} reads '{min(hidden)}' from outside, which an injected statement sets")
 
 
 def _signature(code: CodeType) -> tuple[object, ...]:
     count = code.co_argcount + code.co_kwonlyargcount
     counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount)
     return (*counts, code.co_varnames[:count], code.co_flags, code.co_freevars)
-
-
-def _locals(code: CodeType) -> set[str]:
-    return {*code.co_varnames, *code.co_cellvars}
-
-
-def _read(code: CodeType) -> set[str]:
-    """Names that the function, or one inside it, reads from outside (attribute names among them)."""
-    return {*code.co_names, *code.co_freevars}.union(*map(_read, _inner(code)))
 
 
 def _inner(code: CodeType) -> list[CodeType]:

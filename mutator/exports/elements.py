@@ -15,7 +15,7 @@ from mutator.execution import single_run
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, Site, parsed
-from mutator.mutants.building import injection_edit
+from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import Edit
 from mutator.store import plan_file

@@ -1,26 +1,23 @@
 """Anchors: from a qualified function name and a statement to lines of a source file.
 
 LibCST parses each file once. Kept are, for each function, the statements that assign, call or return, with
-the lines they span. A location resolves to exactly one of them, or to an error that lists the candidates.
+the lines they span. A location resolves to exactly one of them, or to an error that lists the candidates; and
+only to one that `ast` sees in the same place.
 """
 
-import re
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import libcst as cst
-from libcst.metadata import CodeRange, MetadataWrapper, PositionProvider
 
 from mutator._common.interrupts import held
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.probe import instrumented_line
+from mutator.mutants.parsing import import_line, libcst_module, python_tree, reading, refuse_unfit
+from mutator.mutants.places import Place, places_by_ast
+from mutator.mutants.scopes import as_compiled, function_names
 from mutator.mutants.statements import Function, Statement, collect
 from mutator.targets.source_tree import SourceTree
-
-_LONE_CR = re.compile(rb"\r(?!\n)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +49,9 @@ class ParsedFile:
     indent_unit: bytes
     import_line: int
     functions: Mapping[str, tuple[Function, ...]]
+    places: frozenset[Place]  # as `ast` sees them
     where: Path
+    sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve(self, location: FaultLocation) -> Site:
@@ -72,85 +71,26 @@ def parsed(tree: SourceTree, path: str) -> ParsedFile:
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse one file of the target; MutatorError when it is not Python, or has injected lines already."""
     where = root / path
-    lines = tuple(data.splitlines(keepends=True))
-    if _LONE_CR.search(data):
-        raise MutatorError(
-            "line ends of CR alone", where=where, expected="LF or CRLF", remedy="convert the file's line ends"
-        )
-    _refuse_instrumented(data, where)
-    try:
-        compile(data, str(where), "exec", dont_inherit=True)
-        module = cst.parse_module(data)
-    except (SyntaxError, ValueError, RecursionError, cst.ParserSyntaxError) as error:
-        message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
-        raise MutatorError(
-            f"not valid Python: {message}", where=where, line=line, remedy="mend the target"
-        ) from None
-    wrapper = MetadataWrapper(module, unsafe_skip_copy=True)
-    positions: Mapping[cst.CSTNode, CodeRange] = wrapper.resolve(PositionProvider)
-    return ParsedFile(
-        path=path,
-        data=data,
-        lines=lines,
-        encoding=module.encoding.removesuffix("-sig"),
-        newline=module.default_newline.encode(),
-        indent_unit=module.default_indent.encode(),
-        import_line=_import_line(module, positions),
-        functions=collect(module, positions),
-        where=where,
-    )
-
-
-def _refuse_instrumented(data: bytes, where: Path) -> None:
-    line = instrumented_line(data)
-    if line is not None:
-        raise MutatorError(
-            "the name _fi or a `# fi:` tag is in use",
+    refuse_unfit(data, where)
+    tree = python_tree(data, where)
+    with reading(where):
+        module, positions = libcst_module(data, where)
+        return ParsedFile(
+            path=path,
+            data=data,
+            lines=tuple(data.splitlines(keepends=True)),
+            encoding=module.encoding.removesuffix("-sig"),
+            newline=module.default_newline.encode(),
+            indent_unit=module.default_indent.encode(),
+            import_line=import_line(module, positions),
+            functions=collect(module, positions, function_names(data)),
+            places=places_by_ast(tree),
             where=where,
-            line=line + 1,
-            expected="a tree without injected lines",
-            remedy="point the manifest at the original tree, or rename it in the target",
         )
-
-
-def _import_line(module: cst.Module, positions: Mapping[cst.CSTNode, CodeRange]) -> int:
-    """Index of the line before which an import goes: after docstring and `__future__` imports, if any."""
-    after = None
-    for i, node in enumerate(module.body):
-        if not isinstance(node, cst.SimpleStatementLine):
-            break
-        small = node.body[0]
-        docstring = (
-            i == 0
-            and isinstance(small, cst.Expr)
-            and isinstance(small.value, cst.SimpleString | cst.ConcatenatedString)
-        )
-        future = (
-            isinstance(small, cst.ImportFrom)
-            and isinstance(small.module, cst.Name)
-            and small.module.value == "__future__"
-        )
-        if not (docstring or future):
-            break
-        after = positions[node].end.line + _continued(node)
-    if after is not None:
-        return after
-    return _first_line(module.body[0], positions) if module.body else len(module.header)
-
-
-def _first_line(node: cst.CSTNode, positions: Mapping[cst.CSTNode, CodeRange]) -> int:
-    """Index of the first line of a statement, its decorators included."""
-    decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
-    return min(positions[n].start.line for n in (node, *decorators)) - 1
-
-
-def _continued(node: cst.SimpleStatementLine) -> int:
-    """Lines that a trailing backslash adds after the last token of a statement."""
-    return node.trailing_whitespace.whitespace.value.count("\\")
 
 
 def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
-    name = location.function.replace(".<locals>", "")
+    name = as_compiled(location.function.replace(".<locals>", ""))
     functions = file.functions.get(name)
     if not functions:
         known = list(file.functions)
@@ -164,6 +104,7 @@ def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
         return _entry(file, location, functions)
     function, statement = _choose(file, location, functions)
     _refuse_awkward(file, location.anchor, statement)
+    _check_place(file, statement.place)
     first = statement.first
     return Site(
         first=first,
@@ -174,6 +115,18 @@ def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
         indent=_indent(file.lines[first]),
         names=function.names,
     )
+
+
+def _check_place(file: ParsedFile, place: Place | None) -> None:
+    """MutatorError unless `ast` sees the anchored statement, or the function, in the same place."""
+    if place is not None and place.in_bytes(file.lines, file.encoding) not in file.places:
+        raise MutatorError(
+            "LibCST and Python's own parser see this statement in different places",
+            where=file.where,
+            line=place.start[0],
+            expected="one place for both",
+            remedy="anchor at another statement, or reformat the target",
+        )
 
 
 def _indent(line: bytes) -> bytes:
@@ -200,6 +153,7 @@ def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function,
             expected="a body on lines below its head, its docstring on lines of its own",
             remedy="anchor somewhere else, or reformat the target",
         )
+    _check_place(file, function.place)
     index, model_line = function.entry
     return Site(
         first=index,
@@ -217,7 +171,8 @@ def _choose(
 ) -> tuple[Function, Statement]:
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
-    pairs = [(f, s) for f in functions for s in f.statements if anchor.name in s.names(verb)]
+    name = as_compiled(anchor.name)
+    pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
     hits = [(f, s) for f, s in pairs if s.reason is None]
     nth = anchor.nth
     if hits and (len(hits) == 1 if nth is None else nth <= len(hits)):

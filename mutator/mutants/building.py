@@ -7,13 +7,14 @@ from pathlib import Path
 
 from mutator._common.hashing import content_id
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels, SnippetKind
+from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.model import Fault, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.normalized_source import compiles, normalized
 from mutator.mutants.patches import changed_file, new_file
 from mutator.mutants.probe import OBSERVE_TAG, injection_id, observe_call, probe_path, template_values
-from mutator.mutants.rendering import render, snippet
+from mutator.mutants.rendering import render
 from mutator.mutants.reusable_changes import (
     Change,
     ReusableChange,
@@ -22,7 +23,7 @@ from mutator.mutants.reusable_changes import (
     known_changes,
     reuse_key,
 )
-from mutator.mutants.splicing import Edit, apply_edits, guard, insertion, joined, probe_import, unsplice
+from mutator.mutants.splicing import Edit, apply_edits, insertion, joined, probe_import, unsplice
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
@@ -103,26 +104,6 @@ def _edits(
         file = parsed(manifest.tree, injection.location.path)
         edits.setdefault(file.path, []).append(injection_edit(file, models, injection, name))
     return edits
-
-
-def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> Edit:
-    """The edit of one injection in its file: anchor resolved, names checked, snippet rendered."""
-    model = models.get(injection.model)
-    site = file.resolve(injection.location)
-    params = dict(injection.params)
-    for param in model.params:
-        value = params.get(param.name)
-        if param.type == "variable" and isinstance(value, str) and value.partition(".")[0] not in site.names:
-            raise MutatorError(
-                f"'{value}' is not known in {injection.location.function}",
-                where=file.where,
-                line=site.first + 1,
-                expected=f"a name used there: {', '.join(sorted(site.names))}",
-                remedy=f"correct `{param.name}`",
-            )
-    code = snippet(model, params, name)
-    make = guard if model.kind is SnippetKind.GUARD else insertion
-    return make(file, site, code, name)
 
 
 def _observation(manifest: TargetManifest) -> Edit:

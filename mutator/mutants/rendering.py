@@ -132,7 +132,7 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
     text += "\n"
     whole = text + "    pass\n" if kind is SnippetKind.GUARD else text
     try:
-        ast.parse(whole)
+        tree = ast.parse(whole)
         ends = [
             token.start[0]
             for token in tokenize.generate_tokens(io.StringIO(text).readline)
@@ -149,6 +149,13 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
             remedy="correct the template",
         ) from None
     lines = text.split("\n")[:-1]
+    if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(tree)):
+        raise MutatorError(
+            f"the template yields: {text!r}",
+            where=where,
+            expected="lines that do not make a generator of the function that they are put into",
+            remedy="correct the template",
+        )
     uneven = any((len(x) - len(x.lstrip(" "))) % 4 or "\t" in x for x in lines)
     if uneven or ends != list(range(1, len(lines) + 1)):
         raise MutatorError(

@@ -1,12 +1,12 @@
 """What a function's statements assign, call and return, and the lines they are on."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import libcst as cst
-from libcst.metadata import CodeRange
 
-Positions = Mapping[cst.CSTNode, CodeRange]
+from mutator.mutants.places import Place, Positions, function_place, line_after, statement_place
+from mutator.mutants.scopes import FunctionNames, as_compiled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -14,11 +14,12 @@ class Statement:
     """A small statement; with a `reason`, something that binds or calls but is not a statement, and why.
 
     Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns has the
-    empty name in `returns`, too: it matches any return.
+    empty name in `returns`, too: it matches any return. `place` is None if there is a reason.
     """
 
     first: int
     last: int
+    place: Place | None = None
     assigns: tuple[str, ...] = ()
     calls: tuple[str, ...] = ()
     returns: tuple[str, ...] = ()
@@ -51,14 +52,17 @@ class Function:
     """
 
     line: int
+    place: Place
     statements: tuple[Statement, ...]
     names: frozenset[str]
     entry: tuple[int, int] | None
 
 
-def collect(module: cst.Module, positions: Positions) -> dict[str, tuple[Function, ...]]:
+def collect(
+    module: cst.Module, positions: Positions, names: FunctionNames
+) -> dict[str, tuple[Function, ...]]:
     """All functions by qualified name (`Class.method`, `outer.inner`), those of one name in source order."""
-    collector = _Collector(positions)
+    collector = _Collector(positions, names)
     module.visit(collector)
     return {name: tuple(functions) for name, functions in collector.functions.items()}
 
@@ -66,24 +70,24 @@ def collect(module: cst.Module, positions: Positions) -> dict[str, tuple[Functio
 def dotted(node: cst.CSTNode | None) -> str | None:
     """`a.b.c` for a chain of names, None for anything else."""
     if isinstance(node, cst.Name):
-        return node.value
+        return as_compiled(node.value)
     if isinstance(node, cst.Attribute):
         base = dotted(node.value)
-        return f"{base}.{node.attr.value}" if base else None
+        return f"{base}.{as_compiled(node.attr.value)}" if base else None
     return None
 
 
 class _Collector(cst.CSTVisitor):
-    def __init__(self, positions: Positions) -> None:
+    def __init__(self, positions: Positions, names: FunctionNames) -> None:
         super().__init__()
         self.positions = positions
+        self.names = names
         self.functions: dict[str, list[Function]] = {}
         self.scope: list[str] = []
-        self.open: list[tuple[list[Statement], set[str]] | None] = []  # None for a class
-        self.entries: list[tuple[int, list[Function]]] = []
+        self.open: list[list[Statement] | None] = []  # None for a class
 
     def visit_ClassDef(self, node: cst.ClassDef) -> None:  # noqa: N802
-        self.scope.append(node.name.value)
+        self.scope.append(as_compiled(node.name.value))
         self.open.append(None)
 
     def leave_ClassDef(self, original_node: cst.ClassDef) -> None:  # noqa: N802
@@ -91,28 +95,22 @@ class _Collector(cst.CSTVisitor):
         self.open.pop()
 
     def visit_FunctionDef(self, node: cst.FunctionDef) -> None:  # noqa: N802
-        self.scope.append(node.name.value)
-        self.open.append(([], set()))
+        self.scope.append(as_compiled(node.name.value))
+        self.open.append([])
 
     def leave_FunctionDef(self, original_node: cst.FunctionDef) -> None:  # noqa: N802
-        entry = self.open.pop()
-        assert entry is not None
-        statements, names = entry
+        statements = self.open.pop()
+        assert statements is not None
+        line = self.positions[original_node].start.line
         function = Function(
-            line=self.positions[original_node].start.line - 1,
+            line=line - 1,
+            place=function_place(original_node, self.positions),
             statements=tuple(sorted(statements, key=lambda s: s.first)),
-            names=frozenset(names),
+            names=self.names.get((line, self.scope[-1]), frozenset()),
             entry=_entry(original_node, self.positions),
         )
         self.functions.setdefault(".".join(self.scope), []).append(function)
         self.scope.pop()
-        outer = self.open[-1] if self.open else None
-        if outer:
-            outer[1].update(names)
-
-    def visit_Name(self, node: cst.Name) -> None:  # noqa: N802
-        if self.open and self.open[-1]:
-            self.open[-1][1].add(node.value)
 
     def visit_SimpleStatementLine(self, node: cst.SimpleStatementLine) -> None:  # noqa: N802
         self._add(node, one_line_suite=False)
@@ -130,11 +128,11 @@ class _Collector(cst.CSTVisitor):
         self._add_other(node, _targets(node.target), "it is bound by `:=` inside an expression")
 
     def _add(self, node: cst.SimpleStatementLine | cst.SimpleStatementSuite, one_line_suite: bool) -> None:
-        scope = self.open[-1] if self.open else None
-        if not scope:
+        statements = self.open[-1] if self.open else None
+        if statements is None:
             return
         span = self.positions[node]
-        continued = node.trailing_whitespace.whitespace.value.count("\\")
+        last = line_after(node, self.positions)
         for i, small in enumerate(node.body):
             outer = _outer_call(small)
             for call in _inner_calls(small, outer):
@@ -144,10 +142,11 @@ class _Collector(cst.CSTVisitor):
             assigns, calls, returns = _effects(small, outer)
             if not (assigns or calls or returns):
                 continue
-            scope[0].append(
+            statements.append(
                 Statement(
                     first=span.start.line - 1,
-                    last=span.end.line + continued,
+                    last=last,
+                    place=statement_place(small, self.positions),
                     assigns=assigns,
                     calls=calls,
                     returns=returns,
@@ -159,11 +158,11 @@ class _Collector(cst.CSTVisitor):
             )
 
     def _add_other(self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False) -> None:
-        scope = self.open[-1] if self.open else None
-        if scope and names and all(names):
+        statements = self.open[-1] if self.open else None
+        if statements is not None and names and all(names):
             span = self.positions[node]
             kept = tuple(names)
-            scope[0].append(
+            statements.append(
                 Statement(
                     first=span.start.line - 1,
                     last=span.end.line,
@@ -248,5 +247,4 @@ def _entry(node: cst.FunctionDef, positions: Positions) -> tuple[int, int] | Non
         return line, line
     if not isinstance(first, cst.SimpleStatementLine) or len(first.body) > 1:
         return None
-    continued = first.trailing_whitespace.whitespace.value.count("\\")
-    return positions[first].end.line + continued, positions[first].start.line - 1
+    return line_after(first, positions), positions[first].start.line - 1

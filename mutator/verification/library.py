@@ -17,7 +17,8 @@ from mutator.faults.readings import Readings
 from mutator.faults.specs import FaultSpec, Variant
 from mutator.model import Fault
 from mutator.mutants.anchors import parse_file, parsed
-from mutator.mutants.building import build, injection_edit
+from mutator.mutants.building import build
+from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.splicing import apply_edits, joined, unsplice
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable

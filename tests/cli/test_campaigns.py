@@ -69,6 +69,22 @@ def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
     assert not (Path("p") / "records").exists()
 
 
+@pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
+def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: str) -> None:
+    """A fault that would make a module's name local is told with file and line, before any run."""
+    driver = root / "tree" / "toycar" / "driver.py"
+    driver.write_text("HEADWAY_S = 1.5\n" + driver.read_text().replace("1.5 * speed", "HEADWAY_S * speed"))
+    spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
+    place = "{file: toycar/driver.py, function: Driver.drive, entry: true}"
+    text = re.sub(r"at: .*", f"at: {place}", spec.read_text())
+    spec.write_text(text.replace("{by_m: offset}", "{by_m: offset, target: HEADWAY_S}"))
+    answer = cli("run", "small", "--out", "r", "--engine", engine)
+    assert answer.code == 1
+    assert "sensor/lane/shifted" in answer.err
+    assert "driver.py:12: the lines would make 'HEADWAY_S' local in drive" in answer.err
+    assert not list(Path("r").glob("golden/*"))
+
+
 def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
     """The same campaign and seed give the same digest; another seed gives another."""
     one, two = (cli("plan", "toy", "--out", out, "--json").json for out in "ab")

@@ -104,6 +104,8 @@ def test_text_is_no_number() -> None:
         ("if x:\n  x = 1\n", ["one statement a line"]),
         ("if x:\n\tx = 1\n", ["one statement a line"]),
         ("if x:\n", ["does not give Python"]),
+        ("if x:\n    yield x\n", ["t.py.j2: the template yields"]),
+        ("x = yield from x\n", ["t.py.j2: the template yields"]),
         ("", ["one statement a line"]),
     ],
 )

@@ -1,0 +1,102 @@
+"""The edit of one injection: anchor resolved, snippet rendered, and no name of the target disturbed by it."""
+
+import ast
+from collections.abc import Iterator, Sequence
+
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
+from mutator.model import Injection
+from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.rendering import snippet
+from mutator.mutants.reusable_changes import reuse_key
+from mutator.mutants.scopes import as_compiled, moved_names
+from mutator.mutants.splicing import Edit, apply_edits, guard, insertion, joined
+
+
+def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> Edit:
+    """The edit of one injection in its file; `name` tags its lines.
+
+    MutatorError for an anchor that is not found, a name that the function does not know, and for lines that
+    would change what the target's names mean while the fault is not active.
+    """
+    model = models.get(injection.model)
+    site = file.resolve(injection.location)
+    variables = _variables(file, site, model, injection)
+    code = snippet(model, dict(injection.params), name)
+    make = guard if model.kind is SnippetKind.GUARD else insertion
+    edit = make(file, site, code, name)
+    key = (variables, reuse_key(file, [edit], [name]))
+    if key not in file.sound:
+        _check_own_names(file, site, model, code, variables)
+        _check_scopes(file, site, edit)
+        file.sound.add(key)
+    return edit
+
+
+def _variables(file: ParsedFile, site: Site, model: FaultModel, injection: Injection) -> frozenset[str]:
+    """The variables that are passed to the template; MutatorError for one that the function does not know."""
+    params = dict(injection.params)
+    found = set()
+    for param in model.params:
+        value = params.get(param.name)
+        if param.type == "variable" and isinstance(value, str):
+            variable = as_compiled(value.partition(".")[0])
+            if variable not in site.names:
+                raise MutatorError(
+                    f"'{value}' is not known in {injection.location.function}",
+                    where=file.where,
+                    line=site.first + 1,
+                    expected=f"a name used there: {', '.join(sorted(site.names))}",
+                    remedy=f"correct `{param.name}`",
+                )
+            found.add(variable)
+    return frozenset(found)
+
+
+def _check_own_names(
+    file: ParsedFile, site: Site, model: FaultModel, code: Sequence[str], variables: frozenset[str]
+) -> None:
+    """MutatorError if the snippet sets a name of the function that is none of its parameters."""
+    block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
+    taken = ({as_compiled(name) for name in _bound("\n".join(block))} - variables) & site.names
+    if taken:
+        raise MutatorError(
+            f"the injected lines set '{min(taken)}', a name that the function uses itself",
+            where=file.where,
+            line=site.first + 1,
+            expected="lines that set their parameters and names of their own",
+            remedy=f"rename it in {model.template_path.name}, or make it a parameter",
+        )
+
+
+def _bound(code: str) -> Iterator[str]:
+    """The names that code sets or deletes, those inside comprehensions and functions included."""
+    for node in ast.walk(ast.parse(code)):
+        match node:
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
+                yield name
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                yield name
+            case ast.alias(name=name, asname=other):
+                yield other or name.partition(".")[0]
+            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)):
+                yield name
+            case ast.MatchStar(name=str(name)) | ast.MatchMapping(rest=str(name)):
+                yield name
+
+
+def _check_scopes(file: ParsedFile, site: Site, edit: Edit) -> None:
+    """MutatorError if the edit alone changes what a name means anywhere in the file."""
+    inserted = range(edit.index + 1, edit.index + 1 + len(edit.lines))
+    try:
+        moved = next(moved_names(file.data, joined(apply_edits(file, [edit])), inserted), None)
+    except SyntaxError:
+        return  # the mutant does not compile, which is told when it is built
+    if moved:
+        raise MutatorError(
+            f"the lines would make '{moved.name}' {moved.after} in {moved.scope}, where it is {moved.before}",
+            where=file.where,
+            line=site.first + 1,
+            expected="a variable that the function sets itself, or declares `global` or `nonlocal`",
+            remedy="inject where the variable is set, or into a variable that is set from it",
+        )

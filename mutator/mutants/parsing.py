@@ -1,0 +1,118 @@
+"""A source file parsed twice, by Python and by LibCST, and refused where they cannot both read it."""
+
+import ast
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import zip_longest
+from pathlib import Path
+
+import libcst as cst
+from libcst.metadata import MetadataWrapper, PositionProvider
+
+from mutator.errors import MutatorError
+from mutator.mutants.places import Positions, line_after
+from mutator.mutants.probe import instrumented_line
+
+_LONE_CR = re.compile(rb"\r(?!\n)")
+
+
+def refuse_unfit(data: bytes, where: Path) -> None:
+    """MutatorError for line ends that the splicer does not know, and for a file with injected lines."""
+    if found := _LONE_CR.search(data):
+        raise MutatorError(
+            "line ends of CR alone",
+            where=where,
+            line=data[: found.start()].count(b"\n") + 1,
+            expected="LF or CRLF",
+            remedy="convert the file's line ends",
+        )
+    line = instrumented_line(data)
+    if line is not None:
+        raise MutatorError(
+            "the name _fi or a `# fi:` tag is in use",
+            where=where,
+            line=line + 1,
+            expected="a tree without injected lines",
+            remedy="point the manifest at the original tree, or rename it in the target",
+        )
+
+
+def python_tree(data: bytes, where: Path) -> ast.Module:
+    """What `ast` makes of the file; MutatorError unless it compiles."""
+    try:
+        compile(data, str(where), "exec", dont_inherit=True)
+        return ast.parse(data)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
+        raise MutatorError(
+            f"not valid Python: {message}", where=where, line=line, remedy="mend the target"
+        ) from None
+
+
+@contextmanager
+def reading(where: Path) -> Iterator[None]:
+    """Within it, LibCST reads a file; MutatorError where it fails on valid Python."""
+    try:
+        yield
+    except (cst.ParserSyntaxError, UnicodeError, RecursionError) as error:
+        message, line = str(error), None
+        if isinstance(error, cst.ParserSyntaxError):
+            message = error.message.partition(": expected")[0]
+            line = None if message.startswith("tokenizer") else error.raw_line  # where it gives line 1
+        raise MutatorError(
+            f"LibCST cannot read it: {message}",
+            where=where,
+            line=line,
+            expected="Python that LibCST reads, not nested too deeply",
+            remedy="write it in another way, or inject into another file",
+        ) from None
+
+
+def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
+    """What LibCST makes of the file; MutatorError unless that gives back the file's bytes."""
+    module = cst.parse_module(data)
+    given = module.bytes
+    if given != data:
+        pairs = zip_longest(data.splitlines(keepends=True), given.splitlines(keepends=True))
+        line = next(i for i, (one, other) in enumerate(pairs) if one != other)
+        text = b"".join(data.splitlines()[line : line + 1]).decode(errors="replace").strip()
+        raise MutatorError(
+            f"LibCST does not give back the line `{text}` as it is",
+            where=where,
+            line=line + 1,
+            expected="lines that LibCST keeps whole: no backslash alone, no form feed before code",
+            remedy="write it in another way, or inject into another file",
+        )
+    return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
+
+
+def import_line(module: cst.Module, positions: Positions) -> int:
+    """Index of the line before which an import goes: after docstring and `__future__` imports, if any."""
+    after = None
+    for i, node in enumerate(module.body):
+        if not isinstance(node, cst.SimpleStatementLine):
+            break
+        small = node.body[0]
+        docstring = (
+            i == 0
+            and isinstance(small, cst.Expr)
+            and isinstance(small.value, cst.SimpleString | cst.ConcatenatedString)
+        )
+        future = (
+            isinstance(small, cst.ImportFrom)
+            and isinstance(small.module, cst.Name)
+            and small.module.value == "__future__"
+        )
+        if not (docstring or future):
+            break
+        after = line_after(node, positions)
+    if after is not None:
+        return after
+    return _first_line(module.body[0], positions) if module.body else len(module.header)
+
+
+def _first_line(node: cst.CSTNode, positions: Positions) -> int:
+    """Index of the first line of a statement, its decorators included."""
+    decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
+    return min(positions[n].start.line for n in (node, *decorators)) - 1

@@ -1,0 +1,89 @@
+"""Where functions and statements are, told twice: a place counts only if LibCST and `ast` agree on it.
+
+A parser that drops a line shifts everything below. A mutant made with its positions compiles and un-splices
+all the same, with the fault at the wrong line.
+"""
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import libcst as cst
+from libcst.metadata import CodePosition, CodeRange
+
+Positions = Mapping[cst.CSTNode, CodeRange]
+_Point = tuple[int, int]
+_STATEMENTS = ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a function or a small statement is; `kind` is its class in `ast`.
+
+    `start` and `to` are (line from 1, column). `to` is the end of a statement; of a function, the start of
+    the first statement in it, which may be its docstring. LibCST counts columns in characters, `ast` in bytes
+    of UTF-8.
+    """
+
+    kind: str
+    start: _Point
+    to: _Point
+    docstring: bool = False
+
+    def in_bytes(self, lines: Sequence[bytes], encoding: str) -> "Place":
+        """The same with columns in bytes of UTF-8; `lines` are those of the file."""
+
+        def column(point: _Point) -> _Point:
+            line, characters = point
+            text = lines[line - 1].decode(encoding, "replace")
+            return line, len(text[:characters].encode("utf-8", "replace"))
+
+        return replace(self, start=column(self.start), to=column(self.to))
+
+
+def function_place(node: cst.FunctionDef, positions: Positions) -> Place:
+    """Where LibCST sees a function."""
+    first: cst.CSTNode = node.body.body[0]
+    if isinstance(first, cst.SimpleStatementLine):
+        first = first.body[0]
+    return Place(
+        kind="AsyncFunctionDef" if node.asynchronous else "FunctionDef",
+        start=_point(positions[node].start),
+        to=_point(positions[first].start),
+        docstring=node.get_docstring(clean=False) is not None,
+    )
+
+
+def statement_place(node: cst.BaseSmallStatement, positions: Positions) -> Place:
+    """Where LibCST sees a small statement."""
+    span = positions[node]
+    return Place(kind=type(node).__name__, start=_point(span.start), to=_point(span.end))
+
+
+def line_after(node: cst.SimpleStatementLine | cst.SimpleStatementSuite, positions: Positions) -> int:
+    """Index of the first line after a line of statements; backslashes may follow the last of them."""
+    space = node.trailing_whitespace.whitespace.value
+    semicolon = node.body[-1].semicolon
+    if isinstance(semicolon, cst.Semicolon):
+        space += cst.Module([]).code_for_node(semicolon)
+    return positions[node].end.line + space.count("\\")
+
+
+def _point(position: CodePosition) -> _Point:
+    return position.line, position.column
+
+
+def places_by_ast(tree: ast.Module) -> frozenset[Place]:
+    """Where `ast` sees functions, and statements that can be anchors; columns in bytes of UTF-8."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            first, text = node.body[0], ast.get_docstring(node, clean=False)
+            to, docstring = (first.lineno, first.col_offset), text is not None
+        elif isinstance(node, _STATEMENTS):
+            to, docstring = (node.end_lineno or 0, node.end_col_offset or 0), False
+        else:
+            continue
+        start = (node.lineno, node.col_offset)
+        found.add(Place(kind=type(node).__name__, start=start, to=to, docstring=docstring))
+    return frozenset(found)

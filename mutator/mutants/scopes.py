@@ -1,0 +1,74 @@
+"""What names mean in the functions of a source, as the compiler sees it.
+
+One assignment anywhere in a function makes a name local to all of it, from its first line on and whether or
+not the assignment is ever carried out.
+"""
+
+import unicodedata
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass
+from symtable import Symbol, SymbolTable, symtable
+
+FunctionNames = Mapping[tuple[int, str], frozenset[str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moved:
+    """A name that means something else in a function or class than it did."""
+
+    name: str
+    scope: str
+    before: str
+    after: str
+
+
+def function_names(data: bytes) -> FunctionNames:
+    """The names that each function knows and uses, by its line (from 1) and its own name."""
+    return dict(_function_names(_table(data), ""))
+
+
+def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
+    """`private` is what the compiler puts before private names (`__x`), in a class."""
+    if table.get_type() == "class":
+        name = table.get_name().lstrip("_")
+        private = f"_{name}__" if name else ""
+    names = set(table.get_identifiers())
+    if table.get_type() == "function" and ".0" not in names:  # the argument of a comprehension
+        names |= {name[len(private) - 2 :] for name in names if private and name.startswith(private)}
+        yield (table.get_lineno(), table.get_name()), frozenset(names)
+    for child in table.get_children():
+        yield from _function_names(child, private)
+
+
+def as_compiled(name: str) -> str:
+    """An identifier as the compiler takes it: `µ` has two code points, which are one to it."""
+    return unicodedata.normalize("NFKC", name)
+
+
+def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[Moved]:
+    """The names that mean something else after lines were inserted: their numbers in `after`, from 1.
+
+    SyntaxError if `after` is not valid.
+    """
+    return _moved(_table(before), _table(after), inserted)
+
+
+def _moved(before: SymbolTable, after: SymbolTable, inserted: Container[int]) -> Iterator[Moved]:
+    homes = {symbol.get_name(): _home(symbol) for symbol in after.get_symbols()}
+    for symbol in before.get_symbols():
+        name, home = symbol.get_name(), _home(symbol)
+        if homes.get(name, "unknown") != home:
+            yield Moved(name=name, scope=before.get_name(), before=home, after=homes.get(name, "unknown"))
+    kept = [child for child in after.get_children() if child.get_lineno() not in inserted]
+    for one, other in zip(before.get_children(), kept, strict=False):
+        yield from _moved(one, other, inserted)
+
+
+def _home(symbol: Symbol) -> str:
+    if symbol.is_local():
+        return "local"
+    return "of an enclosing function" if symbol.is_free() else "global or built-in"
+
+
+def _table(data: bytes) -> SymbolTable:
+    return symtable(data, "<source>", "exec")  # type: ignore[arg-type]  # bytes, as `compile`

@@ -1,0 +1,272 @@
+"""What must hold of mutants of any source, proved by `ast`, by bytecode and by execution; LibCST has no say.
+
+`prove` splices at every anchor of a source, and counts what it tried, and what was refused and why. Wrong is
+raised for what does not hold, and for what is refused without need.
+"""
+
+import ast
+import contextlib
+import random
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import SnippetKind
+from mutator.model import AnchorKind, Injection
+from mutator.mutants import splicing
+from mutator.mutants.anchors import ParsedFile, Site, parse_file
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.rendering import snippet
+from mutator.workspace import Workspace
+
+from .anchors_by_ast import AFTER, BEFORE, Spot, spots
+from .injected_statements import Beside, Lines, take_out
+from .names_in_bytecode import is_carried_out, keeps_names
+
+Run = Callable[[bytes], object]  # what a source does
+_MODELS = Workspace.find(root=Path(__file__).parents[2]).fault_models()
+_VARIABLE = "?"
+_INJECTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("stuck", {"target": _VARIABLE, "value": 1.0}),
+    ("offset", {"target": _VARIABLE, "by": 1.0, "low": 0.0, "high": 5.0}),
+    ("delay", {"target": _VARIABLE, "delay": 0.5}),
+    ("ghost_object", {"distance_name": _VARIABLE, "distance": 5.0, "speed_name": _VARIABLE, "speed": 2.0}),
+    ("omission", {}),
+    (
+        "image_effect",
+        {"target": _VARIABLE, "effect": "pack.G0", "amount": 1.0, "camera": "x", "scene": "x", "seed": 1},
+    ),
+)
+
+
+class Wrong(AssertionError):
+    """A mutant is not what it must be."""
+
+
+@dataclass(slots=True)
+class Figures:
+    """How many modules, anchors, and injections that set a variable were tried, and what became of them."""
+
+    modules: Counter[str] = field(default_factory=Counter)
+    anchors: Counter[str] = field(default_factory=Counter)
+    variables: Counter[str] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        lines = []
+        for title in ("modules", "anchors", "variables"):
+            counter: Counter[str] = getattr(self, title)
+            lines.append(f"{title}: {sum(counter.values())}")
+            lines += [f"  {count:9}  {what}" for what, count in counter.most_common()]
+        return "\n".join([*lines, f"wrong: {len(self.wrong)}", *self.wrong[:10]])
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """An edit and the spot that it is meant for."""
+
+    spot: Spot
+    edit: splicing.Edit
+    guard: bool = False
+
+    @property
+    def name(self) -> str:
+        """The id in its lines."""
+        return self.edit.lines[0].decode("latin-1").split('"')[1]
+
+
+def prove(data: bytes, figures: Figures, run: Run | None = None, variables: int = 3) -> None:
+    """Splice at every anchor of a source; Wrong unless every mutant is what it must be.
+
+    At `variables` of the anchors, drawn from the source itself, variables are set, too.
+    """
+    tree = _tree(data)
+    try:
+        file = parse_file("m.py", data, Path("root"))
+    except MutatorError as error:
+        _expect("not valid Python" not in error.got or tree is None, f"refused: {error}")
+        figures.modules[_reason(error)] += 1
+        return
+    if tree is None:
+        raise Wrong("an invalid source was accepted")
+    figures.modules["spliced"] += 1
+    before = run(data) if run else None
+    groups, whole = _groups(file, tree, figures), ast.dump(tree)
+    for group in groups.values():
+        mutant = _spliced(file, group)
+        _check_tree(whole, mutant, group)
+        _expect(run is None or run(mutant) == before, "it behaves differently", mutant)
+    everywhere = [placed.spot for group in groups.values() for placed in group]
+    for spot in random.Random(len(data)).choices(everywhere, k=variables) if everywhere else ():
+        mutant = _with_variable_set(file, spot, figures)
+        _expect(run is None or not mutant or run(mutant) == before, f"{spot}: other behaviour", mutant)
+
+
+def _tree(data: bytes) -> ast.Module | None:
+    try:
+        compile(data, "m.py", "exec", dont_inherit=True)
+        return ast.parse(data)
+    except (SyntaxError, ValueError):
+        return None
+
+
+def _expect(holds: bool, what: str, mutant: bytes = b"") -> None:
+    if not holds:
+        raise Wrong(f"{what}\n{mutant.decode(errors='replace')}")
+
+
+def _reason(error: MutatorError) -> str:
+    """Why something is refused, without what differs from case to case; it must name the file."""
+    _expect(error.where is not None, f"no file: {error}")
+    text = re.sub(
+        r"'[^']*'|`[^`]*`|\d+", "_", re.sub(r"(error: [a-z ]+).*", r"\1", error.got, flags=re.DOTALL)
+    )
+    return "refused: " + re.sub(r" in [\w.]+(?=,|$)", "", text.partition(", where")[0])
+
+
+# At every anchor
+
+
+def _groups(file: ParsedFile, tree: ast.Module, figures: Figures) -> dict[str, list[_Placed]]:
+    """Edits at all anchors, in groups of which each makes one mutant."""
+    groups: dict[str, list[_Placed]] = {}
+    for i, spot in enumerate(spots(tree)):
+        name = f"{i:08x}"
+        try:
+            site = file.resolve(spot.location)
+        except MutatorError as error:
+            _expect(error.line is not None and _crowded(file, spot), f"{spot}: {error}")
+            figures.anchors[_reason(error)] += 1
+            continue
+        _check_site(file, site, spot)
+        figures.anchors[spot.kind.value] += 1
+        code = (f'if _fi.active("{name}"):', f'    _fi.report("{name}")')
+        edit = splicing.insertion(file, site, code, name)
+        groups.setdefault(spot.kind.value, []).append(_Placed(spot, edit))
+        if spot.kind in BEFORE:
+            _add_guard(file, site, _Placed(spot, edit), groups, figures)
+    return groups
+
+
+def _add_guard(
+    file: ParsedFile, site: Site, placed: _Placed, groups: dict[str, list[_Placed]], figures: Figures
+) -> None:
+    try:
+        edit = splicing.guard(file, site, (f'if not _fi.active("{placed.name}"):',), placed.name)
+    except MutatorError as error:
+        _expect(error.line is not None and _crowded(file, placed.spot), f"{placed.spot}: {error}")
+        figures.anchors[_reason(error)] += 1
+        return
+    figures.anchors["guard"] += 1
+    guards = groups.setdefault("guard", [])
+    if all(other.edit.index != edit.index for other in guards):  # several anchors name one statement
+        guards.append(_Placed(placed.spot, edit, guard=True))
+
+
+def _crowded(file: ParsedFile, spot: Spot) -> bool:
+    """Whether there is a reason to refuse an anchor: its statement returns, or shares its lines."""
+    node, kind = spot.node, spot.kind
+    if kind is AnchorKind.ENTRY:
+        node = spot.within.body[0]
+    start, end = (_line(file, n) for n in (node.lineno, node.end_lineno or 0))
+    continued = node.lineno > 1 and _line(file, node.lineno - 1).rstrip(b"\r\n").endswith(b"\\")
+    after = end[node.end_col_offset :].strip(b" \t\f\r\n;")
+    shared = (
+        bool(start[: node.col_offset].strip()) or continued or (bool(after) and not after.startswith(b"#"))
+    )
+    return shared or (kind in AFTER and isinstance(node, ast.Return))
+
+
+def _line(file: ParsedFile, number: int) -> bytes:
+    """A line as `ast` counts its columns."""
+    return file.lines[number - 1].decode(file.encoding).removeprefix("\ufeff").encode()
+
+
+def _check_site(file: ParsedFile, site: Site, spot: Spot) -> None:
+    """The lines of the site are those on which `ast` sees the statement."""
+    end = spot.node.end_lineno or 0
+    if spot.kind in AFTER:
+        between = b"".join(file.lines[end : site.last]).strip(b" \t\f\r\n\\;")
+        _expect(site.last >= end and not between, f"{spot} ends before line {site.last}")
+    elif spot.kind in BEFORE:
+        _expect(site.first == spot.node.lineno - 1, f"{spot} begins at line {site.first + 1}")
+
+
+def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
+    edits = [placed.edit for placed in group]
+    with contextlib.suppress(MutatorError):  # a byte order mark right before the first statement
+        edits.append(splicing.probe_import(file, "pack"))
+    mutant = splicing.joined(splicing.apply_edits(file, edits))
+    try:
+        compile(mutant, "m.py", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        raise Wrong(f"it does not compile: {error}\n{mutant.decode(errors='replace')}") from None
+    _expect(splicing.unsplice(mutant) == file.data, "it does not un-splice", mutant)
+    return mutant
+
+
+def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
+    """Each injected statement is beside its anchored one; without them the dumped tree is the original's."""
+    lines, changed = Lines.of(mutant), ast.parse(mutant)
+    found: dict[str, Beside] = {}
+    take_out(changed, lines.injected, found)
+    _expect(ast.dump(changed) == original, "more than the injected statements differs", mutant)
+    for placed in group:
+        spot = placed.spot
+        _expect(placed.name in found, f"{spot} has no statement", mutant)
+        beside = found[placed.name]
+        if spot.kind is AnchorKind.ENTRY:
+            node, first = beside.around, spot.within.body
+            text = ast.get_docstring(spot.within, clean=False)
+            _expect(beside.place == (text is not None) and bool(first), f"{spot} is not at the entry", mutant)
+        else:
+            node = beside.above if spot.kind in AFTER else beside.below
+        here = node and (type(node), lines.original[node.lineno], lines.original[node.end_lineno])
+        _expect(
+            here == (type(spot.node), spot.node.lineno, spot.node.end_lineno), f"{spot} is at {here}", mutant
+        )
+        if not placed.guard:
+            _expect(node.col_offset == spot.node.col_offset, f"{spot} is in another column", mutant)
+
+
+# Setting variables
+
+
+def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
+    """The mutant in which a variable is set at an anchor, its names being as they were; empty if refused."""
+    chosen = random.Random(f"{spot.location}")
+    known = sorted(
+        {n.id for n in ast.walk(spot.within) if isinstance(n, ast.Name)} - {"int"} | {"max", "new"}
+    )
+    model, params = chosen.choice(_INJECTIONS)
+    params = {name: chosen.choice(known) if value == _VARIABLE else value for name, value in params.items()}
+    injection = Injection(location=spot.location, model=model, params=tuple(sorted(params.items())))
+    try:
+        edit = injection_edit(file, _MODELS, injection, "abcd0123")
+    except MutatorError as error:
+        _expect(error.line is not None, f"no line: {error}")
+        if moved := re.match(r"the lines would make '(.+)' .* in (.+), where", error.got):
+            kept = keeps_names(file.data, _forced(file, spot, model, params))
+            _expect(not kept or not is_carried_out(file.data, moved[2], moved[1]), f"refused: {error}")
+        figures.variables[_reason(error)] += 1
+        return b""
+    try:
+        mutant = _spliced(file, [_Placed(spot, edit)])
+    except Wrong as error:
+        _expect("before global declaration" in str(error) or "before nonlocal" in str(error), str(error))
+        figures.variables["refused: the mutant does not compile"] += 1
+        return b""
+    figures.variables[model] += 1
+    _expect(keeps_names(file.data, mutant), f"{injection} changes what names mean", mutant)
+    return mutant
+
+
+def _forced(file: ParsedFile, spot: Spot, model: str, params: dict[str, Any]) -> bytes:
+    """The mutant that was refused."""
+    site, code = file.resolve(spot.location), snippet(_MODELS.get(model), params, "abcd0123")
+    make = splicing.guard if _MODELS.get(model).kind is SnippetKind.GUARD else splicing.insertion
+    return splicing.joined(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))

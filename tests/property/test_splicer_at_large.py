@@ -1,0 +1,104 @@
+"""The splicer on thousands of sources: whatever it does not refuse is spliced right.
+
+`pytest -m slow -s tests/property/test_splicer_at_large.py` tries all, and prints the figures.
+"""
+
+import random
+import sysconfig
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import libcst as cst
+import pytest
+from libcst.metadata import MetadataWrapper, PositionProvider
+
+from mutator.mutants import anchors, injection_edits, splicing, statements
+
+from .behaviour import behaviour
+from .generated_modules import ModuleWriter
+from .splicer_proofs import Figures, Run, Wrong, prove
+
+LIBRARY = Path(sysconfig.get_path("stdlib"))
+KINDS = ("entry", "after_assign", "before_assign", "after_call", "before_call", "before_return", "guard")
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    """What the sources warn of is their business."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: int = 3) -> Figures:
+    """What was tried with these sources; those that came out wrong are named."""
+    figures = Figures()
+    for name, data in sources:
+        try:
+            prove(data, figures, run, variables)
+        except Wrong as error:
+            figures.wrong.append(f"{name}: {error}")
+    print(f"\n{figures}")
+    return figures
+
+
+@pytest.mark.parametrize("count", [30, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_generated_modules(count: int) -> None:
+    """At every anchor of generated modules a mutant is right by `ast`, and does what the original does."""
+    figures = proved(((seed, ModuleWriter(seed).module()) for seed in range(count)), behaviour)
+    assert not figures.wrong
+    assert figures.modules["spliced"] > 0.8 * count
+    assert all(figures.anchors[kind] >= count for kind in KINDS)
+
+
+@pytest.mark.parametrize("share", [0.004, pytest.param(1.0, marks=pytest.mark.slow)])
+def test_the_standard_library(share: float) -> None:
+    """At every anchor of the installed standard library and its tests a mutant is right by `ast`."""
+    paths = sorted(path for path in LIBRARY.rglob("*.py") if "site-packages" not in path.parts)
+    chosen = random.Random(4).sample(paths, round(share * len(paths)))
+    figures = proved(((path, path.read_bytes()) for path in chosen), None)
+    assert not figures.wrong
+    assert figures.modules["spliced"] > 0.95 * len(chosen)
+    assert all(figures.anchors[kind] >= len(chosen) for kind in KINDS)
+
+
+def test_a_seed_makes_one_module() -> None:
+    """What is found wrong can be made again."""
+    assert ModuleWriter(7).module() == ModuleWriter(7).module() != ModuleWriter(8).module()
+
+
+SHIFTED = b"x = 1\n\\\ndef f(a):\n    b = a\n    c = T(1, b)\n    return c\ncall(f, 1)\n"
+CONTINUED = b"def f(a):\n    b = a; \\\n\n    return b\ncall(f, 1)\n"
+READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\n"
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "source"),
+    [
+        (anchors, "libcst_module", SHIFTED),
+        (statements, "line_after", CONTINUED),
+        (injection_edits, "_check_scopes", READS),
+        (splicing, "_unit", READS),
+    ],
+)
+def test_a_broken_splicer_is_found(
+    place: ModuleType, name: str, source: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without one of its checks, or with a wrong end of a statement or depth, something comes out wrong."""
+    assert not proved([("", source)], behaviour, 20).wrong
+    broken = {
+        "libcst_module": without_check_of_bytes,
+        "line_after": lambda node, positions: positions[node].end.line,
+        "_check_scopes": lambda *given: None,
+        "_unit": lambda *given: b"",
+    }
+    monkeypatch.setattr(place, name, broken[name])
+    monkeypatch.setattr(anchors, "_check_place", lambda *given: None)
+    assert proved([("", source)], behaviour, 20).wrong
+
+
+def without_check_of_bytes(data: bytes, where: Path) -> object:
+    module = cst.parse_module(data)
+    return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)

@@ -1,0 +1,141 @@
+"""An injection that would disturb a name of the target is refused before there is a mutant."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.splicing import apply_edits, joined
+from mutator.workspace import Workspace
+
+MODELS = Workspace.find(root=Path(__file__).parents[4]).fault_models()
+SOURCE = """\
+from pack.rain import Rain, Snow
+limit = 3.0
+µ = 0.8
+
+def reads(x):
+    y = x + limit + self.gap
+    return min(y, µ)
+
+def sets(x):
+    global limit
+    limit = x
+    z = x
+    return limit
+
+def outer(x):
+    def count():
+        nonlocal x
+        x += 1
+        return x
+    def look():
+        return x + limit
+    return count, look
+
+class _Car:
+    def drive(self, x):
+        __own = self.__gap
+        return Rain(x)
+"""
+
+
+def injected(
+    models: FaultModels, function: str, anchor: Anchor | None = None, model: str = "stuck", **params: Value
+) -> str:
+    """The source with one injection, at the function's entry if nothing else is said."""
+    file = parse_file("m.py", SOURCE.encode(), Path("root"))
+    place = FaultLocation(path="m.py", function=function, anchor=anchor or Anchor(kind=AnchorKind.ENTRY))
+    given = {"value": 1.0, **params} if model == "stuck" else params
+    injection = Injection(location=place, model=model, params=tuple(sorted(given.items())))
+    return joined(apply_edits(file, [injection_edit(file, models, injection, "ab12")])).decode()
+
+
+@pytest.mark.parametrize(
+    ("function", "target", "line", "said"),
+    [
+        ("reads", "limit", 6, "make 'limit' local in reads, where it is global or built-in"),
+        ("reads", "min", 6, "make 'min' local in reads, where it is global or built-in"),
+        ("reads", "µ", 6, "make 'μ' local in reads, where it is global or built-in"),
+        ("outer.look", "x", 21, "make 'x' local in look, where it is of an enclosing function"),
+        ("_Car.drive", "Rain", 26, "make 'Rain' local in drive, where it is global or built-in"),
+        ("reads", "gap", 6, "'gap' is not known in reads"),
+        ("outer", "limit", 16, "'limit' is not known in outer"),
+    ],
+)
+def test_a_name_from_outside(function: str, target: str, line: int, said: str) -> None:
+    """A variable that the function only reads from outside, or does not know, is refused with its line."""
+    with pytest.raises(MutatorError) as caught:
+        injected(MODELS, function, target=target)
+    error = caught.value
+    assert said in error.got
+    assert (error.where, error.line) == ("root/m.py", line)
+    assert error.remedy
+
+
+@pytest.mark.parametrize(
+    ("function", "anchor", "target"),
+    [
+        ("reads", None, "x"),
+        ("reads", None, "self.gap"),
+        ("sets", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="z"), "limit"),
+        ("outer.count", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"), "x"),
+        ("outer", None, "x"),
+        ("_Car.drive", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="__own"), "__own"),
+        ("_Car.drive", None, "self.__gap"),
+    ],
+)
+def test_a_name_that_may_be_set(function: str, anchor: Anchor | None, target: str) -> None:
+    """Variables of the function, attributes, and names that it declares global or nonlocal are set."""
+    assert f"{target} = 1.0  # fi:ab12\n" in injected(MODELS, function, anchor, target=target)
+
+
+@pytest.fixture
+def models(tmp_path: Path) -> FaultModels:
+    """The fault models; `stuck` sets names of its own, too."""
+    workspace = Workspace.find(root=Path(__file__).parents[4])
+    templates = Path(shutil.copytree(workspace.templates, tmp_path / "templates"))
+    (templates / "stuck.py.j2").write_text(
+        'if _fi.active("{{ fi }}"):\n    import pack.x as z\n    for y in [1]:\n'
+        "        {{ target }} = {{ value }}\n"
+    )
+    return Workspace(library=workspace.library, templates=templates).fault_models()
+
+
+def test_names_of_a_template(models: FaultModels) -> None:
+    """A template may set names of its own, unless the function has them for something else."""
+    assert "for y in [1]:" in injected(models, "outer", target="x")
+    with pytest.raises(
+        MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"
+    ) as caught:
+        injected(models, "reads", target="x")
+    assert "rename it in stuck.py.j2" in str(caught.value)
+    with pytest.raises(MutatorError, match="set 'z', a name that the function uses"):
+        injected(models, "sets", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="z"), target="x")
+    assert "z = 1.0" in injected(models, "sets", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="z"), target="z")
+
+
+def test_a_name_that_is_imported() -> None:
+    """The class that an image effect imports must not be one that the function uses."""
+    params = {"amount": 1.0, "camera": None, "scene": None, "seed": 1, "target": "x"}
+    params |= {"camera": "x", "scene": "x"}
+    with pytest.raises(MutatorError, match="set 'Rain', a name that the function uses"):
+        injected(MODELS, "_Car.drive", model="image_effect", effect="pack.rain.Rain", **params)
+    assert "import Snow" in injected(
+        MODELS, "_Car.drive", model="image_effect", effect="pack.rain.Snow", **params
+    )
+
+
+def test_a_refusal_is_not_forgotten() -> None:
+    """The same injection into the same file is refused again."""
+    file = parse_file("m.py", SOURCE.encode(), Path("root"))
+    place = FaultLocation(path="m.py", function="reads", anchor=Anchor(kind=AnchorKind.ENTRY))
+    injection = Injection(location=place, model="stuck", params=(("target", "limit"), ("value", 1.0)))
+    for _ in range(2):
+        with pytest.raises(MutatorError, match="would make 'limit' local"):
+            injection_edit(file, MODELS, injection, "ab12")

@@ -1,0 +1,58 @@
+"""Files are refused where Python or LibCST cannot read them, or LibCST loses something of them."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.mutants.anchors import parse_file
+
+BODY = "def f(x):\n    x = 1\n    return x\n"
+
+
+@pytest.mark.parametrize(
+    ("source", "line", "said"),
+    [
+        ("\\\n" + BODY, 1, "LibCST does not give back the line `\\`"),
+        (
+            "def f(x):\n    x = 1\n    \\\n    y = 2\n    return x\n",
+            3,
+            "LibCST does not give back the line `\\`",
+        ),
+        ("def f(x):\r\n    x = 1\r\n\\\r\n    return x\r\n", 3, "LibCST does not give back the line `\\`"),
+        ("# coding: latin-1\nx = '\xe9'\n\n\\\n" + BODY, 4, "LibCST does not give back the line `\\`"),
+        (BODY + "try:\n    f(1)\nexcept OSError :\n    pass\n", 6, "the line `except OSError :`"),
+        (BODY + "\n  \n", 4, "LibCST does not give back the line `` as it is"),
+        (BODY + "\n\x0cdef g(): pass\n", 5, "the line `def g(): pass`"),
+        ("def f(x):\n    (x): int = 1\n", 2, "LibCST cannot read it: parser error"),
+        ("x = 1\ny = (" + "1 + " * 400 + "1)\n", None, "LibCST cannot read it: maximum recursion depth"),
+        ("x = 1\ny = 2\rz = 3\n", 2, "line ends of CR alone"),
+        ("x = 1\ndef f(:\n", 2, "not valid Python"),
+        ("x = 1\nreturn\n", 2, "not valid Python: 'return' outside function"),
+    ],
+)
+def test_files_that_are_refused(source: str, line: int | None, said: str) -> None:
+    """The error names the file, the first line at fault, the reason, and what to do."""
+    with pytest.raises(MutatorError) as caught:
+        parse_file("m.py", source.encode("latin-1" if "latin" in source else "utf-8"), Path("root"))
+    error = caught.value
+    assert said in error.got
+    assert (error.where, error.line) == ("root/m.py", line)
+    assert error.remedy
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "\ufeff" + BODY,
+        BODY.replace("\n", "\r\n"),
+        BODY.replace("x = 1", "x = 1; \\\n"),
+        BODY + "\x0c\n" + BODY,
+        BODY + "try:\n    f(1)\nexcept (OSError, ValueError) as e :\n    pass\n",
+        "def f(x):\n    x = 1\n    \n\n",
+        "",
+    ],
+)
+def test_files_that_are_not(source: str) -> None:
+    """Byte order marks, CRLF, continued lines, form feeds and odd spaces are kept, so the file is taken."""
+    assert parse_file("m.py", source.encode(), Path("root")).data == source.encode()
