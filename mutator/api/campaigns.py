@@ -52,6 +52,7 @@ def run(
     workers: int = 0,
     engine: str | None = None,
     reviewed: bool = False,
+    accept_versions: bool = False,
     progress: Notify | None = None,
     workspace: WorkspaceLike = None,
 ) -> Run:
@@ -60,7 +61,8 @@ def run(
     What has a result is not run again. A plan that is frozen in `out` is used as it is: choices that are not
     given are the frozen ones. `workers` is the number of processes (0: this one alone), `engine` a name of
     `mutator.engines.kinds` (None: the fastest that is worth it). With `reviewed` nothing runs that has no
-    approval. `progress` is called about twice a second, from another thread.
+    approval. With `accept_versions` a run goes on with another Python or other packages than before, which it
+    notes. `progress` is called about twice a second, from another thread.
 
     `Run.summary` says what this call came to. Harness errors, a full disk or an interruption end in an
     IncompleteRun warning; the same call then goes on. MutatorError for wrong input; CheckFailed when
@@ -78,6 +80,7 @@ def run(
         choices=choices,
         engine=engine,
         reviewed=reviewed,
+        accept_versions=accept_versions,
         notify=progress,
     )
     if summary.exit_code:

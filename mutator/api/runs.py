@@ -32,6 +32,7 @@ from mutator.report.film import Shot, film_experiment
 from mutator.store import plan_file, run_folder
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder, golden_key
+from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
 from mutator.workspace import Workspace
@@ -52,7 +53,7 @@ def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
 
 
 def newest_run(root: Path) -> Path:
-    """The run folder in runs/, here or under `root`, that was planned last; MutatorError if there is none."""
+    """The run folder in runs/, here or under `root`, that was used last; MutatorError if there is none."""
     here = {base.resolve() for base in (RUNS, root / RUNS)}
     heads = [head for base in here for head in base.glob(f"*/{HEAD}")]
     if not heads:
@@ -70,15 +71,15 @@ def _from_here(path: Path) -> Path:
     return path.relative_to(here) if path.is_relative_to(here) else path
 
 
-def merge_runs(shards: Sequence[str | Path], out: str | Path) -> "Run":
+def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions: bool = False) -> "Run":
     """Merge the shards of a plan into the run folder `out`: the one that a single machine would have made.
 
-    MutatorError for shards that are not one plan's, whole and finished; CheckFailed when their fault-free
-    runs differ.
+    MutatorError for shards that are not one plan's, whole and finished, and, unless `accept_versions`, for
+    some driven with another Python or other packages; CheckFailed when their fault-free runs differ.
     """
     if isinstance(shards, str | Path):
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
-    merge([Path(shard) for shard in shards], Path(out))
+    merge([Path(shard) for shard in shards], Path(out), accept_versions=accept_versions)
     return load_run(out)
 
 
@@ -117,7 +118,8 @@ class Run:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Campaign, target, seed, reading and choices; digests of the sources; versions."""
+        """Campaign, target, seed, reading and choices; digests of the sources; what each stretch of work ran
+        with, under `stretches`."""
         head = self.folder.head
         keys = ("campaign", "target", "plan", "choices", "limits")
         return {key: head[key] for key in keys} | self.folder.provenance
@@ -300,6 +302,11 @@ class RunExperiment(ExperimentResult):
         trigger = facts["trigger"].removesuffix(": True")
         title = f"{facts['fault']}   {facts['scenario']}   {trigger}"
         return film_experiment(run.workspace, run._bench.manifest, run.path, self.id, title, shots)
+
+    @property
+    def stretch(self) -> Stretch | None:
+        """What it was run with; None before it was run."""
+        return self.run.folder.stretch_of(self.id)
 
     @property
     def plot_file(self) -> Path:

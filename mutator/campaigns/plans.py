@@ -14,12 +14,13 @@ from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
+from mutator._common.version import VERSION
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.provenance import check_sources, check_version, sources, versions
-from mutator.campaigns.sampling import pick, pick_in_proportion
+from mutator.campaigns.provenance import check_sources, check_version, sources
+from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
@@ -47,8 +48,8 @@ class Choices:
     """What was chosen on top of the campaign file; None: as the file says.
 
     `only` and `exclude` are filter expressions (`mutator.campaigns.filters`) over the columns known before
-    running; `limit` keeps that many experiments, picked like a campaign's `sample`; `shard` (`k/n`) is the
-    share of the plan that its run folder will run.
+    running; `limit` keeps that many experiments, spread as a campaign's `sample` but guided and random ones
+    in pairs; `shard` (`k/n`) is the share of the plan that its run folder will run.
     """
 
     seed: int | None = None
@@ -197,7 +198,7 @@ def _choose(
             accepts = compile_filter(text, PLAN_COLUMNS)
             experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
     if choices.limit is not None:
-        experiments = pick(experiments, choices.limit, seed)
+        experiments = pick_pairs(experiments, choices.limit, seed)
     if not experiments:
         raise MutatorError(
             "no experiment is left",
@@ -301,7 +302,8 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "canary_hazard": plan.campaign.canary.hazard,
         "sources": _sources(plan, workspace),
         "target_files": manifest.tree.digests,
-        "provenance": versions(),
+        "provenance": {"mutator": VERSION},
+        "stretches": [],
         "chunks": chunks,
     }
 

@@ -1,19 +1,23 @@
 """What a run depends on: digests of its sources, versions of what runs them."""
 
 import platform
-from collections.abc import Mapping
-from importlib import metadata
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common.hashing import digest
+from mutator._common.files import write_json
+from mutator._common.hashing import digest, plain
 from mutator._common.version import VERSION
+from mutator.campaigns import machine
 from mutator.errors import MutatorError
-from mutator.store.run_folder import SCHEMA
+from mutator.store.check_results import loaded_packages
+from mutator.store.run_folder import HEAD, SCHEMA, RunFolder
+from mutator.store.stretches import Stretch, differences
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 _REMEDY = "undo the change, or run into another folder"
+_OWN = Path(__file__).parents[1]  # the harness itself
 
 
 def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str]) -> dict[str, str]:
@@ -52,12 +56,59 @@ def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None
         )
 
 
-def versions() -> dict[str, Any]:
-    """Versions of mutator, Python, and every installed package (any of them may be the target's)."""
-    packages = {d.metadata["Name"].lower(): d.version for d in metadata.distributions()}
-    return {
-        "mutator": VERSION,
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}",
-        "packages": dict(sorted(packages.items())),
-    }
+def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...]:
+    """How Python and packages differ here from the last stretch of work in a run folder: nothing where
+    nothing was driven yet. MutatorError when they do, unless that is accepted."""
+    if not folder.stretches:
+        return ()
+    found = differences(folder.stretches[-1], machine.python(), _packages(folder))
+    if found and not accept:
+        raise other_versions(folder.path, "driven with", found)
+    return found
+
+
+def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
+    """The error (not raised) that the versions are not the same; `what` begins it."""
+    return MutatorError(
+        f"{what} other versions: {'; '.join(found)}",
+        where=run,
+        argument="accept_versions",
+        expected="the same Python and packages for a whole run",
+        remedy="go back to them, or say that others will do: `accept_versions`",
+    )
+
+
+def _packages(folder: RunFolder) -> dict[str, str | None]:
+    """Versions here of what the harness requires, and of what the golden runs of a folder loaded."""
+    before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
+    return machine.versions({*machine.required(), *loaded_packages(folder), *before})
+
+
+def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, accept: bool) -> None:
+    """Note in run.json what this session runs with, once its checks have passed and before it drives any
+    experiment. `records` is the glob of its files. MutatorError as `check_versions`."""
+    target = workspace.manifest(folder.head["target"]).root
+    places = {"library": workspace.library, "templates": workspace.templates, "target": target}
+    states = {name: machine.clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
+    add_stretch(
+        folder,
+        Stretch(
+            accepted=check_versions(folder, accept=accept),
+            python=machine.python(),
+            packages={name: version for name, version in _packages(folder).items() if version},
+            platform=platform.platform(),
+            cpu=machine.cpu(),
+            blas=machine.blas(),
+            threads=machine.threads(),
+            git={name: state for name, state in states.items() if state} or None,
+            records=records,
+        ),
+    )
+
+
+def add_stretch(folder: RunFolder, stretch: Stretch) -> None:
+    """Append a stretch of work to run.json of a folder that the caller owns."""
+    head = folder.head
+    stretches = [*head.get("stretches", ()), plain(stretch)]
+    write_json(folder.path / HEAD, head | {"stretches": stretches})
+    head["stretches"] = stretches

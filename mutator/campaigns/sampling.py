@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from mutator._common.hashing import digest
 from mutator.model import Experiment
 
-_Cell = tuple[str, str, str, str]  # variant, method, scenario, trigger
+_Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigger
 
 
 def spread(count: int, wanted: int) -> list[int]:
@@ -20,19 +20,37 @@ def spread(count: int, wanted: int) -> list[int]:
 def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """`count` of the experiments, in their order: each spec's variant as often as any other, and within a
     variant each method, scenario and trigger; which values, and ties, by a hash of seed and id."""
+    return _pick(experiments, [[experiment] for experiment in experiments], count, seed)
+
+
+def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
+    """As `pick`, but guided experiments and their random partners are taken together, as far as both are
+    among the experiments. Where whole pairs do not come to `count`, the last one is cut."""
+    pairs: dict[Hashable, list[Experiment]] = defaultdict(list)
+    for experiment in experiments:
+        pairs[experiment.scenario, _pair(experiment)].append(experiment)
+    together = [sorted(pair, key=lambda e: (e.method.value, e.id)) for pair in pairs.values()]
+    return _pick(experiments, together, count, seed)
+
+
+def _pick(
+    experiments: Sequence[Experiment], units: Iterable[list[Experiment]], count: int, seed: int
+) -> tuple[Experiment, ...]:
+    """As `pick`, from units that are taken whole."""
     if count >= len(experiments):
         return tuple(experiments)
-    cells: dict[str, dict[_Cell, deque[Experiment]]] = defaultdict(dict)
-    for experiment in sorted(experiments, key=lambda e: digest([seed, e.id])):
-        cell = _cell(experiment)
-        cells[cell[0]].setdefault(cell, deque()).append(experiment)
+    cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
+    for unit in sorted(units, key=lambda unit: digest([seed, unit[0].id])):
+        cell = _cell(unit)
+        cells[cell[0]].setdefault(cell, deque()).append(unit)
     taken: Counter[Hashable] = Counter()
     chosen: set[str] = set()
     while len(chosen) < count:
         variant = min(cells, key=lambda name: (taken[name], digest([seed, name])))
         cell = min(cells[variant], key=lambda c: (*_load(taken, c), digest([seed, c])))
-        chosen.add(cells[variant][cell].popleft().id)
-        taken.update(_marks(cell))
+        unit = cells[variant][cell].popleft()
+        chosen.update(experiment.id for experiment in unit[: count - len(chosen)])
+        taken.update(dict.fromkeys(_marks(cell), len(unit)))
         if not cells[variant][cell]:
             del cells[variant][cell]
         if not cells[variant]:
@@ -40,8 +58,10 @@ def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Expe
     return tuple(e for e in experiments if e.id in chosen)
 
 
-def _cell(experiment: Experiment) -> _Cell:
-    return (experiment.fault.spec, experiment.method.value, experiment.scenario, experiment.trigger.name)
+def _cell(unit: Sequence[Experiment]) -> _Cell:
+    first = unit[0]
+    methods = "+".join(experiment.method.value for experiment in unit)
+    return (first.fault.spec, methods, first.scenario, first.trigger.name)
 
 
 def _marks(cell: _Cell) -> Iterable[Hashable]:

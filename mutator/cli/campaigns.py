@@ -12,6 +12,7 @@ import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
+    AcceptVersions,
     Engine,
     Exclude,
     Json,
@@ -146,6 +147,7 @@ def run(
         bool,
         typer.Option("--require-reviewed", help="Run nothing that `mutator review` has no approval of."),
     ] = False,
+    accept_versions: AcceptVersions = False,
     as_json: Json = False,
     *,
     place: Place,
@@ -166,6 +168,7 @@ def run(
                 workers=workers,
                 engine=engine,
                 reviewed=reviewed,
+                accept_versions=accept_versions,
                 progress=notify,
                 workspace=workspace,
             )

@@ -62,9 +62,11 @@ def show(
     patch = found.patch
     drawn = _plot(terminal, found) if plot and found.record else None
     filmed = _film(terminal, found, video, still or [])
+    stretch = found.stretch
     if as_json:
         facts = {**describe(found.experiment), **found.verdict, "patch": patch}
         facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
+        facts["run_with"] = stretch
         terminal.emit(facts | {"films": filmed})
         return
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -72,6 +74,8 @@ def show(
         terminal.say(str(found.not_run()))
     else:
         experiment_view.print_verdict(terminal, found.record)
+    if stretch:
+        terminal.say(f"run with: {stretch}")
     if drawn:
         terminal.say(f"plot: {short_path(drawn)}")
     for path in filmed:

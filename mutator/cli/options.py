@@ -40,7 +40,12 @@ Only = Annotated[
 Exclude = Annotated[
     str | None, typer.Option(metavar="EXPR", help="Leave out experiments for which this holds.")
 ]
-Limit = Annotated[int | None, typer.Option(min=1, help="At most so many experiments, spread over the plan.")]
+Limit = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="At most so many experiments, spread over the plan, guided and random ones in pairs."
+    ),
+]
 ShardOf = Annotated[
     str | None,
     typer.Option("--shard", metavar="K/N", help="Run the K-th of N shares of the plan; see `merge`."),
@@ -52,6 +57,10 @@ Engine = Annotated[
         help="; ".join(f"{kind.name}: {kind.about}" for kind in ENGINES.values())
         + f". The results are the same. Default: {FORK}, where that is possible and worth it.",
     ),
+]
+AcceptVersions = Annotated[
+    bool,
+    typer.Option("--accept-versions", help="Other versions of Python or packages will do; they are noted."),
 ]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 

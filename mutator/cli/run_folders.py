@@ -10,7 +10,7 @@ import typer
 import mutator
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, OutRun, Place, with_place
+from mutator.cli.options import AcceptVersions, Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ Examples:
 def merge(
     shards: Annotated[list[Path], typer.Argument(metavar="DIR", help="The run folder of each shard.")],
     out: OutRun,
+    accept_versions: AcceptVersions = False,
     as_json: Json = False,
 ) -> None:
     """Merge the shards of a plan into one run folder.
@@ -49,7 +50,7 @@ def merge(
     """
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
-        planned = mutator.merge_runs(shards, out).folder.planned
+        planned = mutator.merge_runs(shards, out, accept_versions=accept_versions).folder.planned
     if as_json:
         terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned})
     results = short_path(out / "results.csv")

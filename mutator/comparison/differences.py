@@ -10,6 +10,8 @@ from typing import Any
 from mutator.comparison.pairs import Matching, Pair
 from mutator.comparison.sides import Side
 from mutator.store.run_folder import RunFolder
+from mutator.store.stretches import package_versions
+from mutator.store.stretches import told as ran_with
 
 _SHORT = 12  # digits of a digest that are shown
 _HEAD = ("campaign", "target", "seed", "reading")
@@ -41,18 +43,20 @@ def facts(a: Side, b: Side) -> tuple[Fact, ...]:
     """What the runs were made of: first all that a result depends on, then packages that differ."""
     heads = [_facts(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
+    if not all("stretches" in side.folder.head for side in (a, b)):  # one of before lists all installed ones
+        names = {n: None for n in names if not n.startswith("package ") or all(n in head for head in heads)}
     return tuple(Fact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
 
 
 def _facts(side: Side) -> dict[str, str]:
-    head, versions = side.folder.head, side.folder.provenance
+    head, stretches = side.folder.head, side.folder.stretches
     told = {name: str(head[name]) for name in _HEAD}
     told["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
     told["chosen"] = ", ".join(f"{k} {v}" for k, v in head["choices"].items() if v is not None) or "-"
     told |= {f"digest of {name}": value[:_SHORT] for name, value in head["sources"].items()}
     told["digest of plan"] = head["plan"][:_SHORT]
-    told |= {name: str(versions[name]) for name in ("mutator", "python", "machine")}
-    return told | {f"package {name}": version for name, version in versions["packages"].items()}
+    told["mutator"] = head["provenance"]["mutator"]
+    return told | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
 
 
 def files(a: RunFolder, b: RunFolder) -> Files | None:

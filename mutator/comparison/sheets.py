@@ -72,7 +72,8 @@ def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
         parts += _adjusted(flag, found)
     note = (
         f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
-        "(of 1), its interval resampled by fault (variant and value). p: McNemar's exact test of the pairs "
+        "(of 1), its interval resampled by fault (variant and value; none where all of them say the same). "
+        "p: McNemar's exact test of the pairs "
         "that differ"
     )
     heads = (

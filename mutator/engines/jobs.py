@@ -40,7 +40,8 @@ class Execution:
 
     `probe` is the probe's report if the tree has one; `log` the tail of what the run printed. `mode`
     says how it was carried out, and `why` another engine did it than the one that was asked; `start` is the
-    step before which the golden run did its work.
+    step before which the golden run did its work. `modules` are the top-level modules that the run imported
+    from neither its package nor the standard library (of the reference engine alone).
     """
 
     status: Status
@@ -53,6 +54,7 @@ class Execution:
     mode: RunMode = RunMode.REFERENCE
     why: str = ""
     start: int = 0
+    modules: tuple[str, ...] = ()
 
 
 class Engine(Protocol):

@@ -90,6 +90,7 @@ class ReferenceEngine:
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
             log=log,
+            modules=tuple(report["modules"]) if report else (),
         )
 
     def _prepare(self, job: Job, folder: Path) -> Path:

@@ -1,14 +1,18 @@
 """Merge the run folders of all shards of a plan into the run folder that one machine would have made."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from mutator._common.files import raising_disk_full, read_json, write_json
+from mutator._common.hashing import plain
 from mutator._common.locks import owned
 from mutator._common.text import counted
 from mutator.campaigns.plans import make_run_folder
+from mutator.campaigns.provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status
 from mutator.outcomes import results
@@ -18,16 +22,18 @@ from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder
+from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
 _SHARED = ("campaign.yaml", "plan.csv", "plan", CHECKS, "golden")  # the same in every shard
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
-def merge(shards: Sequence[Path], out: Path) -> Path:
+def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
     """Merge the run folders `shards` into the new or empty folder `out`; returns its results.csv.
 
-    MutatorError for a shard that is missing, given twice, unfinished, of another plan, or at work;
+    MutatorError for a shard that is missing, given twice, unfinished, of another plan, or at work, and,
+    unless `accept_versions`, for one that was driven with another Python or other packages;
     CheckFailed when the proof of one failed, and when the shards' fault-free runs differ, for then their
     machines are not alike.
     """
@@ -48,12 +54,13 @@ def merge(shards: Sequence[Path], out: Path) -> Path:
         for folder in folders:
             stack.enter_context(owned(folder.path, patience_s=0.0))
             _check_complete(folder)
+        stretches = [plain(s) for s in _stretches(folders, accept=accept_versions)]
         _check_goldens(folders)
         make_run_folder(out)
         stack.enter_context(owned(out))
         try:
             with raising_disk_full(out):
-                _copy(folders, out)
+                _copy(folders, out, stretches)
             return results.build(out)
         except BaseException:
             for path in out.iterdir():
@@ -159,11 +166,28 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
                 f"the golden run {differ[0]} is another one than in {folders[0].path}",
                 where=folder.path,
                 expected="machines on which the target drives to the same bytes",
-                remedy="run this shard again with the same Python and packages (run.json has the versions)",
+                remedy="run this shard again on such a machine (run.json says what each ran with)",
             )
 
 
-def _copy(folders: Sequence[RunFolder], out: Path) -> None:
+def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretch]:
+    """Those of all shards. Python and packages are those that the first shard ended with, or accepted."""
+    first = folders[0]
+    for folder in folders:
+        ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
+        found = [text for one, other in ends for text in differences(one, other.python, other.packages)]
+        if found and not accept:
+            raise other_versions(folder.path, f"not driven as {first.path}, but with", found)
+        assert folder.shard is not None
+        for i, stretch in enumerate(folder.stretches):
+            yield replace(
+                stretch,
+                records=f"{stretch.records}-shard{folder.shard.number}",
+                accepted=[*stretch.accepted, *(() if i else found)],
+            )
+
+
+def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
     """Everything of the shards; the head comes last, so a folder half made is no run folder."""
     first = folders[0]
     for name in _SHARED:
@@ -183,4 +207,5 @@ def _copy(folders: Sequence[RunFolder], out: Path) -> None:
             for path in (folder.path / name).glob("*.jsonl"):
                 shutil.copy(path, out / name / f"{path.stem}-shard{folder.shard.number}.jsonl")
     head = first.head
-    write_json(out / HEAD, head | {"choices": head["choices"] | {"shard": None}})
+    whole = {"choices": head["choices"] | {"shard": None}, "stretches": stretches}
+    write_json(out / HEAD, head | whole)

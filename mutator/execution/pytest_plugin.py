@@ -27,6 +27,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="refuse to run what `mutator review` has no approval of",
     )
+    group.addoption(
+        "--accept-versions",
+        action="store_true",
+        help="go on with another Python or other packages than the run folder was driven with",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -34,11 +39,18 @@ def pytest_configure(config: pytest.Config) -> None:
     if campaign is None:
         if out is not None:
             raise pytest.UsageError("--campaign-out without --campaign")
-        if config.getoption("require_reviewed"):
-            raise pytest.UsageError("--require-reviewed without --campaign")
+        for option in ("require_reviewed", "accept_versions"):
+            if config.getoption(option):
+                raise pytest.UsageError(f"--{option.replace('_', '-')} without --campaign")
         return
     if out is None:
         raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
     from mutator.execution.pytest_session import configure
 
-    configure(config, campaign, out, reviewed=config.getoption("require_reviewed"))
+    configure(
+        config,
+        campaign,
+        out,
+        reviewed=config.getoption("require_reviewed"),
+        accept_versions=config.getoption("accept_versions"),
+    )

@@ -86,13 +86,17 @@ class LazyWorker:
             self._worker = None
 
 
-def configure(config: pytest.Config, campaign: str, out: Path, *, reviewed: bool) -> None:
+def configure(
+    config: pytest.Config, campaign: str, out: Path, *, reviewed: bool, accept_versions: bool
+) -> None:
     """Put the plugin of this process's role in place."""
     given = getattr(config, "workerinput", {}).get(_INPUT)
     if given is not None:
         config.pluginmanager.register(WorkerSide(config, given, config.workerinput["workerid"]))  # type: ignore[attr-defined]
     elif not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
-        config.pluginmanager.register(PlainController(campaign, out, reviewed=reviewed))
+        config.pluginmanager.register(
+            PlainController(campaign, out, reviewed=reviewed, accept_versions=accept_versions)
+        )
 
 
 def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
@@ -194,10 +198,11 @@ class Controller:
 class PlainController(Controller):
     """As Controller, for pytest called directly: also plans, checks, and tells the end."""
 
-    def __init__(self, campaign: str, out: Path, *, reviewed: bool) -> None:
+    def __init__(self, campaign: str, out: Path, *, reviewed: bool, accept_versions: bool) -> None:
         super().__init__()
         self._campaign = campaign
         self._reviewed = reviewed
+        self._accept_versions = accept_versions
         self._out = out
         self._open = ExitStack()
         self._closing_lines: list[str] = []
@@ -213,6 +218,7 @@ class PlainController(Controller):
                 workers=workers,
                 choices=Choices(),
                 reviewed=self._reviewed,
+                accept_versions=self._accept_versions,
             )
             self.begun = self._open.enter_context(opened)
             self.begun.prepare()

@@ -28,6 +28,7 @@ def run_campaign(
     choices: Choices | None = None,
     engine: str | None = None,
     reviewed: bool = False,
+    accept_versions: bool = False,
     distributor: Distributor = LOCAL,
     notify: Notify | None = None,
 ) -> Summary:
@@ -36,6 +37,7 @@ def run_campaign(
     A frozen plan in `out` is used as it is: `choices` not given are the frozen ones, different ones are a
     MutatorError, as is a changed campaign file or target. `engine` is a name in `engines.kinds` (None: the
     fastest that is worth it). With `reviewed`, nothing runs that is not approved (`mutator.review.gate`).
+    A run goes on with the Python and packages it began with, unless `accept_versions` says otherwise.
     `notify` is called from another thread about twice a second. MutatorError for wrong input, CheckFailed
     when something is not approved, and when the preflight or the equivalence check fails.
     """
@@ -47,6 +49,7 @@ def run_campaign(
         choices=choices or Choices(),
         engine=engine,
         reviewed=reviewed,
+        accept_versions=accept_versions,
         notify=notify,
     ) as session:
         session.prepare()

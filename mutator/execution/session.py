@@ -19,6 +19,7 @@ from mutator._common.interrupts import terminable
 from mutator._common.locks import owned
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.plans import Choices, make_run_folder
+from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base
 from mutator.engines.registry import choose_engine
@@ -65,11 +66,19 @@ class Session:
     """One command at work in a run folder that it owns."""
 
     def __init__(
-        self, workspace: Workspace, folder: RunFolder, workers: int, engine: str | None, notify: Notify | None
+        self,
+        workspace: Workspace,
+        folder: RunFolder,
+        *,
+        workers: int = 0,
+        engine: str | None = None,
+        accept_versions: bool = False,
+        notify: Notify | None = None,
     ) -> None:
         self.workspace = workspace
         self.folder = folder
         self.workers = workers
+        self._accept_versions = accept_versions
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
@@ -82,7 +91,8 @@ class Session:
         self._records: dict[str, Record] | None = None
 
     def prepare(self) -> None:
-        """Find what is left to run; if anything is, pass the checks and lay out the pristine tree."""
+        """Find what is left to run; if anything is, pass the checks, lay out the pristine tree, and note the
+        stretch of work that begins. MutatorError for other versions than before that are not accepted."""
         records = read_records(self.folder.path)
         self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
         left = pending(self.folder, records)
@@ -90,8 +100,15 @@ class Session:
             equivalence.begin(self.folder.path)
         self.proof = equivalence.left(self.folder)
         if left or self.proof:
+            check_versions(self.folder, accept=self._accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             prepare_base(self._manifest, self.folder.base)
+            begin_stretch(
+                self.folder,
+                self.workspace,
+                records=self.worker_name("*"),
+                accept=self._accept_versions,
+            )
         self.pending = left
         self._records = None if left else records
 
@@ -149,6 +166,7 @@ def open_session(
     choices: Choices,
     engine: str | None = None,
     reviewed: bool = False,
+    accept_versions: bool = False,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
     """Own the run folder `out` with a frozen plan in it; scratch is cleared before and after."""
@@ -170,6 +188,13 @@ def open_session(
             if is_half_written(path.name):
                 path.unlink()
         try:
-            yield Session(workspace, folder, workers, engine, notify)
+            yield Session(
+                workspace,
+                folder,
+                workers=workers,
+                engine=engine,
+                accept_versions=accept_versions,
+                notify=notify,
+            )
         finally:
             shutil.rmtree(folder.work, ignore_errors=True)

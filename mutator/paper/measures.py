@@ -32,6 +32,9 @@ __all__ = [
 ]
 
 
+_BOUNDS_A_MEDIAN = 6  # fewer runs are on one side of their median in more than 5 % of all cases
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """An estimate with its 95 % interval (NaN: none), from `n` runs or pairs; `count`: how many of them have
@@ -139,12 +142,13 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
         return Estimate(estimate=nan, low=nan, high=nan, n=0, text="- (when a run ends is not known here)")
     ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
     found = times.reaction(chosen, ends, 0.0)
-    median = found.median
-    low, high = found.median_low, found.median_high
+    median, low, high = found.median, found.median_low, found.median_high
     if found.at_risk and math.isnan(
         low
     ):  # the curve is nowhere near a half: always above, or past it in a step
-        median = low = high = math.inf if math.isnan(median) else median
+        median = math.inf if math.isnan(median) else median
+        if found.at_risk >= _BOUNDS_A_MEDIAN:
+            low = high = median
     return _seconds(median, low, high, found.at_risk)
 
 
@@ -188,7 +192,8 @@ def _plain(one: Share) -> str:
 
 
 def _seconds(value: float, low: float, high: float, n: int) -> Estimate:
-    said = f"{value:.2f} s (N {n}; {low:.2f} to {high:.2f})" if n else "- (N 0)"
+    interval = "" if math.isnan(low) else f"; {low:.2f} to {high:.2f}"
+    said = f"{value:.2f} s (N {n}{interval})" if n else "- (N 0)"
     return Estimate(estimate=value, low=low, high=high, n=n, text=said)
 
 

@@ -30,8 +30,9 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
         title="Guided against random: hazards",
         note="Fault types with faults of both methods. Odds ratio: Mantel-Haenszel over fault types, above 1 "
         "if guided faults are the more hazardous ones; p: that it is 1; p equal: that it is the same in all "
-        "types. Difference of rates (of 1): guided less random, its interval resampled by fault (location "
-        "and value), for which single runs are needed.",
+        "types. Both p take runs as independent, so they are rather too small. Difference of rates (of 1): "
+        "guided less random, its interval resampled by fault (location and value), for which single runs are "
+        "needed; there is none where all faults say the same.",
         heads=(
             *("hazards of", "from", "guided", "random", "fault types"),
             *("odds ratio", "odds ratio, low", "odds ratio, high", "p", "p equal"),
@@ -90,7 +91,8 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
         name="matched_pairs",
         title="Guided and random runs of the same fault, in pairs",
         note="A pair has the same fault and value, scenario and context row. Hazards in both, in one or in "
-        "neither; p: McNemar's exact test; p, Holm: adjusted over fault types.",
+        "neither; p: McNemar's exact test, rather too small because it takes pairs of one fault as "
+        "independent; p, Holm: adjusted over fault types.",
         heads=("pairs", "fault type", "N", "both", "guided only", "random only", "neither", "p", "p, Holm"),
         lines=tuple(lines),
     )

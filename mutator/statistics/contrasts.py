@@ -5,7 +5,6 @@ plain tests take runs for more independent than they are; `resampled` draws whol
 """
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -13,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from mutator.statistics.paired import Matched
+from mutator.statistics.paired import Matched, resampled_interval
 from mutator.statistics.paired import mcnemar as exact_mcnemar
 from mutator.statistics.shares import CONFIDENCE
 from mutator.statistics.tallies import Tally
@@ -21,8 +20,6 @@ from mutator.statistics.tallies import Tally
 Whole = Literal["activated", "injected"]
 WHOLES: tuple[Whole, ...] = ("activated", "injected")
 GUIDED, RANDOM = "guided", "random"
-RESAMPLES = 9999
-_SEED = 1  # of the resampling: the same results give the same interval
 _PAIR = ["fault_id", "scenario", "row", "seed"]
 
 
@@ -145,30 +142,12 @@ def mcnemar(paired: pd.DataFrame) -> Matched:
 
 
 def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
-    """The difference of hazard rates, guided less random; the interval is the percentile bootstrap (scipy)
-    over faults, that is over (location, value), with all their runs in all contexts and scenarios."""
-    from scipy.stats import DegenerateDataWarning, bootstrap
-
-    counted = frame[frame["is_activated"]] if whole == "activated" else frame
-    data = _sums(counted)
+    """The difference of hazard rates, guided less random; the interval is that of `resampled_interval` over
+    faults, that is over (location, value), with all their runs in all contexts and scenarios."""
+    data = _sums(frame[frame["is_activated"]] if whole == "activated" else frame)
     seen = float(_rate_difference(*data))
-    clusters = len(data[0])
-    if clusters < 2 or math.isnan(seen):
-        return Difference(difference=seen, low=math.nan, high=math.nan, clusters=clusters)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateDataWarning)  # too few runs of a method: NaN says it
-        interval = bootstrap(
-            data,
-            _rate_difference,
-            paired=True,
-            vectorized=True,
-            n_resamples=RESAMPLES,
-            batch=500,
-            confidence_level=CONFIDENCE,
-            method="percentile",
-            rng=np.random.default_rng(_SEED),
-        ).confidence_interval
-    return Difference(difference=seen, low=float(interval.low), high=float(interval.high), clusters=clusters)
+    low, high = (math.nan, math.nan) if math.isnan(seen) else resampled_interval(data, _rate_difference)
+    return Difference(difference=seen, low=low, high=high, clusters=len(data[0]))
 
 
 def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:

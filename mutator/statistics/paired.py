@@ -6,6 +6,7 @@ Runs of one fault are alike, so a test that takes each pair for itself finds too
 
 import math
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,21 +76,30 @@ def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
 
 
 def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The rate of a flag, second less first; its interval is the percentile bootstrap (scipy) over whole
-    clusters, NaN for fewer than two of them."""
-    from scipy.stats import DegenerateDataWarning, bootstrap  # type: ignore[import-untyped]
-
+    """The rate of a flag, second less first; its interval is that of `resampled_interval` over clusters."""
     change = second.astype(int) - first.astype(int)
     sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
-    data = (sums["sum"].to_numpy(), sums["count"].to_numpy())
+    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean)
     seen = float(change.mean()) if len(change) else math.nan
-    if len(sums) < 2:
-        return Difference(difference=seen, low=math.nan, high=math.nan)
+    return Difference(difference=seen, low=low, high=high)
+
+
+def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., Any]) -> tuple[float, float]:
+    """The percentile bootstrap (scipy) of a statistic of clusters that are drawn anew.
+
+    Each array has a number of each cluster. NaN where nothing can be said: of fewer than two clusters, where
+    the statistic is not defined of some draws, and where it is the same of all, for that clusters which are
+    all alike are seen does not mean that no other ones can be.
+    """
+    from scipy.stats import DegenerateDataWarning, bootstrap  # type: ignore[import-untyped]
+
+    if len(clusters[0]) < 2:
+        return math.nan, math.nan
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateDataWarning)  # no pair differs, say: NaN says it
+        warnings.simplefilter("ignore", DegenerateDataWarning)  # not defined of some draws: NaN says it
         interval = bootstrap(
-            data,
-            _mean,
+            clusters,
+            statistic,
             paired=True,
             vectorized=True,
             n_resamples=RESAMPLES,
@@ -98,7 +108,8 @@ def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> 
             method="percentile",
             rng=np.random.default_rng(_SEED),
         ).confidence_interval
-    return Difference(difference=seen, low=float(interval.low), high=float(interval.high))
+    low, high = float(interval.low), float(interval.high)
+    return (low, high) if low < high else (math.nan, math.nan)
 
 
 def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:

@@ -21,7 +21,7 @@ class Share:
         return self.count / self.of if self.of else math.nan
 
     def __str__(self) -> str:
-        """`35.8 % (1316/3678; 34.2 to 37.4)`; `- (0/0)` of nothing."""
+        """`35.8 % (1316/3678; 34.2 to 37.3)`; `- (0/0)` of nothing."""
         if not self.of:
             return "- (0/0)"
         interval = f"{100 * self.low:.1f} to {100 * self.high:.1f}"

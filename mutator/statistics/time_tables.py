@@ -50,7 +50,8 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
         name="alert_to_hazard",
         title="From alert to hazard, censored",
         note="Runs whose first alert came before any hazard; without a hazard, censored at their end. "
-        "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` where not reached. The last "
+        "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` where not reached; where the curve is one "
+        "half for a while, the middle of that. The last "
         f"columns: share of alerts that no hazard follows within {late}, the driver's reaction time "
         f"(Kaplan-Meier), and of hazards after an alert those that came more than {late} after it. Alerts "
         "that came with the first hazard or after it are counted apart.",

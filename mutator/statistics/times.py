@@ -9,13 +9,16 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from mutator.statistics.frame import hazard_names
 from mutator.statistics.shares import CONFIDENCE, Share, share
 
 Alerts = Mapping[str, tuple[tuple[str, float], ...]]
+_EQUAL = 1e-9  # shares closer than this are the same: a curve is a product of fractions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +37,13 @@ class Reaction:
     """What is left of the drive after the first alert. Times in s; NaN: not reached or not defined.
 
     `at_risk` runs had an alert before any hazard; a hazard then came in `events` of them, the others are
-    censored at their end. `survival` is the Kaplan-Meier share of alerts that no hazard follows within the
-    driver's reaction time; `in_time` the share of hazards after an alert that came later than that.
+    censored at their end. `median` is where the Kaplan-Meier curve crosses one half. Where it is exactly one
+    half for a while, the median is the middle of that while, as R's `survfit` and SAS have it: without
+    censoring it is then the ordinary median. A curve that stays at one half to its end has the beginning.
+    `median_low` to `median_high` are the times at which the curve's interval (log-log transformed) holds one
+    half (Brookmeyer and Crowley 1982); an infinite end is not reached.
+    `survival` is the Kaplan-Meier share of alerts that no hazard follows within the driver's reaction time;
+    `in_time` the share of hazards after an alert that came later than that.
     """
 
     at_risk: int
@@ -102,7 +110,7 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
     low, high = _median_interval(curve)
     return Reaction(
         **found,
-        median=float(curve.quantile(0.5)),
+        median=_median(curve),
         median_low=low,
         median_high=high,
         survival=float(reached[-1]) if len(reached) else 1.0,
@@ -110,13 +118,23 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
     )
 
 
-def _median_interval(curve: object) -> tuple[float, float]:
-    """The interval of the median time (log-log transformed); infinite or NaN: not reached."""
-    import numpy as np
+def _median(curve: Any) -> float:
+    """Where a Kaplan-Meier curve crosses one half, as `Reaction` says; NaN: it does not."""
+    (reached,) = np.nonzero(curve.surv_prob < 0.5 + _EQUAL)
+    if not reached.size:
+        return math.nan
+    first, *later = curve.surv_times[reached]
+    is_flat = curve.surv_prob[reached[0]] > 0.5 - _EQUAL
+    return float((first + later[0]) / 2 if is_flat and later else first)
 
+
+def _median_interval(curve: Any) -> tuple[float, float]:
+    """The interval of the median time; infinite or NaN: not reached."""
     with np.errstate(all="ignore"):  # the curve's last point may be 0, of which there is no log
-        low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)  # type: ignore[attr-defined]
-    return float(low), float(high)
+        low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
+    # where the curve ends at 0 it has no interval, so it cannot end that of the median
+    is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _EQUAL
+    return float(low), math.inf if is_open else float(high)
 
 
 def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:

@@ -18,6 +18,12 @@ class CheckResult:
     detail: str
 
 
+def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
+    """The packages that the golden runs in a folder loaded; nothing before they ran."""
+    path = folder.path / FILE
+    return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
+
+
 def measured_cpu_s(folder: RunFolder) -> float | None:
     """Mean CPU time in s of the golden runs in a folder; None before they ran."""
     path = folder.path / FILE

@@ -1,7 +1,7 @@
 """The run folder: where a campaign keeps all it was told and all it found out.
 
 DIR/
-  run.json              schema, plan digest, choices, chunks, limits, canary, source digests, provenance
+  run.json              schema, plan digest, choices, chunks, limits, canary, sources, stretches of work
   campaign.yaml         the campaign file as it was read
   plan.csv              the plan for people and spreadsheets
   plan/experiments.jsonl, plan/faults.jsonl      the frozen plan
@@ -26,11 +26,13 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.files import read_json
+from mutator._common.hashing import plain
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
 from mutator.model import Limits
 from mutator.store.plan_file import ids
 from mutator.store.shards import Shard
+from mutator.store.stretches import Stretch, read_stretches
 
 SCHEMA = "run/1"
 HEAD = "run.json"
@@ -73,10 +75,25 @@ class RunFolder:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Versions of mutator, Python and packages; source digests; seed and reading."""
+        """Version of mutator, stretches of work, source digests, seed and reading, as plain data."""
         head = self.head
-        found: dict[str, Any] = head["provenance"]
+        stretches = [plain(stretch) for stretch in self.stretches]
+        found = {"mutator": head["provenance"]["mutator"], "stretches": stretches}
         return found | {key: head[key] for key in ("sources", "seed", "reading")}
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """What each session that drove anything ran with, oldest first."""
+        return read_stretches(self.head)
+
+    def stretch_of(self, experiment_id: str) -> Stretch | None:
+        """The newest stretch of work that has a record of an experiment."""
+        files = self.path / "records"
+        for stretch in reversed(self.stretches):
+            for path in files.glob(f"{stretch.records}.jsonl"):
+                if experiment_id.encode() in path.read_bytes():
+                    return stretch
+        return None
 
     @property
     def planned(self) -> int:

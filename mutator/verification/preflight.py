@@ -1,7 +1,7 @@
 """The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -9,7 +9,8 @@ from typing import Any
 
 from mutator._common.files import raising_disk_full, read_json, write_json
 from mutator._common.hashing import digest
-from mutator.campaigns.provenance import sources, versions
+from mutator.campaigns import machine
+from mutator.campaigns.provenance import sources
 from mutator.campaigns.shared_runs import same_in
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
@@ -80,7 +81,15 @@ class _Checks:
         now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
         self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
-        content = [now, versions(), head["goldens"], self.seed, self.canary.id, self.hazard, head["limits"]]
+        content = [
+            now,
+            machine.surroundings(),
+            head["goldens"],
+            self.seed,
+            self.canary.id,
+            self.hazard,
+            head["limits"],
+        ]
         self.digest = digest([*content, places])
 
     def known(self) -> tuple[CheckResult, ...] | None:
@@ -121,6 +130,7 @@ class _Checks:
         results = [anchors, *self._judge(runs)]
         goldens = {golden_key(*key): runs[_GOLDEN, key].digest for key in self.keys}
         self._check_same_as_before(goldens)
+        self._put_in_place(goldens)
         cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
         write_json(
             self.folder.path / FILE,
@@ -129,6 +139,7 @@ class _Checks:
                 "digest": self.digest,
                 "results": [asdict(result) for result in results],
                 "goldens": goldens,
+                "packages": self._packages(runs),
                 "run_cpu_s": sum(cpu) / len(cpu),
             },
         )
@@ -139,7 +150,7 @@ class _Checks:
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
-        """A run that has records must not go on with other golden runs (of another Python, say)."""
+        """A run that has records must not go on with other golden runs (of another processor, say)."""
         before = self._before()
         started = any((self.folder.path / "records").glob("*.jsonl"))
         other = [key for key in goldens if before and before["goldens"].get(key) != goldens[key]]
@@ -147,8 +158,8 @@ class _Checks:
             raise CheckFailed(
                 f"the golden run {other[0]} is not the one this run began with",
                 where=self.folder.path,
-                expected="the same Python and packages during a whole run",
-                remedy="go back to them (run.json has the versions), or run into another folder",
+                expected="a machine, Python and packages with which the target drives to the same bytes",
+                remedy="go back to those of before, which run.json has, or run into another folder",
             )
 
     def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], CheckRun]:
@@ -158,6 +169,8 @@ class _Checks:
         work = self.folder.work / "checks"
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir(parents=True)
+        shutil.rmtree(self._kept(""), ignore_errors=True)
+        self._kept("").mkdir()
         base = prepare_base(self.manifest, self.folder.base)
         engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
         notify(Progress(stage="checks", total=len(jobs)))
@@ -208,7 +221,7 @@ class _Checks:
             execution = engine.execute(job, scratch)
             run = self._look(execution)
             if name[0] == _GOLDEN and not run.problem:
-                self._keep(execution.out, self.folder.golden(*name[1]))
+                execution.out.rename(self._kept(golden_key(*name[1])))
             return run
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
@@ -231,12 +244,26 @@ class _Checks:
             hazards=tuple(golden.hazards_of(record, self.manifest.hazards)),
             triggered=was_triggered(execution.probe),
             cpu_s=execution.cpu_s,
+            modules=execution.modules,
         )
 
-    def _keep(self, out: Path, place: Path) -> None:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(place, ignore_errors=True)
-        out.rename(place)
+    def _kept(self, key: str) -> Path:
+        """Where a golden run waits until it is known to be that of before."""
+        return self.folder.work / "golden" / key
+
+    def _put_in_place(self, keys: Iterable[str]) -> None:
+        for key in keys:
+            place = self.folder.path / "golden" / key
+            shutil.rmtree(place, ignore_errors=True)
+            if self._kept(key).is_dir():
+                place.parent.mkdir(exist_ok=True)
+                self._kept(key).rename(place)
+
+    def _packages(self, runs: Mapping[tuple[str, Any], CheckRun]) -> list[str]:
+        """What the golden runs loaded that is neither the target's nor the standard library's."""
+        loaded = {module for key in self.keys for module in runs[_GOLDEN, key].modules}
+        own = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
+        return list(machine.packages_of(loaded - own))
 
     def _judge(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
         for key in self.keys:

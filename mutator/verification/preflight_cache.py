@@ -15,8 +15,8 @@ from mutator._common.hashing import digest
 
 def entry(key: str) -> Path:
     """Where the checks with this digest are kept. Each machine that shares the home has entries of its own:
-    another processor may compute other last digits."""
-    return caches.of_checks() / digest([key, platform.node(), platform.processor()])
+    what its digest says of it may not be all that changes last digits."""
+    return caches.of_checks() / digest([key, platform.node()])
 
 
 def copy(source: Path, to: Path, file: str) -> None:

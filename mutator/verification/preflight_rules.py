@@ -7,7 +7,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRun:
     """What a check needs to know of a run: how it ended, digests of all it wrote and of its trace alone,
-    hazards, alerts, trigger seen."""
+    hazards, alerts, trigger seen, top-level modules of others that it imported."""
 
     problem: str
     digest: str = ""
@@ -16,6 +16,7 @@ class CheckRun:
     alerts: tuple[tuple[str, float], ...] = ()
     triggered: bool = False
     cpu_s: float = 0.0
+    modules: tuple[str, ...] = ()
 
 
 def judge_golden(first: CheckRun, again: CheckRun) -> str:

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -53,7 +54,10 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
     patches = {p.name: p.read_bytes() for p in (tmp_path / "out" / "patches").rglob("*.patch")}
     assert patches == {p.name: p.read_bytes() for p in (runs["whole"] / "patches").rglob("*.patch")}
     heads = [json.loads((run / "run.json").read_text()) for run in (tmp_path / "out", runs["whole"])]
+    stretches = [head.pop("stretches") for head in heads]
     assert heads[0] == heads[1]
+    same = [{k: v for k, v in stretch.items() if k != "records"} for stretch in chain(*stretches)]
+    assert len(stretches[0]) == 2 and same == [same[0]] * 3
 
 
 def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ def main(job_file: str) -> int:
     sys.path.insert(0, job["tree"])
     report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
     probe = None
+    known = set(sys.modules)
     try:
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
@@ -41,6 +42,7 @@ def main(job_file: str) -> int:
     except BaseException as err:
         report |= describe(err, job["tree"], probe)
     report["outside"] = imported_elsewhere(job["package"], job["tree"], sys.modules)
+    report["modules"] = third_party(known, job["package"])
     report["files"] = tree_files(job["tree"])
     report["probe"] = probe.report() if probe else None
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
@@ -124,6 +126,12 @@ def imported_since(name: str) -> list[str]:
 def libraries(known: set[str], package: str) -> list[str]:
     """Modules that were imported beside the `known` ones, in that order, but for those of the package."""
     return [name for name in sys.modules if name not in known and name.partition(".")[0] != package]
+
+
+def third_party(known: set[str], package: str) -> list[str]:
+    """Top-level names of what was imported beside the `known` modules, but for those of the package and the
+    standard library."""
+    return sorted({name.partition(".")[0] for name in libraries(known, package)} - sys.stdlib_module_names)
 
 
 def tree_files(tree: str) -> dict[str, str]:

@@ -5,6 +5,7 @@ from mutator.campaigns.studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.review import gate
+from mutator.store.stretches import package_versions, told
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
 _HTML = """\
@@ -32,7 +33,7 @@ def origin_panel(run: ReportedRun) -> Panel:
 def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
     reviewed = gate.approval_summary(folder.path)
-    head, versions = folder.head, folder.provenance
+    head, packages = folder.head, package_versions(folder.stretches)
     facts = {
         "experiments": f"{len(run.rows)} of {folder.planned} planned",
         **({"proof": run.engines.state} if run.engines else {}),
@@ -44,8 +45,9 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
         "reading": head["reading"],
         **{f"chosen: {name}": value for name, value in head["choices"].items() if value is not None},
         **{f"digest of {name}": value for name, value in head["sources"].items()},
-        **{name: versions[name] for name in ("mutator", "python", "machine")},
-        **{name: versions["packages"][name] for name in PACKAGES if name in versions["packages"]},
+        "mutator": head["provenance"]["mutator"],
+        **told(folder.stretches),
+        **{name: packages[name] for name in PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]
 

@@ -46,7 +46,7 @@ def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Pa
     assert (len(same.pairs), len(same.changed)) == (2, 0)
     assert list(same.tables["changes"]["fault type"]) == ["sensor/lane", "total"]
     hazards = same.tables["rates"].set_index("what").loc["hazard"]
-    assert (hazards["pairs"], hazards["a: rate"], hazards["b: rate"]) == (2, 1.0, 1.0)
+    assert (hazards["pairs"], hazards["a: rate"], hazards["b: rate"]) == (2, 0.5, 0.5)
     assert same.findings(["new-hazard", mutator.Gate.UNMATCHED]) == ()
     assert "2 experiments" in repr(same)
     assert "What changed" in same._repr_html_()

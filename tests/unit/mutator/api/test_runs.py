@@ -75,7 +75,7 @@ def test_it_says_what_it_is(run: Run) -> None:
     """A run is shown in one line; its faults and its provenance are at hand."""
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
-    assert {"sources", "seed", "packages", "choices"} <= set(run.provenance)
+    assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
     assert set(run.results["fault_id"]) == set(run.faults)
     assert list(run.experiments) == list(plan_file.ids(run.path))
 

@@ -124,6 +124,15 @@ def test_filters_and_limit(whole: Workspace) -> None:
         make_plan(whole, "toy", Choices(only="value > 1000"))
 
 
+def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
+    """A limited plan of both methods is whole pairs, which the statistics of pairs can use."""
+    plan = make_plan(whole, "toy", Choices(limit=10))
+    keys = Counter(
+        (e.fault.id, e.scenario, e.trigger.name.removeprefix("random/"), e.seed) for e in plan.experiments
+    )
+    assert len(plan.experiments) == 10 and set(keys.values()) == {2}
+
+
 @pytest.mark.parametrize(
     ("choices", "told"),
     [

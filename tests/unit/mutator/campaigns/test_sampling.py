@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from mutator.campaigns.sampling import pick, pick_in_proportion, spread
+from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs, spread
 from mutator.model import Experiment, Method
 
 SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
@@ -74,6 +74,36 @@ def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experi
     assert keys[Method.GUIDED] == keys[Method.RANDOM]
     assert pick_in_proportion(many, 56, seed=1) == picked
     assert pick_in_proportion(many, 56, seed=2) != picked
+
+
+@pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
+def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
+    """Every guided experiment has its random partner, variants, scenarios and rows come as evenly as ever,
+    and the same seed picks the same, whatever the order."""
+    picked = pick_pairs(many, count, seed=1)
+    assert len(picked) == count
+    keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
+    assert keys[Method.GUIDED] == keys[Method.RANDOM] and len(keys[Method.GUIDED]) == count // 2
+    if count in (12, 24):
+        assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
+        for counts in (Counter(e.scenario for e in picked), Counter(key(e)[2] for e in picked)):
+            assert max(counts.values()) - min(counts.values()) <= 2
+    assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
+    assert pick_pairs(list(reversed(many)), count, seed=1) == tuple(reversed(picked))
+
+
+@pytest.mark.parametrize("count", [1, 11, 55])
+def test_an_odd_number_cuts_one_pair(many: list[Experiment], count: int) -> None:
+    """One guided experiment has no partner; the number is what was asked for."""
+    picked = pick_pairs(many, count, seed=1)
+    guided, random = ({key(e) for e in picked if e.method is m} for m in (Method.GUIDED, Method.RANDOM))
+    assert len(picked) == count and len(guided - random) == 1 and random <= guided
+
+
+def test_without_partners_pairs_are_single_experiments(many: list[Experiment]) -> None:
+    """Of guided experiments alone the pick is that of `pick`."""
+    guided = [e for e in many if e.method is Method.GUIDED]
+    assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
 
 
 def key(experiment: Experiment) -> tuple[str, str, str]:

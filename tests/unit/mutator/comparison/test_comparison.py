@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,12 @@ import pytest
 
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Gate, compare, findings
+from mutator.comparison.differences import facts
+from mutator.comparison.sides import read_side
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.store.run_folder import HEAD
+from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]
@@ -105,6 +109,23 @@ def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
     assert not any(fact.differs for fact in found.facts)
     assert findings(found, list(Gate)) == ()
     assert "None of them changed" in pages.summary(found)
+
+
+def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
+    """Python, processor and packages of all stretches of a run are facts that may differ; of a folder that
+    lists every installed package only those count that the other one lists, too."""
+    sides = [read_side(runs[0]) for _ in "ab"]
+    old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
+    new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
+    sides[0].folder.head["stretches"] = [asdict(old)]
+    sides[1].folder.head["stretches"] = [asdict(old), asdict(new)]
+    differing = {f.name: (f.a, f.b) for f in facts(*sides) if f.differs}
+    python = {"python": ("CPython 3.11.7", "CPython 3.11.7, CPython 3.12.1")}
+    assert differing == python | {"package numpy": ("2.0", "2.0, 2.1"), "package cv": ("-", "5")}
+    del sides[0].folder.head["stretches"]
+    planned = {"python": "3.11.7", "machine": "Linux", "packages": {"numpy": "2.0", "x": "1"}}
+    sides[0].folder.head["provenance"] |= planned
+    assert {f.name for f in facts(*sides) if f.differs} == {"python", "processor", "package numpy"}
 
 
 def test_only_some(runs: tuple[Path, Path]) -> None:

@@ -336,3 +336,9 @@ def test_engines_run_side_by_side(
     for thread in threads:
         thread.join()
     assert found == [Status.OK, Status.OK]
+
+
+def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
+    """Neither its own package's, nor the standard library's, nor what Python itself had loaded."""
+    assert run().modules == ("numpy",)
+    assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)

@@ -172,12 +172,15 @@ def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
 
 def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
     """The censored median is beyond every run where most alerts are followed by no hazard; where the curve
-    falls past a half in one step it is that step; without an end of runs there is none."""
+    falls past a half in one step it is that step, unless it is one of few; without an end of runs there is
+    none."""
     alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
     safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
     assert median_time(safe, of="").low == math.inf
     found = median_time(late, of="")
     assert (found.estimate, found.low, found.high) == (4.0, 4.0, 4.0)
+    few = median_time(late[:5], of="")
+    assert few.estimate == 4.0 and math.isnan(few.low) and math.isnan(few.high)
     assert math.isnan(median_time(safe.assign(t_end=math.nan), of="").low)
 
 

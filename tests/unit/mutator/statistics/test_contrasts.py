@@ -97,6 +97,25 @@ def test_resampling_draws_whole_faults() -> None:
     assert single.low < 4 / 12 < single.high
 
 
+def test_faults_that_all_say_the_same_have_no_interval() -> None:
+    """That three faults did no harm at all, or only when guided, does not bound what others would do."""
+    for guided in (RAN, HIT):
+        rows = [row for i in range(3) for row in pair(str(i), guided, RAN)]
+        found = contrasts.resampled(results(*rows), "injected")
+        assert found.difference == float(guided is HIT)
+        assert math.isnan(found.low) and math.isnan(found.high)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_interval_needs_both_methods_in_every_draw() -> None:
+    """Where each fault has runs of one method only, some draws have no difference: no interval is told."""
+    found = contrasts.resampled(
+        results(HIT | {"fault_id": "a"}, RAN | {"fault_id": "b", "method": "random"}), "activated"
+    )
+    assert found.difference == 1.0
+    assert math.isnan(found.low) and math.isnan(found.high)
+
+
 def test_a_difference_needs_runs_of_both_methods() -> None:
     """Without random runs there is no difference and no interval."""
     found = contrasts.resampled(results(HIT, RAN), "activated")

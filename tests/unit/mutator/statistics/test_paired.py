@@ -1,7 +1,9 @@
 """Statistics of pairs."""
 
 import math
+from itertools import product
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -20,11 +22,12 @@ def test_mcnemar_looks_at_pairs_that_differ() -> None:
 
 
 def test_nothing_differs() -> None:
-    """Equal flags have p 1 and a difference of 0 with nothing around it."""
+    """Equal flags have p 1 and a difference of 0; how rarely others would differ they do not say."""
     same = flags("1100")
     assert mcnemar(same, same) == Matched(both=2, first_only=0, second_only=0, neither=2, p=1.0)
     found = rate_difference(same, same, pd.Series(list("abcd")))
-    assert found == Difference(difference=0.0, low=0.0, high=0.0)
+    assert found.difference == 0.0
+    assert math.isnan(found.low) and math.isnan(found.high)
 
 
 def test_whole_faults_are_drawn_anew() -> None:
@@ -61,3 +64,45 @@ def test_equal_and_missing_times() -> None:
     none = times(pd.Series([None], dtype=float), pd.Series([1.0]))
     assert none.n == 0
     assert math.isnan(none.median.difference)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
+    """Of five faults there are 5^5 resamples: the interval ends between their percentiles around 2.5 and
+    97.5 %."""
+    draw = np.random.default_rng(seed)
+    cluster = pd.Series(np.repeat(range(5), [1, 2, 3, 5, 8]))
+    first, second = (pd.Series(draw.random(19) < chance) for chance in (0.3, 0.6))
+    change = second.astype(int) - first.astype(int)
+    totals = change.groupby(cluster).agg(["sum", "count"]).to_numpy()
+    drawn = np.array([totals[list(picked)].sum(axis=0) for picked in product(range(5), repeat=5)])
+    near = np.percentile(drawn[:, 0] / drawn[:, 1], [2.0, 3.0, 97.0, 98.0])
+    found = rate_difference(first, second, cluster)
+    assert near[0] <= found.low <= near[1] and near[2] <= found.high <= near[3]
+
+
+@pytest.mark.parametrize("size", [5, 6, 9, 10, 30])
+def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
+    """The interval has as few differences as covers 95 %: the sign test by hand, none for fewer than six."""
+    change = pd.Series(np.random.default_rng(size).normal(0.3, 1.0, size))
+    found = times(pd.Series(np.zeros(size)), change).median
+    tails = [sum(math.comb(size, k) for k in range(i + 1)) / 2**size for i in range(size)]
+    outside = [i for i, tail in enumerate(tails) if tail <= 0.025]
+    if outside:
+        ordered = sorted(change.round(9))
+        assert (found.low, found.high) == (ordered[outside[-1]], ordered[-1 - outside[-1]])
+    else:
+        assert math.isnan(found.low) and math.isnan(found.high)
+
+
+@pytest.mark.parametrize("size", [4, 7, 10])
+def test_wilcoxon_is_exact_for_few_pairs(size: int) -> None:
+    """Of all signs that the ranks may have, the share that is as far to a side as the one seen."""
+    change = pd.Series(np.random.default_rng(size).normal(0.5, 1.0, size))
+    ranks = change.abs().rank()
+    sums = [
+        sum(r for r, up in zip(ranks, signs, strict=True) if up) for signs in product((0, 1), repeat=size)
+    ]
+    least = min(ranks[change > 0].sum(), ranks[change < 0].sum())
+    expected = min(1.0, 2 * sum(total <= least for total in sums) / 2**size)
+    assert times(pd.Series(np.zeros(size)), change).p == pytest.approx(expected)

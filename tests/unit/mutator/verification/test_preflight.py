@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from mutator.campaigns import machine
 from mutator.campaigns.plans import freeze, load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.store.records import SCHEMA, LineWriter, Progress
 from mutator.store.run_folder import RunFolder
-from mutator.verification import preflight
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
@@ -125,13 +125,15 @@ def test_an_anchor_that_is_gone_is_told_before_anything_runs(
 def test_other_golden_runs_than_before_are_refused(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with records does not go on when the machine's packages changed what golden is."""
+    """A run with records does not go on where golden is another one, and keeps the golden runs it has."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA}).close()
-    monkeypatch.setattr(preflight, "versions", lambda: {"python": "another"})
+    monkeypatch.setattr(machine, "cpu", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))
-    monkeypatch.setattr(preflight, "versions", lambda: {"python": "a third"})
+    shutil.rmtree(folder.work)
+    before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
+    monkeypatch.setattr(machine, "cpu", lambda: "a third")
     original = ReferenceEngine.execute
 
     def other(self: ReferenceEngine, job, folder):  # type: ignore[no-untyped-def]
@@ -143,3 +145,5 @@ def test_other_golden_runs_than_before_are_refused(
     monkeypatch.setattr(ReferenceEngine, "execute", other)
     with pytest.raises(CheckFailed, match="not the one this run began with"):
         run_checks(toycar, folder)
+    shutil.rmtree(folder.work)
+    assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before

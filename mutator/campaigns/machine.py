@@ -1,0 +1,129 @@
+"""What computes here: Python, operating system, processor, BLAS, packages; and the state of git clones."""
+
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from mutator.engines.processes import THREADS, environment
+
+_BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
+
+
+def surroundings() -> list[Any]:
+    """All that may change what a run of the target computes, apart from its sources: any of the installed
+    packages may be the target's."""
+    return [python(), platform.platform(), cpu(), blas(), threads(), versions()]
+
+
+def python() -> str:
+    """`CPython 3.11.7`."""
+    return f"{platform.python_implementation()} {platform.python_version()}"
+
+
+def cpu() -> str | None:
+    """The processor's model."""
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        text = ""
+    model = re.search(r"^model name\s*:\s*(.*\S)", text, re.MULTILINE)
+    return model[1] if model else platform.processor() or None
+
+
+def threads() -> dict[str, str]:
+    """How many threads the environment of the target's process allows numerical libraries."""
+    return dict.fromkeys(THREADS, "1")
+
+
+@lru_cache(maxsize=1)
+def blas() -> tuple[dict[str, Any], ...]:
+    """The BLAS that numpy loads in an environment like that of the target's process: `library`, `version`,
+    `kernel` that it chose for this processor, `threads`. Nothing where there is no numpy."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-P", "-s", "-c", _BLAS],
+            env=environment(0, Path(folder)),
+            capture_output=True,
+            check=False,
+        )
+    loaded = json.loads(done.stdout) if done.returncode == 0 else []
+    names = {"internal_api": "library", "version": "version", "architecture": "kernel"}
+    names["num_threads"] = "threads"
+    return tuple({ours: one.get(theirs) for theirs, ours in names.items()} for one in loaded)
+
+
+@lru_cache(maxsize=1)
+def _installed() -> dict[str, tuple[str, list[str]]]:
+    """Version and requirements of each installed package; of one installed twice, of what is imported."""
+    found: dict[str, tuple[str, list[str]]] = {}
+    for distribution in metadata.distributions():
+        told = distribution.metadata
+        if name := told["Name"]:
+            requirements = told.get_all("Requires-Dist") or []
+            found.setdefault(canonicalize_name(name), (told["Version"], requirements))
+    return found
+
+
+def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
+    """The version of each of these packages (default: all), sorted; None: not installed."""
+    installed = _installed()
+    wanted = installed if names is None else names
+    return {name: installed.get(name, (None,))[0] for name in sorted(wanted)}
+
+
+def required() -> frozenset[str]:
+    """The packages that mutator needs to run, with those that they need. Where mutator is not installed, and
+    so says of none, every installed one."""
+    installed = _installed()
+    seen: set[tuple[str, str]] = set()
+    waiting = [("mutator", "")]
+    while waiting:
+        name, extra = waiting.pop()
+        if (name, extra) not in seen and name in installed:
+            seen.add((name, extra))
+            for requirement in map(Requirement, installed[name][1]):
+                if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
+                    needed = canonicalize_name(requirement.name)
+                    waiting += [(needed, wanted) for wanted in ("", *requirement.extras)]
+    return frozenset(name for name, _ in seen) - {"mutator"} or frozenset(installed)
+
+
+def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
+    """The packages that these top-level modules come from, sorted; modules of none are left out."""
+    providers = metadata.packages_distributions()
+    # of a package that is installed as a link to its sources only its own name may be known
+    names = (name for module in modules for name in providers.get(module, [module]))
+    return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
+
+
+def clone_state(folder: Path) -> dict[str, Any] | None:
+    """`commit` of the git clone that has this folder, and whether anything in the folder was `changed` since;
+    None without git, and for a folder that no commit has."""
+    head = _git(folder, "rev-parse", "HEAD", "HEAD:./")
+    changes = _git(folder, "status", "--porcelain", "--", ".")
+    if head is None or changes is None:
+        return None
+    return {"commit": head.split()[0], "changed": bool(changes.strip())}
+
+
+def _git(folder: Path, *words: str) -> str | None:
+    """What git says in a folder; None when it cannot."""
+    outside = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    command = ["git", "--no-optional-locks", "-C", str(folder), *words]
+    try:
+        done = subprocess.run(command, env=outside, capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    return done.stdout if done.returncode == 0 else None

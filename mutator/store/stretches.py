@@ -1,0 +1,90 @@
+"""Stretches of work: what each session that drove anything in a run folder ran with."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from mutator.errors import MutatorError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """What one session ran with.
+
+    `python` and `packages` stay the same while a run goes on, unless others are accepted; `accepted` says
+    which were. All else is recorded only: golden runs show whether machines compute alike. None: not known.
+    """
+
+    python: str  # CPython 3.11.7
+    packages: Mapping[str, str]  # version of what the harness requires and what the golden runs loaded
+    platform: str  # operating system, kernel, kind of processor
+    cpu: str | None = None  # the processor's model
+    blas: Sequence[Mapping[str, Any]] = ()  # `library`, `version`, `kernel`, `threads` of what numpy loads
+    threads: Mapping[str, str] = field(default_factory=dict)  # in the environment of the target's process
+    # `commit` and `changed` of the git clones that mutator, library, templates and target lie in
+    git: Mapping[str, Mapping[str, Any]] | None = None
+    records: str = "*"  # names of its files in records/, timings/ and proof/, without suffix, as a glob
+    accepted: Sequence[str] = ()  # how Python and packages differ from those of the stretch before
+
+    def __str__(self) -> str:
+        """`CPython 3.11.7, Linux-6.1-x86_64, Intel(R) Xeon(R) Gold 6226R`."""
+        return ", ".join(filter(None, (self.python, self.platform, self.cpu)))
+
+
+def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
+    """Those of a run.json, oldest first. An old one has one: what the run was planned with."""
+    if "stretches" not in head:
+        planned = head["provenance"]
+        return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)
+    try:
+        return tuple(Stretch(**stretch) for stretch in head["stretches"])
+    except TypeError as err:
+        raise MutatorError(
+            f"no stretch of work ({err})", where="run.json", remedy="restore the file: it is damaged"
+        ) from None
+
+
+def differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
+    """How Python and packages differ here from a stretch: `numpy 1.26.4, here 2.1.0`."""
+    found = [] if before.python == python else [f"{before.python}, here {python}"]
+    for name in sorted(before.packages.keys() | packages):
+        old, new = before.packages.get(name), packages.get(name)
+        if old != new:
+            found.append(f"{name} {old or 'none'}, here {new or 'none'}")
+    return tuple(found)
+
+
+def told(stretches: Iterable[Stretch]) -> dict[str, str]:
+    """What stretches ran with, for people; several values are listed, oldest first."""
+    found: dict[str, dict[str, None]] = {}
+    for stretch in stretches:
+        for name, text in _texts(stretch).items():
+            found.setdefault(name, {})[text] = None
+    return {name: ", ".join(texts) for name, texts in found.items()}
+
+
+def _texts(stretch: Stretch) -> dict[str, str]:
+    texts = {"python": stretch.python, "platform": stretch.platform}
+    if stretch.cpu:
+        texts["processor"] = stretch.cpu
+    if stretch.blas:
+        texts["BLAS"] = " and ".join(_blas_text(library) for library in stretch.blas)
+    for place, state in (stretch.git or {}).items():
+        texts[f"git commit of {place}"] = state["commit"] + (" with changes" if state["changed"] else "")
+    if stretch.accepted:
+        texts["other versions accepted"] = "; ".join(stretch.accepted)
+    return texts
+
+
+def _blas_text(library: Mapping[str, Any]) -> str:
+    kernel = f" ({library['kernel']})" if library["kernel"] else ""
+    return f"{library['library']} {library['version']}{kernel}, threads: {library['threads']}"
+
+
+def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:
+    """Version of each package that stretches ran with; several are listed."""
+    found: dict[str, dict[str, None]] = {}
+    for stretch in stretches:
+        for name, version in stretch.packages.items():
+            found.setdefault(name, {})[version] = None
+    return {name: ", ".join(versions) for name, versions in sorted(found.items())}

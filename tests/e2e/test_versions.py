@@ -1,0 +1,268 @@
+"""A run goes on with the Python and packages it began with, or says that it did not."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from mutator import load_run
+from mutator._common import caches
+from mutator.campaigns import machine
+from mutator.campaigns.plans import Choices
+from mutator.cli.app import main
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine
+from mutator.errors import CheckFailed
+from mutator.execution.running import run_campaign
+from mutator.execution.session import Session
+from mutator.execution.worker import Assignment, Worker
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[2]
+Cli = Callable[..., tuple[int, str, str]]
+Execute = Callable[[ReferenceEngine, Job, Path], Execution]
+PYTHONS = "CPython 3.11.7, here CPython 3.12.1"
+
+
+class OnePiece:
+    """A distributor that is interrupted after one piece of the work."""
+
+    def run(self, session: Session) -> None:
+        name = session.worker_name("mine")
+        worker = Worker(
+            session.workspace, Assignment(run=session.folder.path, name=name, engine=session.engine)
+        )
+        worker.run(session.pending[0])
+        worker.close()
+        session.problem = "interrupted"
+
+
+@pytest.fixture
+def cli(toy: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
+    """Runs `mutator WORDS...`; gives exit code, output and errors."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
+
+    def run(*words: object) -> tuple[int, str, str]:
+        capfd.readouterr()
+        code = main([str(word) for word in words])
+        return (code, *capfd.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def half(toy: Workspace, tmp_path: Path, python: Callable[[str], None]) -> Path:
+    """A run folder of which Python 3.11.7 has driven two experiments; now it is Python 3.12.1."""
+    out = tmp_path / "half"
+    python("3.11.7")
+    assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 2
+    python("3.12.1")
+    return out
+
+
+@pytest.fixture
+def python(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Pretends to be a Python of this version."""
+    return lambda version: monkeypatch.setattr("platform.python_version", lambda: version)
+
+
+@pytest.fixture
+def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the fault-free runs that are driven."""
+    names: list[str] = []
+    execute = ReferenceEngine.execute
+
+    def noted(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
+        if job.mutant is None:
+            names.append(job.name)
+        return execute(self, job, folder)
+
+    monkeypatch.setattr(ReferenceEngine, "execute", noted)
+    return names
+
+
+def other_digits(execute: Execute) -> Execute:
+    """What runs runs on a machine that computes otherwise: each record of the target's ends in a blank."""
+
+    def run(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
+        done = execute(self, job, folder)
+        with (done.out / "said.json").open("a") as file:
+            file.write(" ")
+        return done
+
+    return run
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_another_python_is_refused(cli: Cli, half: Path) -> None:
+    """Exit code 2, both versions named, what to do said; nothing is driven and nothing is written."""
+    before = contents(half)
+    code, _, err = cli("run", "small", "--out", half)
+    assert code == 2
+    assert f"driven with other versions: {PYTHONS}" in err and "--accept-versions" in err
+    assert contents(half) == before
+
+
+def test_another_python_is_accepted_and_noted(
+    cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
+) -> None:
+    """With the option the run is finished, its fault-free runs are driven again and agree, its results are
+    those of an undisturbed run; run.json, the report and `show` say who drove what."""
+    before = len(driven)
+    code, _, err = cli("run", "small", "--out", half, "--accept-versions")
+    assert code == 0, err
+    assert before == 4 and sorted(driven[:4]) == sorted(driven[4:])
+    assert run_campaign(toy, "small", tmp_path / "whole").exit_code == 0
+    assert (half / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
+    stretches = json.loads((half / "run.json").read_text())["stretches"]
+    assert [stretch["python"] for stretch in stretches] == ["CPython 3.11.7", "CPython 3.12.1"]
+    assert [stretch["accepted"] for stretch in stretches] == [[], [PYTHONS]]
+    report = (half / "report" / "REPORT.md").read_text()
+    assert "CPython 3.11.7, CPython 3.12.1" in report and PYTHONS in report
+    run = load_run(half)
+    by = {e: stretch.python for e in run.records if (stretch := run.experiment(e).stretch)}
+    assert sorted(by.values()) == ["CPython 3.11.7"] * 2 + ["CPython 3.12.1"] * 10
+    for name, version in by.items():
+        code, out, _ = cli("show", name, "--run", half, "--no-plot")
+        assert code == 0 and f"run with: {version}, " in out
+    assert cli("run", "small", "--out", half)[0] == 0  # nothing is left to drive
+
+
+def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the fault-free runs come out otherwise, accepting does not help, and nothing is written."""
+    before = contents(half)
+    monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
+    code, _, err = cli("run", "small", "--out", half, "--accept-versions")
+    assert code == 1 and "is not the one this run began with" in err
+    assert contents(half) == before
+
+
+def test_pytest_refuses_and_accepts_as_the_command_does(
+    toy: Workspace, half: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Called as pytest, a session has the same option and the same exit code."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
+    plain = ["-c", os.devnull, "-p", "no:cacheprovider", "--noconftest", "--rootdir", str(half)]
+    words = [*plain, "--disable-plugin-autoload", "-p", "mutator"]
+    words += ["--campaign", "small", "--campaign-out", str(half)]
+    assert pytest.main(words) == 2
+    assert PYTHONS in capfd.readouterr().err
+    assert pytest.main([*words, "--accept-versions"]) == 0
+    assert len(RunFolder.open(half).stretches) == 2
+
+
+def test_another_machine_drives_the_golden_runs_again(
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
+) -> None:
+    """On another processor a run goes on without a word if the fault-free runs agree, and not otherwise."""
+    out = tmp_path / "run"
+    run_campaign(toy, "small", out, distributor=OnePiece())
+    assert sorted(driven) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
+    run_campaign(toy, "small", out, distributor=OnePiece())
+    assert len(driven) == 4  # the same machine: known
+    monkeypatch.setattr(machine, "cpu", lambda: "another")
+    assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
+    assert len(driven) == 8
+    assert [stretch.cpu == "another" for stretch in RunFolder.open(out).stretches] == [False, False, True]
+
+    monkeypatch.setattr(machine, "cpu", lambda: "a third")
+    monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
+    before = contents(out)
+    with pytest.raises(CheckFailed, match=r"the golden run A.* is not the one this run began with"):
+        run_campaign(toy, "small", out)
+    assert contents(out) == before
+
+
+Shard = Callable[..., Path]
+
+
+@pytest.fixture
+def shard(
+    toy: Workspace, tmp_path: Path, python: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> Shard:
+    """Runs one of two shards on a machine of its own, with a Python of this version."""
+
+    def run(number: int, version: str = "3.11.7") -> Path:
+        python(version)
+        monkeypatch.setattr(machine, "cpu", lambda: f"machine {number}")
+        out = tmp_path / f"part{number}"
+        assert run_campaign(toy, "small", out, choices=Choices(shard=f"{number}/2")).exit_code == 0
+        return out
+
+    return run
+
+
+def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: Shard, tmp_path: Path) -> None:
+    """Exit code 2 with the list; accepted, the merged run has the stretches of both, and says so."""
+    words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
+    code, _, err = cli(*words)
+    assert code == 2 and "part2: not driven as " in err and PYTHONS in err and "--accept-versions" in err
+    assert not (tmp_path / "out").exists()
+    code, _, err = cli(*words, "--accept-versions")
+    assert code == 0, err
+    merged = RunFolder.open(tmp_path / "out")
+    assert [s.python for s in merged.stretches] == ["CPython 3.11.7", "CPython 3.12.1"]
+    assert [list(s.accepted) for s in merged.stretches] == [[], [PYTHONS]]
+    run = load_run(tmp_path / "out")
+    cpus = [stretch.cpu for e in run.records if (stretch := run.experiment(e).stretch)]
+    assert sorted(cpus) == ["machine 1"] * 6 + ["machine 2"] * 6
+
+
+def test_shards_of_other_machines_are_merged(
+    cli: Cli, shard: Shard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Processors may differ: that the fault-free runs agree is enough, and that they do not is an error."""
+    one = shard(1)
+    assert cli("merge", one, shard(2), "--out", tmp_path / "out")[0] == 0
+    shutil.rmtree(tmp_path / "part2")
+    monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
+    shutil.rmtree(caches.of_checks())  # the machine is another one now
+    code, _, err = cli("merge", one, shard(2), "--out", tmp_path / "other")
+    assert code == 1 and "the golden run A is another one" in err
+
+
+def _other_pythons() -> Iterator[str]:
+    """Interpreters of another minor version that can run mutator."""
+    places = [*map(Path, os.environ["PATH"].split(os.pathsep)), *Path.home().glob(".pyenv/versions/*/bin")]
+    for minor in (11, 12, 13):
+        name = f"python3.{minor}"
+        for path in (place / name for place in places if minor != sys.version_info.minor):
+            if shutil.which(path) and not subprocess.run([path, "-c", ""], capture_output=True).returncode:
+                yield str(path)
+
+
+@pytest.mark.slow
+def test_two_real_pythons(toy: Workspace, tmp_path: Path) -> None:
+    """A folder begun by this Python is refused by another one, with the list, and goes on if accepted."""
+    python = next(_other_pythons(), None)
+    if python is None:
+        pytest.skip("there is no second Python")
+    home = tmp_path / "environment"
+    subprocess.run([python, "-m", "venv", home], check=True)
+    install = [home / "bin" / "pip", "install", "-q", "-c", CLONE / "constraints.txt", "-e", CLONE]
+    done = subprocess.run(install, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f"mutator cannot be installed for {python}: {done.stderr[-500:]}")
+    out = tmp_path / "run"
+    assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 2
+
+    def run(*words: str) -> "subprocess.CompletedProcess[str]":
+        command = [home / "bin" / "mutator", "run", "small", "--out", out, *words]
+        places = {"MUTATOR_ROOT": str(toy.library.parent)}
+        return subprocess.run(command, env=os.environ | places, capture_output=True, text=True, check=False)
+
+    refused = run()
+    assert refused.returncode == 2 and f"{machine.python()}, here CPython 3." in refused.stderr
+    accepted = run("--accept-versions")
+    assert accepted.returncode == 0, accepted.stderr
+    assert "12 of 12 experiments done, 10 now" in accepted.stderr + accepted.stdout
+    assert len({stretch.python for stretch in RunFolder.open(out).stretches}) == 2

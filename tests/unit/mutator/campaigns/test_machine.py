@@ -1,0 +1,92 @@
+"""What computes here, as run folders have it."""
+
+import os
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns import machine
+
+IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
+
+
+def git(folder: Path, *words: str) -> None:
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    subprocess.run(["git", "-C", folder, *IDENTITY, *words], env=clean, check=True, capture_output=True)
+
+
+def test_required_packages_are_those_of_the_harness_and_theirs() -> None:
+    """What mutator requires, and what that requires, by its usual name; nothing of its extras, nor itself."""
+    found = machine.required()
+    assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
+    assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
+
+
+def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that is needed on Windows alone, or by an extra that nobody asked for, is no requirement."""
+    told = {
+        "mutator": ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
+        "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
+        **{name: ("1", []) for name in "bcdtw"},
+    }
+    monkeypatch.setattr(machine, "_installed", lambda: told)
+    assert machine.required() == {"a", "b", "c"}
+
+
+def test_where_mutator_is_not_installed_every_package_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody says what it requires, so nothing may change."""
+    monkeypatch.setattr(machine, "_installed", lambda: {"numpy": ("1", []), "stranger": ("2", [])})
+    assert machine.required() == {"numpy", "stranger"}
+
+
+def test_versions_are_those_installed() -> None:
+    """The version that Python's own metadata has; none of what is not there."""
+    found = machine.versions(["numpy", "no-such-package"])
+    assert found == {"numpy": metadata.version("numpy"), "no-such-package": None}
+
+
+def test_modules_are_named_by_their_packages() -> None:
+    """A module may be named otherwise than what it is installed by; what nothing installed is left out."""
+    assert machine.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == ("opencv-python-headless", "pyyaml")
+
+
+def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One thread, whatever the user's environment says: the target's process gets another one."""
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    machine.blas.cache_clear()
+    (library,) = machine.blas()
+    assert library["library"] and library["version"] and library["threads"] == 1
+    assert set(machine.threads().values()) == {"1"} and "OPENBLAS_NUM_THREADS" in machine.threads()
+
+
+def test_the_processor_is_named() -> None:
+    """The model that /proc/cpuinfo has, where it has one."""
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    models = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
+    assert not models or machine.cpu() in models
+
+
+def test_the_state_of_a_clone(tmp_path: Path) -> None:
+    """The commit, and whether something in that folder changed: elsewhere in the clone does not count."""
+    library, other = tmp_path / "library", tmp_path / "other"
+    for folder in (library, other):
+        folder.mkdir()
+        (folder / "a.yaml").write_text("a")
+    assert machine.clone_state(library) is None
+    git(tmp_path, "init", "-q")
+    assert machine.clone_state(library) is None  # no commit yet
+    git(tmp_path, "add", "library")
+    git(tmp_path, "commit", "-qm", "one")
+    found = machine.clone_state(library)
+    assert found is not None and len(found["commit"]) == 40 and found["changed"] is False
+    assert machine.clone_state(other) is None  # in the clone's folder, and in no commit
+    (library / "b.yaml").write_text("new")
+    assert machine.clone_state(library) == found | {"changed": True}
+
+
+def test_without_git_nothing_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A machine without git has no commit to tell."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert machine.clone_state(Path(__file__).parent) is None

@@ -1,0 +1,123 @@
+"""What a session notes of itself in run.json, and when it is refused."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns import machine
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.provenance import begin_stretch, check_versions
+from mutator.errors import EXIT_WRONG_INPUT, MutatorError
+from mutator.store.check_results import SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
+    """A planned run whose checks say that its golden runs loaded `iniconfig` and `hypothesis`."""
+    planned = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
+    (planned.path / "checks.json").write_text(json.dumps(said))
+    return planned
+
+
+def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
+    """Other versions of some packages; None: not installed."""
+    real = machine.versions
+
+    def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
+        found = real(names)
+        return found | {name: version for name, version in other.items() if name in found}
+
+    monkeypatch.setattr(machine, "versions", versions)
+
+
+def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -> None:
+    """Python, platform, processor, BLAS, threads, and the packages of harness and golden runs."""
+    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    (stretch,) = RunFolder.open(folder.path).stretches
+    assert stretch == folder.stretches[0]
+    assert stretch.python == machine.python() and stretch.cpu == machine.cpu()
+    assert stretch.packages == machine.versions({*machine.required(), "hypothesis"})
+    assert (stretch.records, stretch.git, stretch.accepted) == ("0001-*", _clone(), [])
+    assert stretch.blas and stretch.threads and stretch.platform
+
+
+def _clone() -> dict[str, object] | None:
+    """Of the places of a stretch only the harness may lie in a clone: the toy is a copy."""
+    state = machine.clone_state(Path(machine.__file__).parents[1])
+    return {"mutator": state} if state else None
+
+
+def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
+    """A later session adds to what is there, and changes nothing else of run.json."""
+    before = json.loads((folder.path / "run.json").read_text())
+    for session in ("0001-*", "0002-*"):
+        begin_stretch(RunFolder.open(folder.path), toycar, records=session, accept=False)
+    after = json.loads((folder.path / "run.json").read_text())
+    assert [stretch["records"] for stretch in after.pop("stretches")] == ["0001-*", "0002-*"]
+    assert before.pop("stretches") == [] and before == after
+
+
+def test_before_anything_was_driven_any_version_will_do(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plan is the same whatever froze it, so it binds no versions."""
+    use(monkeypatch, numpy="2.1.0")
+    assert check_versions(folder) == ()
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        ({"jinja2": "9.0"}, f"jinja2 {machine.versions(['jinja2'])['jinja2']}, here 9.0"),
+        ({"hypothesis": "9.0"}, f"hypothesis {machine.versions(['hypothesis'])['hypothesis']}, here 9.0"),
+        ({"iniconfig": None}, f"iniconfig {machine.versions(['iniconfig'])['iniconfig']}, here none"),
+    ],
+    ids=["of the harness", "of the target", "gone"],
+)
+def test_other_versions_are_refused_unless_accepted(
+    folder: RunFolder,
+    toycar: Workspace,
+    monkeypatch: pytest.MonkeyPatch,
+    other: dict[str, str | None],
+    told: str,
+) -> None:
+    """The error lists what differs, and is the user's; accepted, it is noted in the stretch."""
+    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    use(monkeypatch, **other)
+    with pytest.raises(MutatorError) as caught:
+        check_versions(folder)
+    assert caught.value.exit_code == EXIT_WRONG_INPUT
+    assert caught.value.got == f"driven with other versions: {told}"
+    begin_stretch(folder, toycar, records="0002-*", accept=True)
+    assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
+    assert check_versions(folder) == ()  # from now on these are the versions of the run
+
+
+def test_another_python_is_refused(
+    folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both versions are named."""
+    monkeypatch.setattr("platform.python_version", lambda: "3.11.7")
+    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    monkeypatch.setattr("platform.python_version", lambda: "3.12.1")
+    with pytest.raises(MutatorError, match=r"CPython 3\.11\.7, here CPython 3\.12\.1"):
+        check_versions(folder)
+
+
+@pytest.mark.parametrize("changed", ["cpu", "platform", "threads"])
+def test_another_machine_is_noted_and_not_refused(
+    folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
+) -> None:
+    """Processor, kernel and threads are recorded only: golden runs decide whether machines are alike."""
+    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
+    name = "platform.platform" if changed == "platform" else f"mutator.campaigns.machine.{changed}"
+    monkeypatch.setattr(name, lambda: other)
+    assert check_versions(folder) == ()
+    begin_stretch(folder, toycar, records="0002-*", accept=False)
+    assert getattr(folder.stretches[1], changed) == other != getattr(folder.stretches[0], changed)

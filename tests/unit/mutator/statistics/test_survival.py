@@ -1,0 +1,118 @@
+"""Censored times against lifelines 0.30.3, against published curves, and against a median by hand."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import CensoredData, ecdf
+
+from mutator.statistics import times
+from mutator.statistics.times import Reaction
+
+from .results_frame import results
+
+LIFELINES: dict[str, dict[str, Any]] = json.loads(
+    Path(__file__).with_name("survival_by_lifelines.json").read_text()
+)["samples"]
+FLAT = {"flat at one half": 1.165, "flat at one half, censored": 2.5}
+ALERT_S = 5.0
+
+
+def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
+    """The reaction of runs with an alert at 5 s, then a hazard or the end of a scenario of their own."""
+    rows, ends = [], {}
+    for i, (time, event) in enumerate(zip(sample["times"], sample["status"], strict=True)):
+        ends[f"S{i}"] = ALERT_S + time
+        row = {"scenario": f"S{i}", "t_activation": 1.0, "t_alert": ALERT_S, "alerts": "fcw"}
+        rows.append(row | ({"t_h1": ALERT_S + time} if event else {}))
+    return times.reaction(results(*rows), ends, driver_s)
+
+
+@pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
+def test_the_curve_is_that_of_lifelines(sample: dict[str, Any]) -> None:
+    """The share of alerts without a hazard is lifelines' Kaplan-Meier curve at each of its steps."""
+    found = [reaction(sample, at).survival for at in sample["at"]]
+    assert found == pytest.approx(sample["survival"], abs=1e-12)
+    assert reaction(sample, sample["at"][0] / 2).survival == 1.0
+
+
+@pytest.mark.parametrize(("name", "sample"), LIFELINES.items(), ids=LIFELINES)
+def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: dict[str, Any]) -> None:
+    """Where the curve is one half for a while, lifelines has its beginning, and the report its middle."""
+    found = reaction(sample)
+    assert (found.at_risk, found.events) == (len(sample["times"]), sum(sample["status"]))
+    if name in FLAT:
+        assert sample["median"] < found.median == pytest.approx(FLAT[name])
+    else:
+        assert found.median == pytest.approx(_finite(sample["median"]), nan_ok=True)
+
+
+@pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
+def test_the_interval_of_the_median_is_that_of_lifelines(sample: dict[str, Any]) -> None:
+    """It lies where lifelines' interval of the curve holds one half.
+
+    Lifelines takes the interval of a curve at 0 for (0, 0), so it ends there at the latest: four times alone
+    would bound a median, though all of them are below it once in sixteen. The report leaves it open, as R.
+    """
+    found = reaction(sample)
+    high = sample["median_high"]
+    if high == sample["at"][-1] and sample["survival"][-1] == 0.0:
+        high = math.inf
+    if math.isnan(found.median_low):  # never near one half
+        assert min(sample["low"]) > 0.5 and math.isnan(found.median_high)
+    else:
+        assert found.median_low == pytest.approx(sample["median_low"])
+        assert found.median_high == (high if math.isinf(high) else pytest.approx(high))
+
+
+def test_the_published_curve_of_freireich() -> None:
+    """6-MP: 0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448; medians of 23 and 8 weeks (Kleinbaum and Klein,
+    Survival Analysis: A Self-Learning Text, chapter 2)."""
+    drug, placebo = LIFELINES["6-MP"], LIFELINES["placebo"]
+    curve = [round(reaction(drug, week).survival, 3) for week in (6, 7, 10, 13, 16, 22, 23)]
+    assert curve == [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448]
+    assert (reaction(drug).median, reaction(placebo).median) == (23.0, 8.0)
+
+
+def test_the_published_medians_of_miller() -> None:
+    """31 weeks maintained, 23 not maintained: what R's `survfit` prints of its data set `aml`."""
+    medians = [reaction(LIFELINES[name]).median for name in ("maintained", "not maintained")]
+    assert medians == [31.0, 23.0]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 20, 21, 50, 51])
+def test_without_censoring_the_median_is_the_ordinary_one(size: int) -> None:
+    """Of an even number of times it is the middle of the two in the middle."""
+    drawn = np.random.default_rng(size).uniform(0.5, 9.0, size).round(3)
+    sample = {"times": drawn, "status": [1] * size}
+    assert reaction(sample).median == pytest.approx(np.median(drawn))
+
+
+def test_a_curve_that_ends_at_one_half_has_the_median_where_it_came_there() -> None:
+    """Nothing tells how long it would have stayed: the beginning, not infinity."""
+    assert reaction(LIFELINES["one half to the end"]).median == 2.0
+
+
+@pytest.mark.parametrize("name", ["ties", "large"])
+def test_the_curve_is_that_of_scipy(name: str) -> None:
+    """A second implementation, with ties and many steps: every step and its log-log interval."""
+    sample = LIFELINES[name]
+    frame = pd.DataFrame({"time": sample["times"], "event": sample["status"]})
+    known, cut = frame[frame["event"] == 1]["time"], frame[frame["event"] == 0]["time"]
+    curve = ecdf(CensoredData(uncensored=known, right=cut)).sf
+    band = curve.confidence_interval(0.95, method="log-log")
+    assert curve.evaluate(sample["at"]) == pytest.approx(sample["survival"], abs=1e-12)
+    assert band.low.evaluate(sample["at"]) == pytest.approx(sample["low"], abs=1e-12)
+    found = reaction(sample)
+    steps = curve.quantiles
+    inside = steps[(band.low.probabilities <= 0.5) & (band.high.probabilities >= 0.5)]
+    assert found.median_low == pytest.approx(inside.min())
+    assert found.median_high == pytest.approx(min(step for step in sample["at"] if step > inside.max()))
+
+
+def _finite(value: float) -> float:
+    return math.nan if math.isinf(value) else value

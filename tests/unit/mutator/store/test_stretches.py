@@ -1,0 +1,69 @@
+"""Stretches of work: read, compared, told."""
+
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.store.stretches import Stretch, differences, package_versions, read_stretches, told
+
+BEFORE = Stretch(
+    python="CPython 3.11.7",
+    packages={"numpy": "1.26.4", "old": "1.0"},
+    platform="Linux-6.1",
+    cpu="Cray 1",
+    blas=[{"library": "openblas", "version": "0.3", "kernel": "Haswell", "threads": 1}],
+    git={"library": {"commit": "abc", "changed": True}},
+)
+
+
+def test_they_come_back_as_they_were_written() -> None:
+    """What run.json has of a stretch is all of it."""
+    assert read_stretches({"stretches": [asdict(BEFORE)]}) == (BEFORE,)
+
+
+def test_an_old_head_has_what_it_was_planned_with() -> None:
+    """A folder of before has one stretch, with all that it says."""
+    planned = {"python": "3.11.2", "machine": "Linux x86_64", "packages": {"numpy": "2.0"}}
+    (found,) = read_stretches({"provenance": planned})
+    assert (found.python, found.platform, found.packages) == ("3.11.2", "Linux x86_64", {"numpy": "2.0"})
+    assert (found.cpu, found.records) == (None, "*")
+
+
+@pytest.mark.parametrize("stretch", [{}, {"python": "3"}, asdict(BEFORE) | {"stranger": 1}, 7])
+def test_a_damaged_stretch_is_told(stretch: Any) -> None:
+    """Too few keys, too many, or no object at all: an error in words."""
+    with pytest.raises(MutatorError, match=r"run\.json: no stretch of work"):
+        read_stretches({"stretches": [stretch]})
+
+
+def test_every_difference_is_named() -> None:
+    """Another Python, another version, one that is gone, and one that is new."""
+    packages = {"numpy": "2.1.0", "old": None, "new": "3.0"}
+    assert differences(BEFORE, "CPython 3.12.1", packages) == (
+        "CPython 3.11.7, here CPython 3.12.1",
+        "new none, here 3.0",
+        "numpy 1.26.4, here 2.1.0",
+        "old 1.0, here none",
+    )
+    assert differences(BEFORE, BEFORE.python, BEFORE.packages | {"unused": None}) == ()
+
+
+def test_several_stretches_are_told_together() -> None:
+    """Each value once, oldest first; what was accepted is said."""
+    after = Stretch(
+        python="CPython 3.12.1",
+        packages={"numpy": "2.1.0"},
+        platform="Linux-6.1",
+        accepted=("numpy 1.26.4, here 2.1.0",),
+    )
+    assert told([BEFORE, after, after]) == {
+        "python": "CPython 3.11.7, CPython 3.12.1",
+        "platform": "Linux-6.1",
+        "processor": "Cray 1",
+        "BLAS": "openblas 0.3 (Haswell), threads: 1",
+        "git commit of library": "abc with changes",
+        "other versions accepted": "numpy 1.26.4, here 2.1.0",
+    }
+    assert package_versions([BEFORE, after]) == {"numpy": "1.26.4, 2.1.0", "old": "1.0"}
