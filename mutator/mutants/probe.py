@@ -20,7 +20,8 @@ from mutator.triggers.conditions import check_condition, to_code
 
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
-INJECTION_ID = r"(?<![0-9A-Za-z])[0-9a-f]{8}(?![0-9A-Za-z])"
+# in quotes, in a name or in a tag: a number of eight digits is none
+INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
 
 Truth = tuple[float, ...]
 

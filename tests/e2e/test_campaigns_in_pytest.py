@@ -35,6 +35,7 @@ def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProc
         (["--campaign", "small"], 4, "--campaign needs --campaign-out DIR"),
         (["--campaign-out", "out"], 4, "--campaign-out without --campaign"),
         (["--require-reviewed"], 4, "--require-reviewed without --campaign"),
+        (["--accept-versions"], 4, "--accept-versions without --campaign"),
         (["--campaign", "small", "--campaign-out", "out", "--require-reviewed"], 1, "not approved"),
         (["--campaign", "nosuch", "--campaign-out", "out"], 2, "no campaign 'nosuch'"),
         (["--campaign", "small", "--campaign-out", "tree"], 2, "no run folder, and not empty (toycar)"),

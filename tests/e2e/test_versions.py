@@ -112,11 +112,15 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
     assert contents(half) == before
 
 
-def test_another_python_is_accepted_and_noted(cli: Cli, toy: Workspace, half: Path, tmp_path: Path) -> None:
+def test_another_python_is_accepted_and_noted(
+    cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
+) -> None:
     """With the option the run is finished, its fault-free runs are driven again and agree, its results are
     those of an undisturbed run; run.json, the report and `show` say who drove what."""
+    before = len(driven)
     code, _, err = cli("run", "small", "--out", half, "--accept-versions")
     assert code == 0, err
+    assert before == 4 and sorted(driven[:4]) == sorted(driven[4:])
     assert run_campaign(toy, "small", tmp_path / "whole").exit_code == 0
     assert (half / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
     stretches = json.loads((half / "run.json").read_text())["stretches"]
@@ -131,6 +135,15 @@ def test_another_python_is_accepted_and_noted(cli: Cli, toy: Workspace, half: Pa
         code, out, _ = cli("show", name, "--run", half, "--no-plot")
         assert code == 0 and f"run with: {version}, " in out
     assert cli("run", "small", "--out", half)[0] == 0  # nothing is left to drive
+
+
+def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the fault-free runs come out otherwise, accepting does not help, and nothing is written."""
+    before = contents(half)
+    monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
+    code, _, err = cli("run", "small", "--out", half, "--accept-versions")
+    assert code == 1 and "is not the one this run began with" in err
+    assert contents(half) == before
 
 
 def test_pytest_refuses_and_accepts_as_the_command_does(

@@ -95,10 +95,10 @@ def prove(data: bytes, figures: Figures, run: Run | None = None, variables: int 
         raise Wrong("an invalid source was accepted")
     figures.modules["spliced"] += 1
     before = run(data) if run else None
-    groups = _groups(file, tree, figures)
+    groups, whole = _groups(file, tree, figures), ast.dump(tree)
     for group in groups.values():
         mutant = _spliced(file, group)
-        _check_tree(tree, mutant, group)
+        _check_tree(whole, mutant, group)
         _expect(run is None or run(mutant) == before, "it behaves differently", mutant)
     everywhere = [placed.spot for group in groups.values() for placed in group]
     for spot in random.Random(len(data)).choices(everywhere, k=variables) if everywhere else ():
@@ -209,12 +209,12 @@ def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
     return mutant
 
 
-def _check_tree(tree: ast.Module, mutant: bytes, group: Sequence[_Placed]) -> None:
-    """Each injected statement is beside its anchored one; without them the tree is the original's."""
+def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
+    """Each injected statement is beside its anchored one; without them the dumped tree is the original's."""
     lines, changed = Lines.of(mutant), ast.parse(mutant)
     found: dict[str, Beside] = {}
     take_out(changed, lines.injected, found)
-    _expect(ast.dump(changed) == ast.dump(tree), "more than the injected statements differs", mutant)
+    _expect(ast.dump(changed) == original, "more than the injected statements differs", mutant)
     for placed in group:
         spot = placed.spot
         _expect(placed.name in found, f"{spot} has no statement", mutant)

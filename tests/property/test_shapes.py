@@ -15,7 +15,8 @@ from mutator.review.groups import group_label, parameter_values, shapes
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])
-NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 35.0, 1e22, 5e-324, math.nan, -math.inf])
+SOME = [0.0, -0.0, 35.0, 10000000.0, 1e22, 5e-324, math.nan, -math.inf]  # one has eight digits, as an id
+NUMBERS = st.floats() | st.sampled_from(SOME)
 CONDITIONS = ["hwt <= 2.0 and rs > 0.0", "not hwt / 2.0 > 1.0", "abs(d_rel) < max(v_ego, 3.0)"]
 
 

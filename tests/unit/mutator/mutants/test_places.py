@@ -56,6 +56,20 @@ def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.Mon
     assert caught.value.line == {"after_assign": 2, "before_return": 3, "entry": 1}[kind]
 
 
+def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Were the file's bytes not compared, the statement would still be refused."""
+
+    def unchecked(data: bytes, where: Path) -> object:
+        module = cst.parse_module(data)
+        return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
+
+    monkeypatch.setattr("mutator.mutants.anchors.libcst_module", unchecked)
+    file = parsed("x = 0\n\\\ndef f(x):\n    x = 1\n    y = 2\n")
+    location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
+    with pytest.raises(MutatorError, match=r"LibCST and Python's own parser"):
+        file.resolve(location)
+
+
 @pytest.mark.parametrize(
     ("line", "after"),
     [
