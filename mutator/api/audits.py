@@ -14,9 +14,9 @@ from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.store.run_folder import RunFolder
-from mutator.verification.auditing import Check, audit
+from mutator.verification.audit import Check, audit
 from mutator.verification.repairing import repair as put_aside
-from mutator.verification.seals import seal as seal_of
+from mutator.verification.seal import seal as seal_of
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences that the page lists

@@ -36,7 +36,7 @@ from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
-from mutator.verification.seals import not_verifiable, seal
+from mutator.verification.seal import not_verifiable, seal
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from mutator.comparison.sides import Side
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import package_versions
 from mutator.store.stretches import told as ran_with
-from mutator.verification.seals import not_verifiable
+from mutator.verification.seal import not_verifiable
 
 _SHORT = 12  # digits of a digest that are shown
 _HEAD = ("campaign", "target", "seed", "reading")

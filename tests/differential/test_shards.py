@@ -15,7 +15,7 @@ from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seals import seal
+from mutator.verification.seal import seal
 from mutator.workspace import Workspace
 
 Runs = dict[str, Path]

@@ -24,7 +24,7 @@ from mutator.model import Experiment
 from mutator.outcomes import results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seals import golden_digests, seal
+from mutator.verification.seal import golden_digests, seal
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]

@@ -6,7 +6,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.review import gate
 from mutator.store.stretches import package_versions, told
-from mutator.verification.seals import seal_or_why_not
+from mutator.verification.seal import seal_or_why_not
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
 _HTML = """\

@@ -20,7 +20,7 @@ from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.targets.manifest import TargetManifest
 from mutator.verification.audited_records import mutants, proof, recorded, verdicts
 from mutator.verification.audited_tables import tables
-from mutator.verification.seals import golden_digests, not_verifiable
+from mutator.verification.seal import golden_digests, not_verifiable
 from mutator.workspace import Workspace
 
 Problems = Iterator[MutatorError]

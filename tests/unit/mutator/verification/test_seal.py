@@ -12,7 +12,7 @@ from mutator.store import digests
 from mutator.store.lines import written
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seals import seal, seal_or_why_not
+from mutator.verification.seal import seal, seal_or_why_not
 from mutator.workspace import Workspace
 
 Reseal = Callable[..., None]
