@@ -14,9 +14,9 @@ from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.store.run_folder import RunFolder
-from mutator.verification.audit import Check, audit
+from mutator.verification.audit import Check, audit_checks
 from mutator.verification.repairing import repair as put_aside
-from mutator.verification.seal import seal as seal_of
+from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences that the page lists
@@ -93,7 +93,7 @@ def verify(
             raise MutatorError(f"'{expect}'", argument="expect", expected="a seal: 64 hex digits")
     folder = RunFolder.unverified(Path(run))
     found = _workspace(workspace)
-    checks = audit(folder, found)
+    checks = audit_checks(folder, found)
     facts = _facts(folder)
     if rerun:
         checks.append(_rerun(folder, found, rerun, facts))

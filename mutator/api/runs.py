@@ -36,7 +36,7 @@ from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
-from mutator.verification.seal import not_verifiable, seal
+from mutator.verification.seal import not_verifiable, seal_of
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ class Run:
     def seal(self) -> str | None:
         """One digest of everything that counts, computed now; None for a run that is not finished, or not
         verifiable."""
-        return seal(self.folder)
+        return seal_of(self.folder)
 
     def counts(self) -> Table:
         """How the experiments of each fault type ended."""

@@ -33,7 +33,7 @@ from mutator.store.records import Progress, label
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 from mutator.verification.preflight import are_there, run_checks
-from mutator.verification.seal import seal
+from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
@@ -159,7 +159,7 @@ class Session:
             interrupted=self.interrupted,
             results=built,
             proof=proven,
-            seal=seal(self.folder),
+            seal=seal_of(self.folder),
             elapsed_s=time.monotonic() - self._began,
         )
 

@@ -15,6 +15,7 @@ from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.targets.manifest import TargetManifest
@@ -43,10 +44,18 @@ class Check:
                 found.append(problem)
         except MutatorError as err:
             found.append(err)
+        except (
+            OSError,
+            LookupError,
+            TypeError,
+            ValueError,
+            AttributeError,
+        ) as err:  # damage
+            found.append(MutatorError(f"{what}: cannot be looked at ({type(err).__name__}: {err})"))
         return cls(what=what, count=count, differences=tuple(found))
 
 
-def audit(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
+def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
     """Look at all of a run folder. Without a `workspace`, and with other sources in it than those of the run,
     trees and patches cannot be compared, and that is a difference, too."""
     head = folder.head
@@ -112,7 +121,7 @@ def _plan(folder: RunFolder) -> Problems:
         if head[key] != value:
             expected = f"{value}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
             yield MutatorError(f"{key} {head[key]}", where=run / HEAD, expected=expected)
-    if (run / CSV).read_bytes() != plan_csv(plan):
+    if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
         yield MutatorError("not the plan", where=run / CSV, expected=f"what {plan_file.EXPERIMENTS} has")
 
 

@@ -35,11 +35,14 @@ def _cells(path: Path, made: bytes) -> Iterator[MutatorError]:
     """The lines that differ, each by its first cell that does."""
     found, wanted = (data.decode("utf-8", "replace").split("\n") for data in (path.read_bytes(), made))
     for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
-        if got == expected:
+        if got is None or expected is None:
+            told = [f"'{line}'" if line is not None else "no line" for line in (got, expected)]
+        elif got != expected:
+            cells = zip_longest(got.split(","), expected.split(","), fillvalue="")
+            told = [f"'{cell}'" for cell in next(pair for pair in cells if pair[0] != pair[1])]
+        else:
             continue
-        cells = zip_longest((got or "").split(","), (expected or "").split(","), fillvalue="nothing")
-        one, other = next(pair for pair in cells if pair[0] != pair[1])
-        yield MutatorError(f"'{one}'", where=path, line=number, expected=f"'{other}'", remedy=_REMEDY)
+        yield MutatorError(told[0], where=path, line=number, expected=told[1], remedy=_REMEDY)
 
 
 def _same_content(path: Path, made: bytes) -> bool:

@@ -19,7 +19,7 @@ from mutator.store.run_folder import RunFolder, golden_key
 SCHEMA = "seal/1"
 
 
-def seal(folder: RunFolder) -> str | None:
+def seal_of(folder: RunFolder) -> str | None:
     """The seal of a run folder, computed from what it holds: 64 hex digits. None for a run that is not
     finished, or not verifiable."""
     if not folder.finished:
@@ -37,7 +37,7 @@ def seal(folder: RunFolder) -> str | None:
 def seal_or_why_not(folder: RunFolder) -> str:
     """The seal, or in a few words why there is none."""
     none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
-    return seal(folder) or f"none: {none}"
+    return seal_of(folder) or f"none: {none}"
 
 
 def not_verifiable(folder: RunFolder) -> str:

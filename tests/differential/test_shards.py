@@ -15,7 +15,7 @@ from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal
+from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 Runs = dict[str, Path]
@@ -65,7 +65,7 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
 def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
     """The seal does not depend on how many machines computed; a shard has another one."""
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
-    seals = [seal(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
+    seals = [seal_of(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
 
 

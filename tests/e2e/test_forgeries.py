@@ -24,7 +24,7 @@ from mutator.model import Experiment
 from mutator.outcomes import results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import golden_digests, seal
+from mutator.verification.seal import golden_digests, seal_of
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -305,7 +305,7 @@ def test_a_plain_forgery_is_found_by_the_api(
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
     """It is what it says, also copied elsewhere and read-only, and its seal is the one that was printed."""
-    known = seal(RunFolder.open(genuine[1]))
+    known = seal_of(RunFolder.open(genuine[1]))
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
     try:
@@ -326,7 +326,7 @@ def test_a_forgery_whose_digests_all_fit_is_found_by_the_seal(
 ) -> None:
     """It opens like any other run, and all that it says of itself fits; it is not the run that the seal
     stands for. An edited table follows from no record."""
-    known = seal(RunFolder.open(genuine[1]))
+    known = seal_of(RunFolder.open(genuine[1]))
     forge(run, True)
     if forge is not the_table:
         reseal(run)

@@ -12,7 +12,7 @@ from mutator.store import digests
 from mutator.store.lines import written
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal, seal_or_why_not
+from mutator.verification.seal import seal_of, seal_or_why_not
 from mutator.workspace import Workspace
 
 Reseal = Callable[..., None]
@@ -34,8 +34,8 @@ def run(made: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(made, tmp_path / "another place"))
 
 
-def seal_of(run: Path) -> str | None:
-    return seal(RunFolder.open(run))
+def sealed(run: Path) -> str | None:
+    return seal_of(RunFolder.open(run))
 
 
 def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, reseal: Reseal) -> None:
@@ -49,9 +49,9 @@ def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, rese
     data["provenance"]["machine"] = "Linux on another one"
     (run / "run.json").write_text(json.dumps(data))
     reseal(run)
-    known = seal_of(made)
+    known = sealed(made)
     assert known is not None and len(known) == 64
-    assert seal_of(run) == known
+    assert sealed(run) == known
 
 
 def test_tries_that_failed_are_not_in_it(made: Path, run: Path) -> None:
@@ -63,7 +63,7 @@ def test_tries_that_failed_are_not_in_it(made: Path, run: Path) -> None:
     digests.close_segments(run, finished=False)
     path.write_bytes(written(path, head, [{"experiment_id": name, "status": "harness_error"}]))
     digests.close_segments(run, finished=True)
-    assert seal_of(run) == seal_of(made)
+    assert sealed(run) == sealed(made)
 
 
 def edit(path: Path, old: str, new: str) -> None:
@@ -90,14 +90,14 @@ def test_all_that_counts_is_in_it(made: Path, run: Path, reseal: Reseal, change:
     """Another record, patch, golden run, check, source or version, and the seal is another one."""
     CHANGES[change](run)
     reseal(run)
-    assert seal_of(run) not in (None, seal_of(made))
+    assert sealed(run) not in (None, sealed(made))
 
 
 def test_what_is_not_finished_has_none(run: Path) -> None:
     """A seal stands for a whole run; an old one has nothing to be trusted."""
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
-    assert (seal(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
+    assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
     edit(run / "run.json", '"run/2"', '"run/1"')
     folder = RunFolder.unverified(run)
     assert seal_or_why_not(folder) == "none: not verifiable, as run/1 has no digests"
@@ -109,4 +109,4 @@ def test_a_record_is_in_it_as_it_was_written(made: Path, run: Path) -> None:
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines()
     assert canonical(json.loads(lines[1])) != lines[1]  # the checksum comes first
-    assert seal_of(run) == seal_of(made)
+    assert sealed(run) == sealed(made)

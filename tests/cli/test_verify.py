@@ -1,0 +1,107 @@
+"""`verify` on the command line, and the seal that it compares."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+
+
+@pytest.fixture
+def sealed(cli: Cli, root: Path) -> str:
+    """The seal of the run folder `run`, as `mutator run` prints it."""
+    ran = cli("run", "small", "--out", "run", "--limit", 4, "--engine", "fork")
+    assert ran.code == 0, ran.err
+    found = re.search(r"^seal: ([0-9a-f]{64})$", ran.out, re.MULTILINE)
+    assert found
+    return found[1]
+
+
+def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
+    """The page says what was checked, with which versions, what was drawn, and the seal, on one page."""
+    found = cli("verify", "run", "--rerun", 2, "--expect", sealed)
+    assert (found.code, found.err) == (0, "")
+    assert found.out.rstrip().endswith("no difference") and len(found.out.splitlines()) < 50
+    for text in (f"seal                  {sealed}", "mutator 0.", "Python 3.", "packages", "drawn by lot"):
+        assert text in found.out
+    as_json = cli("verify", "run", "--json").json
+    assert (as_json["passed"], as_json["seal"]) == (True, sealed)
+    assert sum(check["count"] for check in as_json["checks"]) > 20
+
+
+def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
+    """By `run`, again when nothing is left to do, as JSON, and in the report."""
+    again = cli("run", "small", "--out", "run", "--json")
+    assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
+    assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
+    planned = cli("plan", "small", "--out", "planned")
+    assert planned.code == 0
+    assert cli("verify", "planned").code == 0
+    assert cli("verify", "planned", "--expect", sealed).code == 1
+
+
+def test_a_damaged_run_is_repaired_and_run_again(cli: Cli, sealed: str) -> None:
+    """Damage is listed, put aside and made good by the command that made the run: the seal is the old one."""
+    records, patch = next(Path("run/records").iterdir()), next(Path("run/patches").rglob("*.patch"))
+    golden = next(Path("run/golden").rglob("log.npz"))
+    lines = records.read_bytes().splitlines(keepends=True)
+    records.write_bytes(
+        b"".join([*lines[:1], lines[1].replace(b'"status":"ok"', b'"status":"OK"'), *lines[2:]])
+    )
+    patch.write_text("other")
+    golden.write_bytes(b"other")
+    found = cli("verify", "run", "--repair")
+    assert found.code == 1 and found.err == ""
+    for text in ("a damaged line", "log.npz: changed", "repaired: ", ".patch: a patch with SHA-256"):
+        assert text in found.out
+    again = cli("run", "small", "--out", "run")
+    assert again.code == 0, again.err
+    assert f"seal: {sealed}" in again.out
+    assert cli("verify", "run", "--expect", sealed).code == 0
+
+
+def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
+    """The page lists some and counts the rest; JSON has all."""
+    table = Path("run/results.csv")
+    table.write_text("\n" * 60)
+    found = cli("verify", "run")
+    assert found.code == 1
+    assert len(found.out.splitlines()) < 70 and re.search(r"^- and \d+ more$", found.out, re.MULTILINE)
+    tables = cli("verify", "run", "--json").json["checks"][-1]
+    assert len(tables["differences"]) > 50
+
+
+def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> None:
+    """With another target no tree can be compared; it says so, and that is no pass."""
+    with (root / "tree" / "toycar" / "driver.py").open("a") as file:
+        file.write("\n")
+    found = cli("verify", "run", "--expect", sealed)
+    assert found.code == 1
+    assert "without them no tree or patch was compared" in found.out and "toycar/driver.py" in found.out
+    assert "trees and patches" not in found.out.split("- ")[0]
+
+
+def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeypatch: Any) -> None:
+    """Where the target is not in the library, digests and tables are compared all the same."""
+    monkeypatch.delenv("MUTATOR_ROOT")
+    found = cli("verify", "run", "--json")
+    assert found.code == 1
+    failed = [check["what"] for check in found.json["checks"] if check["differences"]]
+    assert failed == ["sources that are those of the run"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("verify", "nosuch"), "no run folder"),
+        (("verify", "run", "--expect", "36251d8d"), "--expect: '36251d8d'"),
+        (("verify", "run", "--rerun", "-1"), "--rerun"),
+    ],
+)
+def test_wrong_input(cli: Cli, sealed: str, words: tuple[str, ...], told: str) -> None:
+    """A folder that is none, and a seal that is none, are answered in words."""
+    found = cli(*words)
+    assert found.code == 2 and told in found.err

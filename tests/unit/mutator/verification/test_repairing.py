@@ -1,0 +1,185 @@
+"""Repair: what is damaged is put aside, what is intact stays, and the folder opens again."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator._common.locks import owned
+from mutator.errors import MutatorError
+from mutator.store import digests, plan_file
+from mutator.store.lines import written
+from mutator.store.run_folder import RunFolder
+from mutator.verification.repairing import repair
+from mutator.workspace import Workspace
+
+
+@pytest.fixture(scope="module")
+def made(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_finished: Callable[..., Path],
+) -> Path:
+    place = tmp_path_factory.mktemp("made")
+    return write_finished(copy_toycar(place), place / "run")
+
+
+@pytest.fixture
+def run(made: Path, tmp_path: Path) -> Path:
+    """A finished run of 24 experiments that a test may damage."""
+    return Path(shutil.copytree(made, tmp_path / "run"))
+
+
+def repaired(run: Path) -> tuple[list[str], RunFolder]:
+    """What a repair says, and the folder, which opens then."""
+    said = repair(RunFolder.unverified(run))
+    return said, RunFolder.open(run)
+
+
+def edit(path: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
+    """Change the lines of a file."""
+    path.write_bytes(b"".join(change(path.read_bytes().splitlines(keepends=True))))
+
+
+RECORDS = "records/0001-a.jsonl"
+LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
+    "a changed line": (lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]], 1),
+    "a dropped line": (lambda x: [*x[:3], *x[4:]], 2),  # the one after it cannot tell that it is sound
+    "a doubled line": (lambda x: [*x[:4], *x[3:]], 0),
+    "a lost end": (lambda x: x[:-2], 2),
+    "a torn end": (lambda x: [*x[:-1], x[-1][:30]], 1),
+    "a lost head": (lambda x: x[1:], 1),
+    "more lines": (lambda x: [*x, b"{}\n"], 0),
+    "an empty file": (lambda x: [], 24),
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) -> None:
+    """Only what is lost is to be run again; the damaged file is kept elsewhere as it was."""
+    change, lost = LOSSES[loss]
+    edit(run / RECORDS, change)
+    damaged = (run / RECORDS).read_bytes()
+    said, folder = repaired(run)
+    known = RunFolder.open(made).records()
+    assert folder.records().items() <= known.items() and len(folder.records()) == 24 - lost
+    assert not folder.finished
+    assert (run / "damaged" / RECORDS).read_bytes() == damaged
+    assert any(text.startswith(f"{RECORDS}: ") for text in said)
+
+
+def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
+    """A file whose checksums all fit is still not the one that was closed: none of its lines is kept."""
+    head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
+    lines[4]["outcome"] = "sdc"
+    values = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
+    (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
+    _, folder = repaired(run)
+    assert folder.records() == {}
+
+
+def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
+    """The file that was closed is still in there, and stays."""
+    head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
+    values = [{k: v for k, v in line.items() if k != "sum"} for line in [*lines, lines[0]]]
+    (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
+    _, folder = repaired(run)
+    assert folder.records() == RunFolder.open(made).records()
+
+
+def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
+    """Its experiments are run again."""
+    (run / RECORDS).unlink()
+    said, folder = repaired(run)
+    assert folder.records() == {} and said == [f"{RECORDS} is gone"]
+
+
+def test_a_lost_patch_takes_its_record_with_it(run: Path) -> None:
+    """Running the experiment again makes both."""
+    one, other = list(plan_file.ids(run))[:2]
+    folder = RunFolder.unverified(run)
+    folder.patch(one).write_bytes(b"other")
+    folder.patch(other).unlink()
+    said, folder = repaired(run)
+    assert len(folder.records()) == 22 and not {one, other} & folder.records().keys()
+    assert (run / "damaged" / folder.patch(one).relative_to(run)).read_bytes() == b"other"
+    assert any(one in text for text in said)
+
+
+@pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
+def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
+    """The run is finished no more, so that it is made again."""
+    (run / name).write_bytes(b"other")
+    said, folder = repaired(run)
+    assert said == [f"{name} put aside: `mutator run` makes it again"]
+    assert not folder.finished and not (run / name).exists()
+    assert (run / "damaged" / name).read_bytes() == b"other"
+    (run / name).write_bytes(b"again")
+    digests.close_segments(run, finished=True)
+    repaired(run)
+    assert (run / "damaged" / f"{name}.2").read_bytes() == b"again"
+
+
+def test_the_plan_for_people_is_made_anew(run: Path, made: Path) -> None:
+    """plan.csv follows from the plan, so the run stays finished."""
+    (run / "plan.csv").unlink()
+    said, folder = repaired(run)
+    assert said == ["plan.csv made anew from the plan"] and folder.finished
+    assert (run / "plan.csv").read_bytes() == (made / "plan.csv").read_bytes()
+
+
+def test_strangers_go(run: Path) -> None:
+    """Files that the finished run did not write are put aside."""
+    (run / "records" / "0002-a.jsonl").write_bytes(b"anything\n")
+    _, folder = repaired(run)
+    assert len(folder.records()) == 24 and not (run / "records" / "0002-a.jsonl").exists()
+
+
+def test_damaged_costs_lose_their_line(run: Path) -> None:
+    """Timings are outside the seal; what is left of them is read again."""
+    edit(run / "timings" / "0001-a.jsonl", lambda x: [*x[:3], x[3].replace(b"1.0", b"9.0"), *x[4:]])
+    with pytest.raises(MutatorError, match=r"0001-a\.jsonl:4: a damaged line"):
+        RunFolder.open(run).timings()
+    _, folder = repaired(run)
+    assert len(folder.timings()) == 23 and len(folder.records()) == 24
+
+
+@pytest.mark.parametrize("content", [None, b"{", b"{}"])
+def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None) -> None:
+    """Only a seal that was known before can vouch for it, which is said."""
+    path = run / digests.FILE
+    path.unlink() if content is None else path.write_bytes(content)
+    said, folder = repaired(run)
+    assert said == [
+        "digests.json made anew of the files as they are: only a seal known before vouches for them"
+    ]
+    assert len(folder.records()) == 24 and not folder.finished
+
+
+def test_what_nobody_can_make_again_stays(run: Path) -> None:
+    """A damaged campaign file, or plan, is left for whoever has a copy of it."""
+    (run / "campaign.yaml").write_text("other")
+    assert repair(RunFolder.unverified(run)) == []
+    assert (run / "campaign.yaml").read_text() == "other"
+    edit(run / plan_file.EXPERIMENTS, lambda x: x[:-1])
+    with pytest.raises(MutatorError, match="23 experiments"):
+        repair(RunFolder.unverified(run))
+
+
+def test_a_sound_run_is_left_alone(run: Path) -> None:
+    """Nothing is put aside, and nothing is written."""
+    before = (run / digests.FILE).stat().st_mtime_ns
+    assert repair(RunFolder.unverified(run)) == []
+    assert (run / digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
+
+
+def test_repair_waits_for_nobody(run: Path) -> None:
+    """A folder in use, and one of an earlier schema, are refused."""
+    with owned(run), pytest.raises(MutatorError, match="in use"):
+        repair(RunFolder.unverified(run))
+    head = run / "run.json"
+    head.write_text(head.read_text().replace("run/2", "run/1"))
+    with pytest.raises(MutatorError, match="run/1 has no checksums"):
+        repair(RunFolder.unverified(run))
