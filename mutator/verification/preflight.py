@@ -221,7 +221,9 @@ class _Checks:
             execution = engine.execute(job, scratch)
             run = self._look(execution)
             if name[0] == _GOLDEN and not run.problem:
-                execution.out.rename(self._kept(golden_key(*name[1])))
+                kept = self._kept(golden_key(*name[1]))
+                kept.parent.mkdir(parents=True, exist_ok=True)  # a scenario may have a folder in its name
+                execution.out.rename(kept)
             return run
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
@@ -256,7 +258,7 @@ class _Checks:
             place = self.folder.path / "golden" / key
             shutil.rmtree(place, ignore_errors=True)
             if self._kept(key).is_dir():
-                place.parent.mkdir(exist_ok=True)
+                place.parent.mkdir(parents=True, exist_ok=True)
                 self._kept(key).rename(place)
 
     def _packages(self, runs: Mapping[tuple[str, Any], CheckRun]) -> list[str]:
