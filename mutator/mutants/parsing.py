@@ -55,7 +55,7 @@ def reading(where: Path) -> Iterator[None]:
     """Within it, LibCST reads a file; MutatorError where it fails on valid Python."""
     try:
         yield
-    except (cst.ParserSyntaxError, UnicodeError, RecursionError) as error:
+    except (cst.ParserSyntaxError, SyntaxError, UnicodeError, RecursionError) as error:
         message, line = str(error), None
         if isinstance(error, cst.ParserSyntaxError):
             message = error.message.partition(": expected")[0]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from mutator.config import yaml_files
@@ -83,6 +83,7 @@ def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
+@example(b"#\x80")  # LibCST has no line for it
 def test_any_source(data: bytes) -> None:
     """Arbitrary bytes are Python that can be spliced into, or a MutatorError."""
     try:
