@@ -45,8 +45,8 @@ def engine_summary(folder: RunFolder) -> EngineSummary | None:
 
 def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
     """RunMode many experiments were run how, and why not as was asked; the newest line of each counts."""
-    lines = folder.timings().values()
-    return Counter((line["engine"], line["why"]) for line in lines if "engine" in line)  # old runs had one
+    told = (line for line in folder.timings().values() if "engine" in line)  # not where there was but one
+    return Counter((line["engine"], line.get("why", "")) for line in told)
 
 
 def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
