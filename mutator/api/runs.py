@@ -29,7 +29,7 @@ from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
 from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
-from mutator.store import plan_file, run_folder
+from mutator.store import cleaning, plan_file
 from mutator.store.records import read_records
 from mutator.store.run_folder import HEAD, RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
@@ -223,8 +223,9 @@ class Run:
         equivalence.judge(self.folder, read_records(self.path))
 
     def delete(self) -> None:
-        """Delete the run folder; MutatorError while a command or its workers hold it."""
-        run_folder.clean(self.path)
+        """Delete the run folder; MutatorError while a command or its workers hold it, and when it holds what
+        no run writes."""
+        cleaning.clean(self.path)
 
     def _workspace_if_any(self) -> Workspace | None:
         try:

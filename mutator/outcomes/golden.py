@@ -62,7 +62,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     path = out / manifest.record_file
     try:
         data = json.loads(path.read_bytes())
-    except (OSError, ValueError) as err:
+    except (OSError, ValueError, RecursionError) as err:
         raise BadOutput(
             f"not a readable record ({_why(err)})", where=path, expected="a JSON object"
         ) from None

@@ -22,6 +22,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 _HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 
 
@@ -98,8 +99,16 @@ def describe(err: BaseException, tree: str, probe: Any) -> dict[str, Any]:
     text = f"exit status {err.code}" if isinstance(err, SystemExit) else type(err).__name__
     if str(err) and not isinstance(err, SystemExit):
         text += f": {err}"
-    full = isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
-    return {"ended": "error", "error": text + where, "disk_full": full}
+    return {"ended": "error", "error": text + where, "disk_full": of_full_disk(err)}
+
+
+def of_full_disk(err: BaseException | None) -> bool:
+    """Whether an error came of a full disk or quota, be it in the words of a library."""
+    while err is not None:
+        if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
+            return True
+        err = err.__cause__ or err.__context__
+    return False
 
 
 def place(err: BaseException, tree: str) -> str:
