@@ -127,7 +127,7 @@ def _check_events(text: str, path: Path) -> None:
             expected="plain values",
             remedy="remove or indent it",
         )
-    depth = values = 0
+    documents = depth = values = 0
     for event in yaml.parse(text, Loader=_Loader):
         line = event.start_mark.line + 1 if event.start_mark else None
         anchor = getattr(event, "anchor", None)
@@ -142,6 +142,11 @@ def _check_events(text: str, path: Path) -> None:
             )
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         values += isinstance(event, yaml.NodeEvent)
+        documents += isinstance(event, yaml.DocumentStartEvent)
+        if documents > 1:
+            raise MutatorError(
+                "a second document", where=path, line=line, expected="one", remedy="remove the `---` above it"
+            )
         if depth > MAX_DEPTH or values > MAX_VALUES:
             raise MutatorError(
                 "nested too deeply" if depth > MAX_DEPTH else "too many values",

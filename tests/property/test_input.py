@@ -156,7 +156,7 @@ def test_any_shape(tmp_path: Path, words: list[str], data: st.DataObject) -> Non
     began = time.process_time()
     with suppress(MutatorError):
         yaml_files.load(path)
-    assert time.process_time() - began < 1.0
+    assert time.process_time() - began < 2.0
 
 
 NESTED = {
