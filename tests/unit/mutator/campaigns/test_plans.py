@@ -331,7 +331,7 @@ def test_a_limit_of_space_is_part_of_a_plan_where_it_is_not_the_default(
     text = path.read_text()
     before = freeze(make_plan(toycar, "small"), tmp_path / "0", toycar)
     for number, (limit, is_same) in enumerate([(1024, True), (1025, False)], start=1):
-        path.write_text(f"{text}limits: {{disk_mb: {limit}}}\n")
+        path.write_text(text.replace("limits: {", f"limits: {{disk_mb: {limit}, "))
         folder = freeze(make_plan(toycar, "small"), tmp_path / str(number), toycar)
         assert (folder.head["plan"] == before.head["plan"]) is is_same
         assert (folder.head["limits"] == before.head["limits"]) is is_same
