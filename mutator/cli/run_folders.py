@@ -113,16 +113,16 @@ def clean(
     Only what a run wrote is deleted: a folder that holds anything else, a link, and a run under way are left
     alone.
     """
-    from mutator.store import cleaning
+    from mutator.api.cleaning import check, delete
 
     terminal = Terminal()
     for run in runs:
-        cleaning.check(run)
+        check(run)
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
         if not typer.confirm(f"delete {', '.join(map(short_path, runs))}?"):
             return
     for run in runs:
-        cleaning.clean(run)
+        delete(run)
         terminal.say(f"deleted {short_path(run)}")
