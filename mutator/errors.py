@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+_LONGEST = 2000  # characters of a part of an error
 EXIT_OK = 0
 EXIT_CHECK_FAILED = 1
 EXIT_WRONG_INPUT = 2
@@ -30,12 +31,12 @@ class MutatorError(Exception):
         expected: str | None = None,
         remedy: str | None = None,
     ) -> None:
-        self.got = got
+        self.got = _short(got)
         self.where = str(where) if where is not None else None
         self.line = line
         self.argument = argument
-        self.expected = expected
-        self.remedy = remedy
+        self.expected = _short(expected) if expected else None
+        self.remedy = _short(remedy) if remedy else None
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -63,6 +64,11 @@ class MutatorError(Exception):
 
 class MutatorWarning(UserWarning):
     """Something that the user should know although nothing failed: shown in one line."""
+
+
+def _short(text: str) -> str:
+    """The text, cut where nobody reads on: what is wrong may be megabytes long."""
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> MutatorError:

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.arguments import check_whole
+from mutator._common.files import check_is_text
 from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, suggestion
@@ -223,9 +224,11 @@ class Workspace:
     def _file(self, folder: str, name: str | Path, what: str) -> Path:
         """A file of the library by name, or the file at a path that ends in .yaml."""
         if str(name).endswith((".yaml", ".yml")) and Path(name).is_file():
+            check_is_text(Path(name))
             return Path(name)
         known = self._files(folder)
         if str(name) in known:
+            check_is_text(known[str(name)])
             return known[str(name)]
         raise MutatorError(
             f"no {what} '{name}'",
@@ -267,4 +270,5 @@ def _folder(path: Path, what: str, argument: str) -> Path:
             expected=f"the {what} folder",
             remedy=f"correct `{argument}` or MUTATOR_{argument.upper()}, `root` or MUTATOR_ROOT",
         )
+    check_is_text(path.resolve())
     return path.resolve()

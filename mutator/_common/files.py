@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ from typing import Any
 
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+
 
 class DiskFull(MutatorError):
     """No space left. What finished is kept, and the same command goes on once there is room."""
@@ -19,12 +22,16 @@ class DiskFull(MutatorError):
     exit_code = EXIT_HARNESS_ERRORS
 
 
-def is_disk_full(err: BaseException) -> bool:
-    """Whether the disk (or a quota) is full."""
-    return isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
+def is_disk_full(err: BaseException | None) -> bool:
+    """Whether an error came of a full disk or quota, be it in the words of another library."""
+    while err is not None:
+        if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
+            return True
+        err = err.__cause__ or err.__context__
+    return False
 
 
-def disk_full(where: Path) -> DiskFull:
+def disk_full(where: str | Path | None) -> DiskFull:
     return DiskFull(
         "no space left on this disk",
         where=where,
@@ -34,17 +41,33 @@ def disk_full(where: Path) -> DiskFull:
 
 @contextmanager
 def raising_disk_full(where: Path) -> Iterator[None]:
-    """Turn the file system's ENOSPC into DiskFull."""
+    """Turn what a full disk makes of other code into DiskFull."""
     try:
         yield
-    except OSError as err:
+    except MutatorError:
+        raise
+    except Exception as err:
         if is_disk_full(err):
             raise disk_full(where) from err
         raise
 
 
+def check_is_text(path: Path) -> None:
+    """MutatorError for a path with bytes that are no text here: neither digests nor tables could hold it."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise MutatorError(
+            f"the name {path.name!a} is no text in this environment",
+            where=path,
+            expected=f"UTF-8, and an environment that says so (it says {sys.getfilesystemencoding()})",
+            remedy="set LC_ALL=C.UTF-8, or PYTHONUTF8=1; or rename it",
+        ) from None
+
+
 def make_folder(path: Path) -> None:
     """Make a folder to write into, and its parents; MutatorError when that fails."""
+    check_is_text(path.absolute())
     try:
         with raising_disk_full(path):
             path.mkdir(parents=True, exist_ok=True)
@@ -98,7 +121,7 @@ def read_json(path: Path, schema: str) -> dict[str, Any]:
         data = json.loads(path.read_bytes())
     except FileNotFoundError:
         raise MutatorError("no such file", where=path) from None
-    except (ValueError, UnicodeDecodeError) as err:
+    except (ValueError, RecursionError) as err:
         raise MutatorError(f"not JSON ({err})", where=path, remedy="delete it if it is damaged") from None
     if not isinstance(data, dict):
         raise MutatorError(f"a {type(data).__name__}", where=path, expected="a JSON object")

@@ -30,7 +30,7 @@ from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
 from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
-from mutator.store import plan_file, run_folder
+from mutator.store import cleaning, plan_file
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
@@ -244,8 +244,9 @@ class Run:
         return verify(self.path, rerun=rerun, expect=expect, repair=repair, workspace=workspace)
 
     def delete(self) -> None:
-        """Delete the run folder; MutatorError while a command or its workers hold it."""
-        run_folder.clean(self.path)
+        """Delete the run folder; MutatorError while a command or its workers hold it, and when it holds what
+        no run writes."""
+        cleaning.clean(self.path)
 
     def _workspace_if_any(self) -> Workspace | None:
         try:

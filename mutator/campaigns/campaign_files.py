@@ -15,6 +15,7 @@ from mutator.model import Limits, Method
 
 SCHEMA = "campaign/1"
 EVERY_READING = "*"  # whose time is in `armed_after_s` if that is one number
+_MOST = 1_000_000_000  # of a limit or a time: no machine has more, and no run takes longer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,8 +102,8 @@ class _SelectionModel(StrictModel, title="A selection"):
     )
 
 
-_Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-_SECONDS = {"type": "number", "minimum": 0.0}
+_Seconds = Annotated[float, Field(ge=0.0, le=_MOST, allow_inf_nan=False)]
+_SECONDS = {"type": "number", "minimum": 0.0, "maximum": _MOST}
 
 
 class _TriggersModel(StrictModel, title="Triggers"):
@@ -120,6 +121,7 @@ class _TriggersModel(StrictModel, title="Triggers"):
     )
     random_until_s: float = Field(
         gt=0.0,
+        le=_MOST,
         allow_inf_nan=False,
         description="The latest random time. One past the end of a scenario never comes.",
     )
@@ -157,13 +159,14 @@ class _CanaryModel(StrictModel, title="The canary"):
 class _LimitsModel(StrictModel, title="Limits"):
     """What one run may use before it is stopped."""
 
-    cpu_s: int = Field(default=60, ge=1, description="Seconds of CPU.")
-    wall_s: int = Field(default=300, ge=1, description="Seconds of wall time.")
-    memory_mb: int = Field(default=4096, ge=256, description="MiB of address space.")
-    steps: int = Field(default=20_000, ge=1, description="Steps of simulation.")
+    cpu_s: int = Field(default=60, ge=1, le=_MOST, description="Seconds of CPU.")
+    wall_s: int = Field(default=300, ge=1, le=_MOST, description="Seconds of wall time.")
+    memory_mb: int = Field(default=4096, ge=256, le=_MOST, description="MiB of address space.")
+    steps: int = Field(default=20_000, ge=1, le=_MOST, description="Steps of simulation.")
     disk_mb: int = Field(
         default=1024,
         ge=1,
+        le=_MOST,
         description="MiB in its output folder and TMPDIR together, and in any single file that it writes.",
     )
 
@@ -226,12 +229,13 @@ def load_campaign(path: Path) -> Campaign:
     """
     model, source = read(path, CampaignModel, SCHEMA)
     for key in ("scenarios", "setting", "methods"):
-        values = getattr(model, key)
-        for i, value in enumerate(values):
-            if value in values[:i]:
+        seen = set[str]()
+        for i, value in enumerate(getattr(model, key)):
+            if value in seen:
                 raise source.error(
                     (key, i), f"'{value}' stands here a second time", remedy="remove one of the two"
                 )
+            seen.add(value)
     triggers = model.triggers
     return Campaign(
         name=model.name,

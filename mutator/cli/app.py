@@ -1,6 +1,7 @@
 """`mutator`: the verbs put together, and what becomes of an error."""
 
 import errno
+import io
 import os
 import sys
 import traceback
@@ -13,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from mutator._common.files import disk_full, is_disk_full
 from mutator._common.interrupts import terminable
 from mutator._common.version import VERSION
 from mutator.cli import (
@@ -48,7 +50,7 @@ EXIT_CODES = {
     EXIT_HARNESS_ERRORS: "harness errors or experiments left",
     EXIT_INTERRUPTED: "interrupted",
 }
-THE_MACHINE_SAYS_NO = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS}
+THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
     ("Look around", ("list", "init", "stpa", "check", "doctor", "cache")),
@@ -133,6 +135,8 @@ for module in (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # like standard error: what cannot be shown is told
     try:
         code = _answer(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()  # now, for at the interpreter's end a closed pipe would be an error
@@ -167,15 +171,31 @@ def _answer(words: Sequence[str]) -> int:
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         raise
-    except OSError as e:
-        if e.errno not in THE_MACHINE_SAYS_NO:
+    except Exception as e:
+        if (known := _known(e)) is None:
             return _defect()
-        show_error(
-            MutatorError(str(e.strerror), where=e.filename, remedy="make room or choose another folder")
-        )
-        return EXIT_WRONG_INPUT
-    except Exception:
-        return _defect()
+        show_error(known)
+        return known.exit_code
+
+
+def _known(error: Exception) -> MutatorError | None:
+    """What a user can mend of an error that came from the machine."""
+    where = getattr(error, "filename", None)
+    if is_disk_full(error):
+        return disk_full(where)
+    if isinstance(error, UnicodeEncodeError) and isinstance(error.object, str):
+        return _no_text(error.object[error.start : error.end])
+    if isinstance(error, OSError) and error.errno in THE_MACHINE_SAYS_NO:
+        return MutatorError(str(error.strerror), where=where, remedy="choose another folder")
+    return None
+
+
+def _no_text(characters: str) -> MutatorError:
+    return MutatorError(
+        f"{characters!a}, which is no text in this environment",
+        expected="names in UTF-8, and an environment that says so",
+        remedy="set LC_ALL=C.UTF-8, or PYTHONUTF8=1; or use other names",
+    )
 
 
 @contextmanager

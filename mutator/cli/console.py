@@ -3,6 +3,7 @@
 Rich is imported when the first line is printed, so `--help` and shell completion do not pay for it.
 """
 
+import codecs
 import json
 import math
 import re
@@ -64,7 +65,8 @@ class Terminal:
 
     def emit(self, data: Any) -> None:
         """The result as one JSON document; numbers JSON does not know (infinity, nan) become null."""
-        json.dump(_jsonable(data), sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
+        is_narrow = codecs.lookup(sys.stdout.encoding).name != "utf-8"
+        json.dump(_jsonable(data), sys.stdout, indent=2, ensure_ascii=is_narrow, allow_nan=False)
         sys.stdout.write("\n")
 
     def table(

@@ -113,15 +113,19 @@ def clean(
 ) -> None:
     """Delete run folders.
 
-    Anything that is no run folder, and a run under way, is left alone.
+    Only what a run wrote is deleted: a folder that holds anything else, a link, and a run under way are left
+    alone.
     """
+    from mutator.api.cleaning import check, delete
+
     terminal = Terminal()
-    found = [mutator.load_run(path) for path in runs]
+    for run in runs:
+        check(run)
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
-        if not typer.confirm(f"delete {', '.join(short_path(run.path) for run in found)}?"):
+        if not typer.confirm(f"delete {', '.join(map(short_path, runs))}?"):
             return
-    for folder in found:
-        folder.delete()
-        terminal.say(f"deleted {short_path(folder.path)}")
+    for run in runs:
+        delete(run)
+        terminal.say(f"deleted {short_path(run)}")

@@ -20,11 +20,15 @@ Keys = tuple[str | int, ...]
 M = TypeVar("M", bound="StrictModel")
 
 MAX_BYTES = 1_000_000
+MAX_DEPTH = 40  # of lists and mappings in each other
+MAX_VALUES = 100_000  # keys, texts, numbers, lists and mappings
+_LINE_BREAK = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
+_DIRECTIVE = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
 _SCHEMA = re.compile(r"([a-z_]+)/(\d{1,6})\Z")
 _CORE = {
     "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
     "null": ("~nN\0", r"~|null|Null|NULL|"),
-    "int": ("-+0123456789", r"[-+]?[0-9]{1,400}"),
+    "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # more is a float, and infinite if it is beyond these
     "float": (
         "-+.0123456789",
         r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
@@ -77,7 +81,7 @@ def load(path: Path) -> Source:
     """Parse one YAML file strictly; MutatorError with file and line for anything wrong with it."""
     text = _read_text(path)
     try:
-        _refuse_aliases(text, path)
+        _check_events(text, path)
         node = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -89,8 +93,6 @@ def load(path: Path) -> Source:
         ) from None
     except yaml.YAMLError as error:
         raise MutatorError(f"not valid YAML: {error}", where=path, remedy="save it as plain text") from None
-    except RecursionError:
-        raise MutatorError("nested too deeply", where=path, remedy="flatten the file") from None
     lines: dict[Keys, int] = {}
     data = _construct(node, (), lines, path) if node is not None else None
     return Source(path=path, data=data, lines=lines)
@@ -115,17 +117,43 @@ def _read_text(path: Path) -> str:
         ) from None
 
 
-def _refuse_aliases(text: str, path: Path) -> None:
+def _check_events(text: str, path: Path) -> None:
+    """Refuse what the dialect has not, and what would take long to read, event by event: nothing is built."""
+    if directive := _DIRECTIVE.search(text):
+        raise MutatorError(
+            "'%' at the start of a line (a directive)",
+            where=path,
+            line=len(_LINE_BREAK.findall(text, 0, directive.end())) + 1,
+            expected="plain values",
+            remedy="remove or indent it",
+        )
+    documents = depth = values = 0
     for event in yaml.parse(text, Loader=_Loader):
+        line = event.start_mark.line + 1 if event.start_mark else None
         anchor = getattr(event, "anchor", None)
         tag = getattr(event, "tag", None)
         if anchor or tag:
             raise MutatorError(
                 f"'{tag}' (a tag)" if tag else f"'{anchor}' (an anchor or alias)",
                 where=path,
-                line=event.start_mark.line + 1 if event.start_mark else None,
+                line=line,
                 expected="plain values",
                 remedy="write the value out",
+            )
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        values += isinstance(event, yaml.NodeEvent)
+        documents += isinstance(event, yaml.DocumentStartEvent)
+        if documents > 1:
+            raise MutatorError(
+                "a second document", where=path, line=line, expected="one", remedy="remove the `---` above it"
+            )
+        if depth > MAX_DEPTH or values > MAX_VALUES:
+            raise MutatorError(
+                "nested too deeply" if depth > MAX_DEPTH else "too many values",
+                where=path,
+                line=line,
+                expected=f"at most {MAX_VALUES} values, {MAX_DEPTH} deep",
+                remedy="flatten the file" if depth > MAX_DEPTH else "split it",
             )
 
 

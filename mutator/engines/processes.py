@@ -7,8 +7,10 @@ import signal
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
+from mutator._common.files import is_disk_full
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
 from mutator.model import Limits, Status
@@ -19,6 +21,7 @@ _END_S = 10.0
 _REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
 _LOG_TAIL = 4000
 _LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
+_TRIAL = 1 << 20  # nor one where so much cannot be written
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
@@ -130,10 +133,18 @@ def was_active(folder: Path) -> bool:
 
 
 def is_full(work: Path, report: dict[str, Any] | None) -> bool:
+    """Whether a run that failed had too little room, on the disk or in a quota."""
     if report is not None and report["disk_full"]:
         return True
     state = os.statvfs(work)
-    return state.f_bavail * state.f_frsize < _LEAST_FREE
+    if state.f_bavail * state.f_frsize < _LEAST_FREE:
+        return True
+    try:
+        with TemporaryFile(dir=work) as trial:
+            trial.write(bytes(_TRIAL))
+    except OSError as err:
+        return is_disk_full(err)
+    return False
 
 
 def steady(detail: str, folder: Path) -> str:

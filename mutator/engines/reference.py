@@ -81,8 +81,7 @@ class ReferenceEngine:
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
         with raising_disk_full(self.work):
-            request = self._prepare(job, folder)
-        ended = self._run(request, folder, job.hash_seed)
+            ended = self._run(self._prepare(job, folder), folder, job.hash_seed)
         log = tail(folder / "log")
         report = read_report(folder / "report.json")
         status, detail = self._judge(job, ended, report)

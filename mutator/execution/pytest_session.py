@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.files import DiskFull
+from mutator._common.files import DiskFull, raising_disk_full
 from mutator._common.locks import living_workers, register_worker
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
@@ -41,8 +41,9 @@ class WorkItem(pytest.Item):
 
     def runtest(self) -> None:
         try:
-            worker, work = self.worker.get(), self.work
-            errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
+            with raising_disk_full(self.config.rootpath):
+                worker, work = self.worker.get(), self.work
+                errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
         except Exception as err:
             problem = str(err) if isinstance(err, MutatorError) else _defect(err, self.name)
             self.user_properties.append((_PROBLEM, problem))

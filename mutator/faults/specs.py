@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model, model_validator
 
@@ -17,6 +17,8 @@ from mutator.model import Hold
 
 SCHEMA = "fault_spec/1"
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+_MOST_RANGES = 1000
+_LARGEST = 1e15  # of a drawn number: whole numbers up to it are exact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,13 +99,16 @@ class FaultSpec:
         return iter(self.variants)
 
 
+_Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
+
+
 class SweepModel(StrictModel, title="A sweep"):
     """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` is the 24
     ranges [15, 24], [25, 34] ... [245, 254]; one value is drawn from each, both ends included."""
 
-    first: list[float] = Field(description="The first range, [low, high].")
+    first: list[_Number] = Field(description="The first range, [low, high].")
     step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
-    last: list[float] = Field(description="The last range; whole steps above the first.")
+    last: list[_Number] = Field(description="The last range; whole steps above the first.")
 
     @model_validator(mode="after")
     def _even(self) -> "SweepModel":
@@ -115,8 +120,10 @@ class SweepModel(StrictModel, title="A sweep"):
         if len(self.first) != 2 or len(self.last) != 2 or not self.first[0] <= self.first[1]:
             raise ValueError("first and last as [low, high]")
         low, high = self.first
-        count = round((self.last[0] - low) / self.step) + 1
-        ranges = tuple((low + i * self.step, high + i * self.step) for i in range(min(count, 10_000)))
+        steps = (self.last[0] - low) / self.step
+        if steps >= _MOST_RANGES:
+            raise ValueError(f"at most {_MOST_RANGES} ranges")
+        ranges = tuple((low + i * self.step, high + i * self.step) for i in range(round(steps) + 1))
         if not ranges or any(abs(a - b) > 1e-9 for a, b in zip(ranges[-1], self.last, strict=True)):
             raise ValueError("a last range that lies whole steps above the first")
         return ranges

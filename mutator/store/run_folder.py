@@ -19,15 +19,14 @@ DIR/
   work/                                          scratch of running experiments
 """
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from mutator._common.files import check_is_text
 from mutator._common.hashing import digest, plain
-from mutator._common.locks import owned
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
@@ -38,6 +37,15 @@ from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 
 _LOOKS = 3  # at a folder whose owner writes while it is looked at
+SCRATCH = "work"
+CONTENT = (  # all that may be in a run folder; * stands for any text, folders included
+    *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
+    *("golden/*/*", "patches/*.patch", "records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
+    *("traces/*/*", "plots/*", "results.csv", "results.parquet", "timings.parquet", "results.json"),
+    *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
+    *("report/tables/*", "report/figures/*", "report/compare-*/*", "exports/*"),
+    *("damaged/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
+)
 
 
 def golden_key(scenario: str, changes: Sequence[str]) -> str:
@@ -74,6 +82,7 @@ class RunFolder:
                 remedy="check the path",
             )
         folder = cls(path.resolve())
+        check_is_text(folder.path)
         _ = folder.head  # read now, so that a wrong schema is told now
         return folder
 
@@ -218,7 +227,7 @@ class RunFolder:
     @property
     def work(self) -> Path:
         """Scratch; whatever is in it may be deleted while nobody owns the folder."""
-        return self.path / "work"
+        return self.path / SCRATCH
 
     @property
     def base(self) -> Path:
@@ -237,16 +246,3 @@ class RunFolder:
                 remedy="give more of the id" if hits else "see plan.csv or results.csv",
             )
         return hits[0]
-
-
-def clean(path: Path) -> None:
-    """Delete a run folder; refused while a command or its workers hold it, or when it is no run folder."""
-    if not RunFolder.exists(path):
-        raise MutatorError(
-            "no run folder (it has no run.json)",
-            where=path,
-            expected="a run folder",
-            remedy="delete it yourself",
-        )
-    with owned(path, patience_s=0.0):
-        shutil.rmtree(path)

@@ -9,7 +9,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TypeVar
 
 from pydantic import Field
 
@@ -18,7 +17,7 @@ from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.triggers.conditions import VARIABLES
 
-T = TypeVar("T")
+_WIDEST = 100  # rows and columns of the drawing
 
 
 class Kind(StrEnum):
@@ -205,13 +204,13 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
     taken: dict[tuple[int, int], str] = {}
     for name, component in structure.components.items():
         row, column, width = component.drawn
-        fields = [(row, column + i) for i in range(width)]
+        fields = [(row, column + i) for i in range(min(width, _WIDEST))]
         other = next((taken[field] for field in fields if field in taken), None)
-        if other or not fields or min(row, column) < 0:
+        if other or not fields or min(row, column) < 0 or max(row, column, width) > _WIDEST:
             raise source.error(
                 ("components", name, "drawn"),
                 f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
-                expected="row and column from 0, a width from 1, and fields of its own",
+                expected=f"row, column and width up to {_WIDEST}, a width from 1, and fields of its own",
             )
         taken.update(dict.fromkeys(fields, name))
 

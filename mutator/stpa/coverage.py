@@ -15,7 +15,7 @@ from itertools import pairwise, product
 
 from mutator.triggers.conditions import VARIABLES, evaluate
 
-MAX_CELLS = 100_000
+MAX_TESTS = 400_000  # of a context in a cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,8 +51,9 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
         return Coverage(beyond=f"{error} is no comparison of one variable with a constant")
     lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
     total = math.prod(len(line) for line in lines)
-    if total > MAX_CELLS:
-        return Coverage(beyond=f"its constants cut out {total} cells, more than {MAX_CELLS}")
+    if total * len(conditions) > MAX_TESTS:
+        found = f"{total} cells for {len(conditions)} contexts"
+        return Coverage(beyond=f"its constants cut out {found}, too many to test them all")
     for place in product(*lines):
         values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
         rows = tuple(row for row, condition in conditions.items() if evaluate(condition, values))

@@ -87,7 +87,7 @@ class ManifestModel(StrictModel, title="The file"):
         description="Globs: files that a run reads while it runs, as what it caches follows from them. A "
         "mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
     )
-    step_s: float = Field(gt=0.0, allow_inf_nan=False, description="The length of a step of simulation.")
+    step_s: float = Field(ge=1e-6, allow_inf_nan=False, description="The length of a step of simulation.")
     armed_after_s: float = Field(
         0.0,
         ge=0.0,
@@ -181,15 +181,16 @@ def _check_names(model: ManifestModel, source: Source) -> None:
 def _check_events(model: ManifestModel, source: Source) -> None:
     """Hazards and alerts have names that tables can take, each once."""
     for key in ("hazards", "alerts"):
-        names = [name.lower() for name in getattr(model, key)]
-        for i, name in enumerate(names):
-            if not name.isidentifier() or name in names[:i]:
+        seen = set[str]()
+        for i, name in enumerate(getattr(model, key)):
+            if not name.isidentifier() or name.lower() in seen:
                 raise source.error(
                     (key, i),
-                    f"'{getattr(model, key)[i]}'",
+                    f"'{name}'",
                     expected="a name of letters, digits and _, once",
                     remedy="rename it",
                 )
+            seen.add(name.lower())
 
 
 def _channels(channels: Mapping[str, _ChannelModel]) -> tuple[Channel, ...]:

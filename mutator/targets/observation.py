@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.text import shown
 from mutator.config.locations import AtModel, dotted_name
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.errors import MutatorError
@@ -13,6 +14,7 @@ from mutator.model import FaultLocation
 from mutator.targets.paths import inside
 
 OBSERVED = ("t", "d_rel", "v_ego", "v_lead")
+_LONGEST = 1000  # characters of an expression
 _READING = (ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.UAdd, ast.USub, ast.Load)
 
 
@@ -55,7 +57,7 @@ def read_observation(model: ObservationModel, source: Source, root: Path) -> Obs
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise source.error(
                 ("observation", name),
-                f"'{getattr(model, name)}'",
+                shown(getattr(model, name)),
                 expected="a local name or attribute, a number, or a sum, difference or product of them",
                 remedy="say where the value is at that statement",
             ) from None
@@ -64,6 +66,8 @@ def read_observation(model: ObservationModel, source: Source, root: Path) -> Obs
 
 def _expression(text: str) -> str:
     """The text of an expression that does nothing but read and reckon; ValueError for any other."""
+    if len(text) > _LONGEST:
+        raise ValueError(text)
     tree = ast.parse(text.strip(), mode="eval").body
     for node in ast.walk(tree):
         constant = isinstance(node, ast.Constant) and type(node.value) in (int, float)

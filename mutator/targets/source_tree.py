@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from mutator._common.files import check_is_text
 from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
 
@@ -74,6 +75,7 @@ def read_tree(root: Path, globs: Iterable[str]) -> SourceTree:
             and path.is_file()
             and matches(name, patterns)
         ):
+            check_is_text(path)
             files[name] = path.read_bytes()
     entries = _entries(files)
     return SourceTree(root=root, files=files, digest=_digest(entries), _entries=entries)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.files import raising_disk_full
 from mutator._common.hashing import digest
 from mutator.campaigns.sampling import pick
 from mutator.errors import CheckFailed
@@ -50,7 +51,8 @@ class Proof:
 
 def begin(run: Path) -> None:
     """From now on the run has results that a proof is needed for."""
-    (run / FOLDER).mkdir(exist_ok=True)
+    with raising_disk_full(run):
+        (run / FOLDER).mkdir(exist_ok=True)
 
 
 def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:

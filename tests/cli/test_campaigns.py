@@ -329,6 +329,30 @@ def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
     assert Path("mine").exists()
 
 
+def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
+    """After every command that writes into a run folder, `clean` deletes it; through a link it does not."""
+    copy, other = tmp_path / "copy", tmp_path / "other"
+    for folder in (copy, other):
+        shutil.copytree(run, folder)
+    name = results(run)[1].split(",")[0]
+    for words in (
+        ["show", name, "--run", copy],
+        ["rerun", name, "--run", copy, "--trace"],
+        ["show", name, "--run", copy, "--still", "2.0"],
+        *(["export", copy, "--format", f] for f in ("mutation-elements", "junit", "csv", "parquet")),
+        ["compare", other, copy],
+        ["report", copy],
+    ):
+        assert cli(*words).code == 0, words
+    assert {path.name for path in copy.iterdir()} >= {"traces", "plots", "exports", "report"}
+    link = tmp_path / "link"
+    link.symlink_to(copy)
+    refused = cli("clean", link, "--yes")
+    assert (refused.code, "a link to" in refused.err) == (2, True)
+    assert cli("clean", copy, "--yes").out == f"deleted {copy}\n"
+    assert not copy.exists()
+
+
 def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
     """One fault from a file of one's own: diff, verdict, plot and traces, none of it in the library."""
     shutil.move(root / "fault_library/faults/sensor/silence.yaml", "own.yaml")

@@ -149,14 +149,17 @@ def test_an_error_shows_place_expectation_and_remedy(
     ("error", "code", "said"),
     [
         (CheckFailed("the canary sings"), EXIT_CHECK_FAILED, "the canary sings"),
-        (OSError(errno.ENOSPC, "No space left on device", "/full"), 2, "/full: No space left"),
+        (OSError(errno.ENOSPC, "No space left on device", "/full"), 3, "/full: no space left"),
+        (RuntimeError("cannot encode: Disk quota exceeded"), 3, "no space left on this disk"),
+        (OSError(errno.EACCES, "Permission denied", "/shut"), 2, "/shut: Permission denied"),
         (KeyboardInterrupt(), 130, "interrupted"),
     ],
 )
 def test_exit_codes(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
 ) -> None:
-    """A failed check is 1, a full disk is the user's to mend (2), an interruption is 130; no traceback."""
+    """A failed check is 1, a folder that is shut the user's to mend (2), a full disk 3, whatever library says
+    so, and an interruption 130; no traceback."""
     fail_with(monkeypatch, error)
     answer = cli("list", "specs")
     assert answer.code == code

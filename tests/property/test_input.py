@@ -1,6 +1,8 @@
 """Whatever stands in a file, it is read or refused; nothing else happens."""
 
 import math
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +11,15 @@ import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from mutator._common.files import read_json
+from mutator.campaigns.filters import compile_filter
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.readings import UNDECLARED
 from mutator.faults.specs import load_spec
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.rendering import literal, signed
+from mutator.triggers.conditions import check_condition, evaluate
 
 QUIET = [HealthCheck.function_scoped_fixture]
 SPEC = Path(__file__).parents[2] / "fault_library" / "faults" / "car_sensors" / "speed.yaml"
@@ -118,3 +123,83 @@ def test_only_numbers_and_names_are_rendered(value: object) -> None:
     """Anything else in a template is an error."""
     with pytest.raises(MutatorError):
         literal(value)
+
+
+SHAPES = {
+    "open lists": "a: " + "[" * 900,
+    "deep lists": "[" * 50_000 + "]" * 50_000,
+    "open lists without end": "[" * 200_000,
+    "open mappings": "{a: " * 200_000,
+    "open lists on lines": "[\n" * 200_000,
+    "deep block lists": "- " * 400_000,
+    "deep block mappings": "".join(" " * i + "a:\n" for i in range(1300)),
+    "deep keys": "? " * 400_000,
+    "directives": "".join(f"%TAG !a{i}! b\n" for i in range(50_000)) + "---\na: 1\n",
+    "later directives": "a: 1\n...\n" + "".join(f"%TAG !a{i}! b\n" for i in range(50_000)),
+    "a wide list": "[" + "1," * 400_000 + "]",
+    "a wide mapping": "".join(f"k{i}: 1\n" for i in range(80_000)),
+    "documents": "---\n" * 200_000,
+    "too large a file": "a" * 1_000_001,
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_shape_that_would_take_long(tmp_path: Path, shape: str) -> None:
+    """A file of a shape that would take long to read, or end the interpreter, is refused at once, with its
+    line."""
+    path = tmp_path / "x.yaml"
+    path.write_text(SHAPES[shape], encoding="utf-8")
+    began = time.process_time()
+    with pytest.raises(MutatorError) as refused:
+        yaml_files.load(path)
+    assert time.process_time() - began < 1.0
+    assert refused.value.where == str(path)
+    assert refused.value.line is not None or shape == "too large a file"
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=QUIET)
+@given(
+    st.lists(st.sampled_from(["[", "]", "{", "}", "- ", "? ", ": ", ",", "\n", "a", "'", " ", "%"])),
+    st.data(),
+)
+def test_any_shape(tmp_path: Path, words: list[str], data: st.DataObject) -> None:
+    """Brackets, dashes and line ends in any order, some of them very often, are read or refused, and soon."""
+    text = "".join(word * data.draw(st.sampled_from([1, 1, 1, 1000, 50_000])) for word in words)
+    path = tmp_path / "x.yaml"
+    path.write_text(text, encoding="utf-8")
+    began = time.process_time()
+    with suppress(MutatorError):
+        yaml_files.load(path)
+    assert time.process_time() - began < 2.0
+
+
+NESTED = {
+    "parentheses": "(" * 400 + "t" + ")" * 400,
+    "signs": "t < " + "-" * 900 + "1",
+    "negations": "not " * 200 + "t < 1",
+    "calls": "t < " + "abs(" * 150 + "1" + ")" * 150,
+    "sums": "t < 1" + "+1" * 450,
+    "attributes": "t" + ".t" * 450,
+    "tuples": "t in " + "(" * 150 + "1," + ")" * 150,
+    "globs": 'match(t, "' + "*a" * 400 + 'b")',
+    "a long text": "t < 1 " + "and t < 1 " * 10_000,
+}
+
+
+@pytest.mark.parametrize("nested", NESTED)
+def test_nested_expressions(nested: str) -> None:
+    """Conditions and filters of any depth and length are read or refused, and soon; what is read can be
+    evaluated."""
+    began = time.process_time()
+    with suppress(MutatorError):
+        evaluate(check_condition(NESTED[nested]), {"t": 1.0})
+    with suppress(MutatorError):
+        compile_filter(NESTED[nested], ["t"])({"t": "a" * 200})
+    assert time.process_time() - began < 1.0
+
+
+def test_deep_json(tmp_path: Path) -> None:
+    """A JSON file that is nested too deeply is a damaged one."""
+    (tmp_path / "x.json").write_text("[" * 100_000)
+    with pytest.raises(MutatorError, match=r"x\.json: not JSON"):
+        read_json(tmp_path / "x.json", "x/1")

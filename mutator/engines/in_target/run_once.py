@@ -22,6 +22,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 _HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 _LONGEST = 2000  # characters of an exception's text
 _MOST_ERRORS = 50  # of which an exception came
@@ -133,8 +134,16 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
     except Exception as why:
         message = f"its text cannot be told ({type(why).__name__})"
     error = {"kind": kind.__name__, "message": message, "stacks": stacks(err, tree)}
-    full = isinstance(err, OSError) and err.errno in (errno.ENOSPC, errno.EDQUOT)
-    return {"ended": "error", "error": error, "disk_full": full}
+    return {"ended": "error", "error": error, "disk_full": of_full_disk(err)}
+
+
+def of_full_disk(err: BaseException | None) -> bool:
+    """Whether an error came of a full disk or quota, be it in the words of a library."""
+    while err is not None:
+        if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
+            return True
+        err = err.__cause__ or err.__context__
+    return False
 
 
 def stacks(err: BaseException, tree: str) -> list[list[tuple[str, int]]]:

@@ -2,11 +2,19 @@
 
 import errno
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
-from mutator._common.files import DiskFull, check_schema, read_json, write_atomic, write_json
+from mutator._common.files import (
+    DiskFull,
+    check_schema,
+    raising_disk_full,
+    read_json,
+    write_atomic,
+    write_json,
+)
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 
@@ -54,3 +62,26 @@ def test_other_failures_are_not_called_a_full_disk(tmp_path: Path) -> None:
     """A folder that is not there is not told as a full disk."""
     with pytest.raises(FileNotFoundError):
         write_atomic(tmp_path / "nosuch" / "file", b"")
+
+
+def no_room(*_: object, **__: object) -> None:
+    raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
+
+
+def test_a_full_disk_in_other_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk or quota is told as one when `shutil` has put it into a list of texts, and when a library
+    has made another error of it."""
+    (tmp_path / "from").mkdir()
+    (tmp_path / "from" / "file").touch()
+    monkeypatch.setattr(shutil, "copyfile", no_room)
+    with pytest.raises(DiskFull, match="no space left"), raising_disk_full(tmp_path):
+        shutil.copytree(tmp_path / "from", tmp_path / "to")
+    with pytest.raises(DiskFull), raising_disk_full(tmp_path):
+        try:
+            no_room()
+        except OSError:
+            raise RuntimeError("cannot encode") from None
+    with pytest.raises(RuntimeError), raising_disk_full(tmp_path):
+        raise RuntimeError("cannot encode")
+    with pytest.raises(MutatorError, match="mine"), raising_disk_full(tmp_path):
+        raise MutatorError("mine") from OSError(errno.ENOSPC, "")

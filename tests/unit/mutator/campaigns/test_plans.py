@@ -330,3 +330,18 @@ def test_the_run_schema_is_no_part_of_the_plan_digest(
     before = make_plan(toycar, "small").digest
     monkeypatch.setattr("mutator.campaigns.plans.SCHEMA", "run/9")
     assert make_plan(toycar, "small").digest == before
+
+
+def test_a_limit_of_space_is_part_of_a_plan_where_it_is_not_the_default(
+    toycar: Workspace, tmp_path: Path
+) -> None:
+    """`disk_mb` changes neither a plan's digest nor its head while it holds its default."""
+    path = toycar.campaign("small")
+    text = path.read_text()
+    before = freeze(make_plan(toycar, "small"), tmp_path / "0", toycar)
+    for number, (limit, is_same) in enumerate([(1024, True), (1025, False)], start=1):
+        path.write_text(text.replace("limits: {", f"limits: {{disk_mb: {limit}, "))
+        folder = freeze(make_plan(toycar, "small"), tmp_path / str(number), toycar)
+        assert (folder.head["plan"] == before.head["plan"]) is is_same
+        assert (folder.head["limits"] == before.head["limits"]) is is_same
+        assert folder.limits.disk_mb == limit

@@ -86,7 +86,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
         ("schema: car/2\n1: x\n", 2, ["key '1'", "expected text"]),
         ("schema: car/2\nname: x\n\ttags: []\n", 3, ["not valid YAML", "tab"]),
         ("schema: car/2\nname: 'x\n", 3, ["not valid YAML"]),
-        ("schema: car/2\nname: x\n---\nname: y\n", 3, ["not valid YAML", "another document"]),
+        ("schema: car/2\nname: x\n---\nname: y\n", 3, ["a second document", "remove the `---`"]),
     ],
 )
 def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int, pieces: list[str]) -> None:

@@ -258,6 +258,12 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "14: 2 anchors (after_assign, before_call); expected exactly one of after_assign",
         ),
         ("last: [30, 39]", "last: [31, 40]", "for 'integers_from'; expected a last range"),
+        ("last: [30, 39]", "last: [.inf, .inf]", "inf for '"),
+        ("last: [30, 39]", "last: [30, .nan]", "nan for '"),
+        ("first: [10, 19]", "first: [-.inf, 19]", "-inf for '"),
+        ("last: [30, 39]", "last: [1.0e+300, 1.0e+300]", "1e+300 for '"),
+        ("first: [10, 19], step: 10", "first: [10, 19], step: 5.0e-324", "at most 1000 ranges"),
+        ("first: [10, 19], step: 10", "first: [10, 19], step: .inf", "inf for 'step'"),
         (
             "as_coded:",
             "as_built:",

@@ -1,4 +1,4 @@
-"""The run folder: opened, owned by one, cleaned."""
+"""The run folder: opened, owned by one."""
 
 import json
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 from mutator._common import locks
 from mutator.campaigns.plans import freeze, make_plan
 from mutator.errors import MutatorError
-from mutator.store import run_folder
+from mutator.store.cleaning import clean
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -62,12 +62,9 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
 
 
 def test_no_run_folder(tmp_path: Path) -> None:
-    """A folder without run.json is told as such, also to `clean`, which deletes nothing."""
-    (tmp_path / "thesis.tex").touch()
-    for ask in (RunFolder.open, run_folder.clean):
-        with pytest.raises(MutatorError, match="no run folder"):
-            ask(tmp_path)
-    assert (tmp_path / "thesis.tex").exists()
+    """A folder without run.json is told as such."""
+    with pytest.raises(MutatorError, match="no run folder"):
+        RunFolder.open(tmp_path)
 
 
 def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -> None:
@@ -82,7 +79,7 @@ def test_one_owner(folder: RunFolder) -> None:
     """While a command owns the folder another is refused, told who it is; a dead one's lock is gone."""
     process = holder(folder, "owner")
     try:
-        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: run_folder.clean(folder.path)):
+        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: clean(folder.path)):
             with pytest.raises(MutatorError, match=f"in use by process {process.pid}"):
                 attempt()
     finally:
@@ -101,12 +98,6 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
     with locks.owned(folder.path):
         assert locks.living_workers(folder.path) == []
     process.communicate()
-
-
-def test_clean_deletes_everything(folder: RunFolder) -> None:
-    """A run folder that nobody holds is deleted whole."""
-    run_folder.clean(folder.path)
-    assert not folder.path.exists()
 
 
 def test_a_damaged_folder_is_told(folder: RunFolder) -> None:

@@ -91,6 +91,7 @@ def test_places_of_both_readings_count(clone: Workspace) -> None:
         (STRUCTURE, "observed: rs", "observed: ttc", "variable 'ttc'; expected one of t, d_rel"),
         (STRUCTURE, "drawn: [1, 1, 2]", "drawn: [1, 0, 2]", "'acc' drawn at [1, 0, 2], where 'alerts' is"),
         (STRUCTURE, "drawn: [1, 1, 2]", "drawn: [1, 1, 0]", "a width from 1"),
+        (STRUCTURE, "drawn: [1, 1, 2]", "drawn: [1, 1, 1000000000000]", "width up to 100"),
         (STRUCTURE, "to: powertrain", "to: powertrian", "did you mean 'powertrain'"),
         (STRUCTURE, "accelerate: {link: gas", "accelerate: {link: gass", "link 'gass'"),
         (

@@ -119,7 +119,7 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
             "trace_file: ../trace.npz",
             "12: '../trace.npz'; expected a bare file name",
         ),
-        ("step_s: 0.1", "step_s: 0", "7: 0 for 'step_s'; expected greater than 0"),
+        ("step_s: 0.1", "step_s: 0", "7: 0 for 'step_s'; expected greater than or equal to 0.000001"),
         ("step_s: 0.1", "step_s: .inf", "7: inf for 'step_s'; expected a finite number"),
         ("tolerance: 0.5", "tolerance: -1", "16: -1 for 'tolerance'"),
         ("t: now.time", "t: now.time()", "19: 'now.time()'; expected a local name or attribute"),

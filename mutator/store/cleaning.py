@@ -1,0 +1,76 @@
+"""Deletes what a run wrote into its folder, and nothing else."""
+
+import os
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from mutator._common.files import is_half_written, read_json
+from mutator._common.locks import owned
+from mutator.errors import MutatorError
+from mutator.store.run_folder import CONTENT, SCRATCH, RunFolder
+from mutator.store.run_head import HEAD, SCHEMA
+
+_FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}
+_SHOWN = 3
+
+
+def clean(path: Path) -> None:
+    """Delete the run folder; refused as by `check`, and while a command or its workers hold it."""
+    check(path)
+    with owned(path, patience_s=0.0):
+        found = check(path)  # once more, now that nobody writes to it
+        for file in sorted(found, key=lambda file: file == path / HEAD):  # without it, it is no run folder
+            file.unlink()
+        for folder, _, _ in os.walk(path, topdown=False):
+            Path(folder).rmdir()
+
+
+def check(path: Path) -> list[Path]:
+    """The files of a run folder; MutatorError for any other folder, for one that holds what no run writes,
+    and for a link to one."""
+    if path.is_symlink():
+        raise MutatorError(
+            f"a link to {path.readlink()}",
+            where=path,
+            expected="a run folder itself",
+            remedy="name the folder that it leads to",
+        )
+    if not RunFolder.exists(path):
+        raise MutatorError(
+            "no run folder (it has no run.json)",
+            where=path,
+            expected="a run folder",
+            remedy="delete it yourself",
+        )
+    read_json(path / HEAD, SCHEMA)
+    ours, strangers = _sorted_out(path)
+    if strangers:
+        names = [str(entry.relative_to(path)) for entry in sorted(strangers)]
+        more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+        raise MutatorError(
+            f"holds what no run writes: {', '.join(names[:_SHOWN])}{more}",
+            where=path,
+            expected="a run folder and nothing else",
+            remedy="move that elsewhere, or delete the folder yourself",
+        )
+    return ours
+
+
+def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
+    """What a run wrote below `path`, without the folders, and what it did not. No link is followed."""
+    ours: list[Path] = []
+    strangers: list[Path] = []
+    for folder, folders, files in os.walk(path):
+        for name in (*files, *folders):
+            entry = Path(folder, name)
+            words = entry.relative_to(path).as_posix()
+            is_link = entry.is_symlink()
+            if name in folders and not is_link and words.partition("/")[0] in _FOLDERS:
+                continue
+            known = is_half_written(name) or any(fnmatchcase(words, pattern) for pattern in CONTENT)
+            if known and (not is_link or words.startswith(f"{SCRATCH}/")):
+                ours.append(entry)
+            else:
+                strangers.append(entry)
+                folders[:] = [other for other in folders if other != name]
+    return ours, strangers

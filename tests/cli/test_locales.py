@@ -1,0 +1,71 @@
+"""Names that are not ASCII, in environments that know UTF-8 and in one that does not."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.workspace import Workspace
+
+PLAIN = {"LC_ALL": "C"}  # in which Python finds UTF-8 by itself
+NARROW = PLAIN | {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+def mutator(place: Path, environment: dict[str, str], *words: str) -> "subprocess.CompletedProcess[str]":
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("LC_", "LANG"))}
+    return subprocess.run(
+        [sys.executable, "-m", "mutator", *words],
+        cwd=place,
+        env=kept | environment | {"MUTATOR_ROOT": "."},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=300,
+    )
+
+
+@pytest.fixture
+def place(toy: Workspace) -> Path:
+    """The toy's root, in which the text of a spec is not ASCII."""
+    root = toy.library.parent
+    spec = toy.library / "faults" / "sensor" / "distance.yaml"
+    spec.write_text(spec.read_text().replace("about: ", "about: Maß → ", 1), encoding="utf-8")
+    return root
+
+
+def test_names_of_any_letters_in_a_plain_locale(place: Path) -> None:
+    """Under LC_ALL=C a campaign runs whose library, target files and run folder have names of any letters."""
+    (place / "tree" / "toycar" / "größe.py").write_text("SIZE = 1\n")
+    root = place.rename(place.with_name("bücher"))
+    answer = mutator(root, PLAIN, "run", "small", "--out", "läufe/1", "--limit", "1", "-n", "1")
+    assert answer.returncode == 0, answer.stderr
+    assert "läufe/1" in answer.stdout
+    assert (root / "läufe" / "1" / "results.csv").exists()
+
+
+def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
+    """Where output can only be ASCII, what is not is shown by its number; JSON stays JSON."""
+    answer = mutator(place, NARROW, "list", "specs")
+    assert (answer.returncode, "Ma\\xdf \\u2192" in answer.stdout) == (0, True)
+    answer = mutator(place, NARROW, "list", "specs", "--json")
+    assert (answer.returncode, "Ma\\u00df \\u2192" in answer.stdout) == (0, True)
+
+
+@pytest.mark.parametrize("what", ["run folder", "library", "target file"])
+def test_names_that_are_no_text(place: Path, what: str) -> None:
+    """A name that this environment cannot read as text is refused in one message that says what to set."""
+    out = "run"
+    if what == "run folder":
+        out = "läufe"
+    if what == "library":
+        place = place.rename(place.with_name("bücher"))
+    if what == "target file":
+        (place / "tree" / "toycar" / "größe.py").touch()
+    answer = mutator(place, NARROW, "plan", "small", "--out", out)
+    assert (answer.returncode, answer.stdout) == (2, ""), answer.stderr
+    assert "Traceback" not in answer.stderr
+    assert answer.stderr.startswith("error: ")
+    assert "is no text in this environment" in answer.stderr
+    assert "LC_ALL=C.UTF-8" in answer.stderr
+    assert not (place / out / "run.json").exists()

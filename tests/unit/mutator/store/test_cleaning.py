@@ -1,0 +1,109 @@
+"""Cleaning: what a run wrote is deleted, and nothing else."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.errors import MutatorError
+from mutator.store.cleaning import clean
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def run(toycar: Workspace, tmp_path: Path) -> Path:
+    return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar).path
+
+
+def contents(folder: Path) -> set[Path]:
+    return set(folder.rglob("*"))
+
+
+def test_all_that_a_run_wrote_goes(run: Path) -> None:
+    """A run folder goes whole: with what a kill left half-written, and with scratch of any shape."""
+    (run / "report" / "tables").mkdir(parents=True)
+    (run / "report" / ".REPORT.md.4711").touch()
+    odd = run / "work" / "1-x" / "out"
+    odd.mkdir(parents=True)
+    (odd / "link").symlink_to(run.parent)
+    (odd / "dangling").symlink_to("nowhere")
+    os.mkfifo(odd / "pipe")
+    clean(run)
+    assert not run.exists()
+    assert run.parent.exists()
+
+
+@pytest.mark.parametrize(
+    "stranger",
+    [
+        "thesis.tex",
+        "data/night.csv",
+        "empty/",
+        "records/notes.txt",
+        "report/mine.docx",
+        "golden/notes",
+        "plan/x/y.txt",
+    ],
+)
+def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
+    """A run folder that holds anything else is left as it was, and the answer names it."""
+    path = run / stranger
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.mkdir() if stranger.endswith("/") else path.touch()
+    before = contents(run)
+    first = stranger.partition("/")[0] if "/" in stranger and not (run / stranger).is_file() else ""
+    with pytest.raises(MutatorError, match="holds what no run writes: ") as refused:
+        clean(run)
+    assert (first or stranger.split("/")[0]) in refused.value.got
+    assert "move that elsewhere" in str(refused.value)
+    assert contents(run) == before
+
+
+def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
+    """A folder of other things with a run.json in it is left as it was; so is one of another schema."""
+    for head, names in (
+        ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
+        ('{"schema":"run/99"}', []),
+        ('{"schema":"other/1"}', []),
+        ("{}", []),
+        ("", []),
+    ):
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        (folder / "run.json").write_text(head)
+        for name in names:
+            (folder / name).touch()
+        with pytest.raises(MutatorError) as refused:
+            clean(folder)
+        assert not names or refused.value.got == "holds what no run writes: a, b, c and 2 more"
+        assert len(contents(folder)) == 1 + len(names)
+
+
+def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
+    """What is no run folder at all is told as such, and nothing is written into it."""
+    (tmp_path / "thesis.tex").touch()
+    with pytest.raises(MutatorError, match="no run folder"):
+        clean(tmp_path)
+    assert contents(tmp_path) == {tmp_path / "thesis.tex"}
+
+
+def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
+    """Neither a link to a run folder nor one in it is followed: what it leads to stays."""
+    link = tmp_path / "latest"
+    link.symlink_to(run)
+    with pytest.raises(MutatorError, match=r"a link to .*; name the folder"):
+        clean(link)
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "S1").mkdir(parents=True)
+    (elsewhere / "S1" / "trace.npz").touch()
+    (run / "golden").symlink_to(elsewhere)
+    with pytest.raises(MutatorError, match="holds what no run writes: golden"):
+        clean(run)
+    (run / "golden").unlink()
+    (run / "plots").mkdir()
+    (run / "plots" / "x.svg").symlink_to(elsewhere / "S1" / "trace.npz")
+    with pytest.raises(MutatorError, match=r"holds what no run writes: plots/x\.svg"):
+        clean(run)
+    assert (run / "run.json").exists()
+    assert (elsewhere / "S1" / "trace.npz").exists()
