@@ -40,6 +40,20 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("torture")
+    group.addoption("--tries", type=int, metavar="N", help="so many cases of each torture")
+    group.addoption("--seed", type=int, metavar="SEED", help="of each torture only the case of this seed")
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """What tests have to tell, wherever they ran."""
+    reports = [*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")]
+    told = [text for report in reports for name, text in report.user_properties if name == "tally"]
+    for text in told:
+        terminalreporter.write_line(f"\n{text}")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """What fixtures of modules and sessions cache is not the user's."""

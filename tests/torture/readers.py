@@ -1,0 +1,155 @@
+"""All that reads a run folder, and what is compared of what it tells."""
+
+import io
+import json
+import re
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+import mutator
+from mutator.cli.app import main
+from mutator.errors import MutatorError
+
+from .damages import contents
+
+# What differs from run to run, or can be made again: whoever audits a run does not look at it.
+OUTSIDE = re.compile(r"(timings|traces|plots|report|exports|damaged|work|workers)/|owner\.lock|results\.json")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What a reader came to: its exit code, what it said, and the result that must be that of the undamaged
+    folder."""
+
+    code: int
+    said: str
+    result: Any = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A copy of a run folder that may be damaged, and what its readers need to know of it."""
+
+    folder: Path  # holds all of it
+    genuine: Path = Path()  # the undamaged one, elsewhere
+    campaign: tuple[str, ...] = ()  # the words that ran it, without `--out`
+    experiment: str = ""  # one of it
+    shards: tuple[Path, ...] = ()
+
+    @property
+    def run(self) -> Path:
+        return self.folder / "run"
+
+
+Reader = Callable[[Place], Told]
+
+
+def cli(*words: object) -> tuple[int, str, str]:
+    """Exit code, output and errors of `mutator WORDS...`."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main([str(word) for word in words])
+    return code, out.getvalue(), err.getvalue()
+
+
+def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Told:
+    """What a command came to, if it counts what it printed and wrote."""
+    code, out, err = cli(*words)
+    written = [path.read_bytes() for path in files] if code == 0 else []
+    return Told(code=code, said=out + err, result=[out if printed else "", *written])
+
+
+def run(place: Place) -> Told:
+    """`run` or `resume`: the same command."""
+    code, out, err = cli("run", *place.campaign, "--out", place.run, "--json")
+    if code != 0:
+        return Told(code=code, said=out + err)
+    found = json.loads(out)
+    facts = [found[key] for key in ("planned", "done", "outcomes", "proof", "seal")]
+    return Told(code=code, said=out + err, result=[facts, (place.run / "results.csv").read_bytes()])
+
+
+def repair(place: Place) -> Told:
+    """`verify --repair`, then `run`, for which the repaired folder is one like any other."""
+    code, out, err = cli("verify", place.run, "--repair")
+    return run(place) if code in (0, 1) else Told(code=code, said=out + err)
+
+
+def report(place: Place) -> Told:
+    """Without what the report tells of time: that is no result."""
+    words = ("report", place.run)
+    told = _told(words, *(sorted((place.run / "report" / "tables").glob("*.csv"))), printed=True)
+    if told.code != 0:
+        return told
+    text = (place.run / "report" / "REPORT.md").read_text()
+    return Told(code=0, said=told.said, result=[told.result, text])
+
+
+def compare(place: Place) -> Told:
+    out = place.folder / "compared"
+    return _told(("compare", place.genuine, place.run, "--out", out), out / "pairs.csv", printed=True)
+
+
+def show(place: Place) -> Told:
+    return _told(("show", place.experiment, "--run", place.run, "--no-plot"), printed=True)
+
+
+def show_plot(place: Place) -> Told:
+    """With the plot, which is drawn of a kept trace, or of one that is driven again."""
+    return _told(("show", place.experiment, "--run", place.run), printed=True)
+
+
+def rerun(place: Place) -> Told:
+    return _told(("rerun", place.experiment, "--run", place.run), printed=True)
+
+
+def merge(place: Place) -> Told:
+    out = place.folder / "merged"
+    code, printed, err = cli("merge", *place.shards, "--out", out, "--json")
+    if code != 0:
+        return Told(code=code, said=printed + err)
+    return Told(
+        code=0, said=printed, result=[json.loads(printed)["seal"], (out / "results.csv").read_bytes()]
+    )
+
+
+def _export(format: str) -> Reader:
+    def export(place: Place) -> Told:
+        out = place.folder / f"exported.{format}"
+        told = _told(("export", place.run, "--format", format, "--out", out), out)
+        if format != "parquet" or told.code != 0:
+            return told
+        return Told(code=0, said=told.said, result=pd.read_parquet(out).to_csv())
+
+    return export
+
+
+def verify(place: Place) -> Told:
+    """An audit that finds nothing vouches for every file that it looks at."""
+    code, out, err = cli("verify", place.run)
+    names = (name for name in contents(place.run) if not OUTSIDE.match(name))
+    audited = {name: contents(place.run)[name] for name in names} if code == 0 else None
+    return Told(code=code, said=out + err, result=audited)
+
+
+def api(place: Place) -> Told:
+    """Results, endings, seal, an experiment with its patch, in Python."""
+    try:
+        found = mutator.load_run(place.run)
+        told = [found.results.to_csv(), found.endings, found.seal, found.experiment(place.experiment).patch]
+        return Told(code=0, said="", result=[*told, str(found.counts()), sorted(found.records)])
+    except MutatorError as err:
+        return Told(code=err.exit_code, said=f"{err}\nto do: {err.remedy}" if err.remedy else str(err))
+
+
+READERS: dict[str, Reader] = {
+    **{one.__name__: one for one in (run, repair, report, compare, show, show_plot)},
+    **{one.__name__: one for one in (rerun, verify, api)},
+    **{f"export {format}": _export(format) for format in mutator.Format},
+}
+

@@ -1,0 +1,85 @@
+"""Makes the run folders that are damaged."""
+
+import os
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from ..differential.command import Command
+from .readers import READERS, Place, api, cli, merge, repair, report, run, show, verify
+from .worlds import World
+
+SMALL = ("small", "--limit", "6")
+SHIPPED = ("paper_reference", "--limit", "4", "--only", 'scenario == "S1"')
+REFERENCE = ("--engine", "reference")
+UNFINISHED = {one.__name__: one for one in (run, repair, verify, api, report)}
+QUICK = ("api", "compare", "show", "verify", "export csv", "export mutation-elements", "run")
+
+
+def finished(home: Path, at: Path) -> World:
+    """A run of the toy with proof, plot, trace, report, comparison and exports."""
+    words = (*SMALL, "--engine", "fork")
+    done(*("run", *words, "--out", home / "run"))
+    name = hazardous(home / "run")
+    done("rerun", name, "--run", home / "run", "--trace")
+    done("export", home / "run", "--format", "junit")
+    done("compare", home / "run", home / "run")
+    done("report", home / "run")
+    return World(home=home, place=_place(home, at, words, name), readers=READERS)
+
+
+def half(home: Path, at: Path) -> World:
+    """A run of the toy that was killed, with most of its experiments done."""
+    words, out = (*SMALL, *REFERENCE), home / "run"
+    command = Command(_workspace(), out, "-m", "mutator", "run", *words, "-n", "2", "--out", str(out))
+    command.wait_for_records(4)
+    os.killpg(command.process.pid, signal.SIGKILL)
+    command.end()
+    name = next(iter(RunFolder.open(out).records()))
+    return World(home=home, place=_place(home, at, words, name), readers=UNFINISHED)
+
+
+def shards(home: Path, at: Path) -> World:
+    """Two halves of a run of the toy, to be merged."""
+    for number in (1, 2):
+        out = home / f"shard{number}"
+        done("run", *SMALL, *REFERENCE, "--shard", f"{number}/2", "--out", out)
+    place = Place(folder=at, shards=(at / "shard1", at / "shard2"))
+    return World(home=home, place=place, readers={"merge": merge})
+
+
+def shipped(home: Path, at: Path) -> World:
+    """A run on the controller that ships, read without driving."""
+    words = (*SHIPPED, *REFERENCE)
+    done("run", *words, "--out", home / "run")
+    place = _place(home, at, words, hazardous(home / "run"))
+    return World(home=home, place=place, readers={name: READERS[name] for name in QUICK})
+
+
+BUILDERS: dict[str, Callable[[Path, Path], World]] = {
+    one.__name__: one for one in (finished, half, shards, shipped)
+}
+
+
+def done(*words: object) -> None:
+    """Give a command that must go well."""
+    code, _, said = cli(*words)
+    assert code == 0, said
+
+
+def hazardous(run: Path) -> str:
+    """The first experiment of a run that reached a hazard."""
+    return next(name for name, record in RunFolder.open(run).records().items() if record.hazards)
+
+
+def _place(home: Path, at: Path, words: tuple[str, ...], experiment: str) -> Place:
+    genuine = Path(shutil.copytree(home / "run", at.parent / "genuine"))
+    return Place(folder=at, genuine=genuine, campaign=words, experiment=experiment)
+
+
+def _workspace() -> Workspace:
+    return Workspace.find(root=Path(os.environ["MUTATOR_ROOT"]))

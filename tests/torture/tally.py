@@ -1,0 +1,67 @@
+"""What became of the cases of a torture: a table that is printed, and the cases that went wrong."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+
+from mutator._common.tables import Table
+
+
+class End(StrEnum):
+    """How a case may end."""
+
+    RIGHT = "right"  # with the result of the undisturbed
+    REFUSED = "refused"  # with an error that names the file and what to do
+    WRONG = "wrong"  # with anything else
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One try: the kind of what was tortured, what was done to it, what then read it or went on, how that
+    ended, and what to know of a wrong end."""
+
+    kind: str
+    damage: str
+    reader: str
+    end: End
+    story: str = ""
+
+
+@dataclass(slots=True)
+class Tally:
+    """The cases of one torture by seed; each can be repeated alone, with `--seed`."""
+
+    title: str
+    cases: dict[int, Case] = field(default_factory=dict)
+
+    def drive(self, seeds: Iterable[int], case: Callable[[int], Case]) -> None:
+        """Go through the cases; what escapes from one is a wrong end of it."""
+        for seed in seeds:
+            try:
+                self.cases[seed] = case(seed)
+            except Exception as err:
+                story = f"{type(err).__name__}: {err}"
+                self.cases[seed] = Case(kind="?", damage="?", reader="?", end=End.WRONG, story=story)
+
+    @property
+    def wrong(self) -> list[str]:
+        """A line for each wrong end, with the seed that repeats it."""
+        return [
+            f"--seed {seed}: {case.kind}: {case.story}"
+            for seed, case in self.cases.items()
+            if case.end is End.WRONG
+        ]
+
+    def __str__(self) -> str:
+        """A table for each way to look at the cases, and the wrong ends."""
+        heads = [field.name for field in fields(Case)[:3]]
+        tables = [self._table(head) for head in heads]
+        return "\n\n".join([f"{self.title}: {len(self.cases)} cases", *tables, *self.wrong])
+
+    def _table(self, head: str) -> str:
+        counts = Counter((getattr(case, head), case.end) for case in self.cases.values())
+        names = sorted({one for one, _ in counts})
+        rows = [(one, *(str(counts[one, end]) for end in End)) for one in names]
+        total = [str(sum(counts[one, end] for one in names)) for end in End]
+        return Table(heads=(head, *End), rows=[*rows, ("total", *total)], right=(1, 2, 3)).as_text()

@@ -1,0 +1,38 @@
+"""Whatever becomes of a file of a run folder: who reads the folder gets the right result, or an error that
+names the file and what to do. Never another result, never a traceback."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from mutator.workspace import Workspace
+
+from .run_folders import BUILDERS
+from .tally import Tally
+
+pytestmark = pytest.mark.slow
+
+CLONE = Path(__file__).parents[2]
+TRIES = {"finished": 600, "half": 200, "shards": 120, "shipped": 80}
+
+
+@pytest.mark.parametrize("name", TRIES)
+def test_damages(
+    name: str,
+    toy: Workspace,
+    tmp_path: Path,
+    kept_checks: None,
+    seeds: Callable[[int], Sequence[int]],
+    print_tally: Callable[[Tally], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A damage, then a reader."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name == "shipped" else toy.library.parent))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "home").mkdir()
+    world = BUILDERS[name](tmp_path / "home", tmp_path / "case")
+    tally = Tally(f"damages to run folders: {name}")
+    tally.drive(seeds(TRIES[name]), world.case)
+    print_tally(tally)
+    assert not tally.wrong

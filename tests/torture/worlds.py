@@ -1,0 +1,113 @@
+"""Run folders to be damaged: each case gets a copy of one, always in the same place."""
+
+import random
+import shutil
+import signal
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+
+from .damages import damage
+from .readers import Place, Reader, Told
+from .tally import Case, End
+
+LONGEST_S = 180  # of a case, on a busy machine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """A folder `home` with run folders, which stays as it is, and what reads the copy of it at `place`."""
+
+    home: Path
+    place: Place
+    readers: Mapping[str, Reader]
+    right: dict[str, Told] = field(default_factory=dict)  # what readers tell of the undamaged folder
+
+    def case(self, seed: int) -> Case:
+        """Damage a file of some kind in some way, and let some reader read the folder."""
+        chance = random.Random(seed)
+        reader = chance.choice(sorted(self.readers))
+        right = self._right(reader)
+        with self._copied():
+            kinds = kinds_of(self.home)
+            kind = chance.choice(sorted(kinds))
+            how, touched = damage(self.place.folder, kinds[kind], chance)
+            told = self._tell(reader)
+        end, why = judged(told, right, touched)
+        story = f"{how} of {', '.join(touched)}, then {reader}: {why}\n{told.said}"
+        return Case(kind=kind, damage=how, reader=reader, end=end, story=story)
+
+    def _right(self, reader: str) -> Told:
+        if reader not in self.right:
+            with self._copied():
+                self.right[reader] = self._tell(reader)
+            assert self.right[reader].code == 0, f"{reader}: {self.right[reader].said}"
+        return self.right[reader]
+
+    def _tell(self, reader: str) -> Told:
+        with limited(LONGEST_S):
+            return self.readers[reader](self.place)
+
+    @contextmanager
+    def _copied(self) -> Iterator[None]:
+        shutil.copytree(self.home, self.place.folder, symlinks=True)
+        try:
+            yield
+        finally:
+            shutil.rmtree(self.place.folder)
+
+
+def kinds_of(home: Path) -> dict[str, list[str]]:
+    """The files below a folder by kind: those of a folder of a run folder are one kind."""
+    found = defaultdict(list)
+    for path in sorted(home.rglob("*")):
+        if path.is_file():
+            name = path.relative_to(home)
+            found["/".join(name.parts[1:2]) if len(name.parts) > 1 else name.name].append(name.as_posix())
+    return dict(found)
+
+
+def judged(told: Told, right: Told, touched: Sequence[str]) -> tuple[End, str]:
+    """Whether a reader came to the right result, or refused the damaged folder as it should."""
+    if "Traceback" in told.said or "defect of mutator" in told.said:
+        return End.WRONG, "a traceback"
+    if told.code == 0:
+        same = told.result == right.result
+        return (End.RIGHT, "") if same else (End.WRONG, f"another result: {_difference(told, right)}")
+    if told.code not in (1, 2, 3):
+        return End.WRONG, f"exit code {told.code}"
+    if not any(Path(name).name in told.said for name in touched):
+        return End.WRONG, "no file is named"
+    if "to do: " not in told.said and told.code == 2:
+        return End.WRONG, "no remedy is named"
+    return End.REFUSED, ""
+
+
+def _difference(told: Told, right: Told) -> str:
+    """What differs, in short."""
+    if isinstance(right.result, list) and isinstance(told.result, list):
+        pairs = [pair for pair in zip(told.result, right.result, strict=False) if pair[0] != pair[1]]
+        return f"{pairs[:1]}"[:2000]
+    if isinstance(right.result, dict) and isinstance(told.result, dict):
+        names = right.result.keys() | told.result.keys()
+        return ", ".join(name for name in names if right.result.get(name) != told.result.get(name))
+    return f"{told.result} for {right.result}"[:2000]
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """TimeoutError where what is within takes longer."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError(f"took more than {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
