@@ -3,6 +3,7 @@
 Locks are flocks: the kernel drops them when their process dies, however it dies.
 """
 
+import errno
 import fcntl
 import os
 import time
@@ -22,11 +23,11 @@ _PATIENCE_S = 15.0  # workers of a dead command end by themselves well within th
 def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
     """Own the existing folder `run`; MutatorError while another command or its workers hold it."""
     with raising_disk_full(run):
-        fd = os.open(run / OWNER, os.O_RDWR | os.O_CREAT, 0o644)
+        fd = _opened(run / OWNER, os.O_CREAT)
     try:
         if not _try_lock(fd):
             raise MutatorError(
-                f"in use by process {os.read(fd, 32).decode().strip() or '(unknown)'}",
+                f"in use by process {os.read(fd, 32).decode(errors='replace').strip() or '(unknown)'}",
                 where=run,
                 expected="one command at a time in a run folder",
                 remedy="wait until it ends, or use another folder",
@@ -56,7 +57,7 @@ def register_worker(run: Path) -> int:
     with raising_disk_full(run):
         folder = run / WORKERS
         folder.mkdir(exist_ok=True)
-        fd = os.open(folder / str(os.getpid()), os.O_RDWR | os.O_CREAT, 0o644)
+        fd = _opened(folder / str(os.getpid()), os.O_CREAT)
     fcntl.flock(fd, fcntl.LOCK_EX)
     return fd
 
@@ -66,7 +67,7 @@ def living_workers(run: Path) -> list[int]:
     living = []
     for path in sorted((run / WORKERS).glob("[0-9]*")):
         try:
-            fd = os.open(path, os.O_RDWR)
+            fd = _opened(path)
         except FileNotFoundError:  # another looked, too
             continue
         try:
@@ -85,6 +86,21 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
     while (living := living_workers(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)
     return living
+
+
+def _opened(path: Path, more: int = 0) -> int:
+    """The file there, open; MutatorError for a folder, and for a link, to whose end nothing may be written."""
+    try:
+        return os.open(path, os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
+    except OSError as err:
+        if err.errno not in (errno.EISDIR, errno.ELOOP):
+            raise
+        raise MutatorError(
+            f"no file ({err.strerror})",
+            where=path,
+            expected="a file of the run folder",
+            remedy="delete it: it says nothing of a result",
+        ) from None
 
 
 def _try_lock(fd: int) -> bool:

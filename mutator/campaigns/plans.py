@@ -249,7 +249,7 @@ def make_run_folder(out: Path) -> None:
         strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
         if strangers:
             raise MutatorError(
-                f"no run folder, and not empty ({', '.join(sorted(strangers)[:3])})",
+                f"no {HEAD}, and not empty ({', '.join(sorted(strangers)[:3])})",
                 where=out,
                 argument="out",
                 expected="a run folder, or a new or empty folder",

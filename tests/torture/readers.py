@@ -17,8 +17,9 @@ from mutator.errors import MutatorError
 
 from .damages import contents
 
-# What differs from run to run, or can be made again: whoever audits a run does not look at it.
-OUTSIDE = re.compile(r"(timings|traces|plots|report|exports|damaged|work|workers)/|owner\.lock|results\.json")
+AUDITED = re.compile(r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/")
+TABLES = ("results.csv", "results.parquet", "timings.parquet")  # verified if they are there
+HOW = re.compile(r"^## How the experiments were run$.*?^(?=## )", re.MULTILINE | re.DOTALL)  # of a report
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,10 +52,15 @@ Reader = Callable[[Place], Told]
 
 def cli(*words: object) -> tuple[int, str, str]:
     """Exit code, output and errors of `mutator WORDS...`."""
-    out, err = io.StringIO(), io.StringIO()
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     with redirect_stdout(out), redirect_stderr(err):
         code = main([str(word) for word in words])
-    return code, out.getvalue(), err.getvalue()
+    return code, _text(out), _text(err)
+
+
+def _text(stream: io.TextIOWrapper) -> str:
+    stream.seek(0)
+    return stream.read()
 
 
 def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Told:
@@ -81,13 +87,13 @@ def repair(place: Place) -> Told:
 
 
 def report(place: Place) -> Told:
-    """Without what the report tells of time: that is no result."""
+    """Without what it tells of timings, which say nothing of a result."""
     words = ("report", place.run)
     told = _told(words, *(sorted((place.run / "report" / "tables").glob("*.csv"))), printed=True)
     if told.code != 0:
         return told
     text = (place.run / "report" / "REPORT.md").read_text()
-    return Told(code=0, said=told.said, result=[told.result, text])
+    return Told(code=0, said=told.said, result=[told.result, HOW.sub("", text)])
 
 
 def compare(place: Place) -> Told:
@@ -132,9 +138,11 @@ def _export(format: str) -> Reader:
 def verify(place: Place) -> Told:
     """An audit that finds nothing vouches for every file that it looks at."""
     code, out, err = cli("verify", place.run)
-    names = (name for name in contents(place.run) if not OUTSIDE.match(name))
-    audited = {name: contents(place.run)[name] for name in names} if code == 0 else None
-    return Told(code=code, said=out + err, result=audited)
+    found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
+    finished = json.loads(genuine["digests.json"])["finished"]  # only then nothing may be added
+    audited = {name: found[name] for name in found if AUDITED.match(name) and (finished or name in genuine)}
+    tables = {name: found.get(name, genuine[name]) for name in TABLES if name in genuine}
+    return Told(code=code, said=out + err, result=audited | tables)
 
 
 def api(place: Place) -> Told:

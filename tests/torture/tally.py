@@ -1,7 +1,8 @@
 """What became of the cases of a torture: a table that is printed, and the cases that went wrong."""
 
+import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
@@ -30,26 +31,27 @@ class Case:
 
 @dataclass(slots=True)
 class Tally:
-    """The cases of one torture by seed; each can be repeated alone, with `--seed`."""
+    """The cases of one torture, and the seeds that they came of: each can be repeated alone, with `--seed`."""
 
     title: str
-    cases: dict[int, Case] = field(default_factory=dict)
+    cases: list[tuple[int, Case]] = field(default_factory=list)
 
-    def drive(self, seeds: Iterable[int], case: Callable[[int], Case]) -> None:
-        """Go through the cases; what escapes from one is a wrong end of it."""
+    def drive(self, seeds: Iterable[int], cases_of: Callable[[int], Sequence[Case]]) -> None:
+        """Go through the seeds; what escapes from a case is a wrong end of it."""
         for seed in seeds:
             try:
-                self.cases[seed] = case(seed)
-            except Exception as err:
-                story = f"{type(err).__name__}: {err}"
-                self.cases[seed] = Case(kind="?", damage="?", reader="?", end=End.WRONG, story=story)
+                found = cases_of(seed)
+            except Exception:
+                story = traceback.format_exc()
+                found = [Case(kind="?", damage="?", reader="?", end=End.WRONG, story=story)]
+            self.cases += [(seed, case) for case in found]
 
     @property
     def wrong(self) -> list[str]:
         """A line for each wrong end, with the seed that repeats it."""
         return [
             f"--seed {seed}: {case.kind}: {case.story}"
-            for seed, case in self.cases.items()
+            for seed, case in self.cases
             if case.end is End.WRONG
         ]
 
@@ -60,7 +62,7 @@ class Tally:
         return "\n\n".join([f"{self.title}: {len(self.cases)} cases", *tables, *self.wrong])
 
     def _table(self, head: str) -> str:
-        counts = Counter((getattr(case, head), case.end) for case in self.cases.values())
+        counts = Counter((getattr(case, head), case.end) for _, case in self.cases)
         names = sorted({one for one, _ in counts})
         rows = [(one, *(str(counts[one, end]) for end in End)) for one in names]
         total = [str(sum(counts[one, end] for one in names)) for end in End]

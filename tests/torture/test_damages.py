@@ -33,6 +33,6 @@ def test_damages(
     (tmp_path / "home").mkdir()
     world = BUILDERS[name](tmp_path / "home", tmp_path / "case")
     tally = Tally(f"damages to run folders: {name}")
-    tally.drive(seeds(TRIES[name]), world.case)
+    tally.drive(seeds(TRIES[name]), world.cases)
     print_tally(tally)
     assert not tally.wrong

@@ -1,0 +1,159 @@
+"""Commands that are killed at random moments, and given again until they come to their end."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import mutator
+from mutator.workspace import Workspace
+
+from ..differential.command import Command
+from .damages import Chance
+from .readers import HOW, Place, Told, run
+from .run_folders import SMALL, done
+from .tally import Case
+from .worlds import judged
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP)
+VICTIMS = ("command", "group", "worker", "mutant or fork server")
+KILLS = 2  # of one command, at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """A command, where it begins, and what must have become of the folder in the end."""
+
+    name: str
+    workspace: Workspace
+    at: Path  # the folder that all happens in
+    words: tuple[object, ...]
+    told: Callable[[], Told]  # of what the command has made
+    home: Path | None = None  # what is in the folder before; None: nothing
+    fresh_cache: bool = False  # so that the checks are run, too
+
+    def cases(self, right: Told, longest_s: float, seed: int) -> Sequence[Case]:
+        """Kill the command, give it again, kill that, then let it end; a case for each kill that came."""
+        chance = random.Random(seed)
+        self._begin()
+        kills = []
+        for _ in range(KILLS):
+            command = self._command()
+            kills.append(struck(command, chance, longest_s))
+            command.end()  # and that of every process that it started, soon
+            if self._is_done(command):
+                break
+        told = self.told() if self._is_done(command) else self._finish()
+        end, why = judged(told, right, [])
+        story = f"{self.name}: {kills}: {why}"
+        return [
+            Case(kind=victim, damage=number.name, reader=self.name, end=end, story=story)
+            for victim, number in filter(None, kills)
+        ]
+
+    def _is_done(self, command: Command) -> bool:
+        """Whether it needs no other; nor does a merge that was killed when all was written: it would refuse
+        to write over a run."""
+        return command.process.returncode == 0 or (self.name == "merge" and (self.at / "run/run.json").exists())
+
+    def undisturbed(self) -> tuple[Told, float]:
+        """What the command comes to when nobody kills it, and how long that takes, in s."""
+        self._begin()
+        began = time.monotonic()
+        command = self._command()
+        printed, longest_s = command.end(), time.monotonic() - began
+        assert command.process.returncode in (0, 1), printed
+        return self.told(), longest_s
+
+    def _begin(self) -> None:
+        shutil.rmtree(self.at, ignore_errors=True)
+        if self.home:
+            shutil.copytree(self.home, self.at)
+        else:
+            self.at.mkdir()
+
+    def _finish(self) -> Told:
+        command = self._command()
+        printed = command.end()
+        if command.process.returncode not in (0, 1):
+            return Told(code=command.process.returncode, said=printed)
+        return self.told()
+
+    def _command(self) -> Command:
+        cache = {"XDG_CACHE_HOME": str(self.at / "cache")} if self.fresh_cache else {}
+        return Command(self.workspace, self.at, "-m", "mutator", *map(str, self.words), **cache)
+
+
+def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
+    """A run without and with its checks, a report, a repair of a damaged run, a merge."""
+    words, place = (*SMALL, "--engine", "fork"), Place(folder=at, campaign=(*SMALL, "--engine", "fork"))
+    scene = partial(Scene, workspace=workspace, at=at)
+    running = ("run", *words, "-n", "2", "--out", place.run)
+    yield scene(name="run", words=running, told=lambda: run(place))
+    yield scene(name="run with checks", words=running, told=lambda: run(place), fresh_cache=True)
+    done("run", *words, "--out", homes / "finished" / "run")
+    whole = homes / "finished"
+    yield scene(name="report", words=("report", place.run), told=lambda: _written(place), home=whole)
+    damaged = _damaged(shutil.copytree(whole, homes / "damaged"))
+    repairing = ("verify", place.run, "--repair")
+    yield scene(name="repair", words=repairing, told=lambda: run(place), home=damaged)
+    for number in (1, 2):
+        words = (*SMALL, "--engine", "reference", "--shard", f"{number}/2")
+        done("run", *words, "--out", homes / "shards" / f"shard{number}")
+    shards = (at / "shard1", at / "shard2")
+    yield scene(name="merge", words=("merge", *shards, "--out", place.run), told=lambda: _merged(place), home=homes / "shards")
+
+
+def _damaged(home: Path) -> Path:
+    """A line of the records lost, a golden run and a patch changed."""
+    records = next((home / "run" / "records").iterdir())
+    records.write_bytes(records.read_bytes()[:-1] + b"x\n")
+    for path in (next((home / "run" / "golden").rglob("*.npz")), next((home / "run" / "patches").rglob("*.patch"))):
+        path.write_bytes(path.read_bytes()[:-1])
+    return home
+
+
+def _written(place: Place) -> Told:
+    """A report, as it was written."""
+    text = (place.run / "report" / "REPORT.md").read_text()
+    tables = sorted((place.run / "report" / "tables").iterdir())
+    return Told(code=0, said="", result=[HOW.sub("", text), *(table.read_text() for table in tables)])
+
+
+def _merged(place: Place) -> Told:
+    found = mutator.load_run(place.run)
+    return Told(code=0, said="", result=[found.seal, (place.run / "results.csv").read_text()])
+
+
+def struck(command: Command, chance: Chance, longest_s: float) -> tuple[str, signal.Signals] | None:
+    """Send a signal to a process of a command, or to all, at some moment of the time that it takes; to which,
+    and which signal. None if the command ended before."""
+    number, victim = chance.choice(SIGNALS), chance.choice(VICTIMS)
+    try:
+        command.process.wait(chance.uniform(0.0, longest_s))
+        return None
+    except subprocess.TimeoutExpired:
+        pass
+    workers = command.workers() if victim in VICTIMS[2:] else []
+    others = [pid for pid, _ in command.others() if pid not in workers] if victim == VICTIMS[3] else []
+    if victims := {"worker": workers, VICTIMS[3]: others}.get(victim, []):
+        _kill(chance.choice(victims), number)
+    elif victim == "group":
+        os.killpg(command.process.pid, number)
+    else:
+        victim = "command"
+        _kill(command.process.pid, number)
+    return victim, number
+
+
+def _kill(pid: int, number: signal.Signals) -> None:
+    try:
+        os.kill(pid, number)
+    except ProcessLookupError:  # it has just ended by itself
+        return

@@ -1,0 +1,37 @@
+"""Whoever kills whatever of a command, whenever: the same command, given again, comes to the same results, and
+nothing of the killed one lives on."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from mutator.workspace import Workspace
+
+from .scenes import scenes
+from .tally import Tally
+
+pytestmark = pytest.mark.slow
+
+TRIES = {"run": 45, "run with checks": 20, "report": 20, "repair": 20, "merge": 15}  # of two kills each
+
+
+@pytest.mark.parametrize("name", TRIES)
+def test_kills(
+    name: str,
+    toy: Workspace,
+    tmp_path: Path,
+    kept_checks: None,
+    seeds: Callable[[int], Sequence[int]],
+    print_tally: Callable[[Tally], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two kills, then the end of the command."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
+    monkeypatch.chdir(tmp_path)
+    scene = next(one for one in scenes(toy, tmp_path / "homes", tmp_path / "case") if one.name == name)
+    right, longest_s = scene.undisturbed()
+    tally = Tally(f"kills of {name}")
+    tally.drive(seeds(TRIES[name]), lambda seed: scene.cases(right, longest_s, seed))
+    print_tally(tally)
+    assert not tally.wrong
