@@ -134,11 +134,11 @@ def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
     path.write_bytes(b"".join(text + b"\n" for text in texts))
 
 
-def changed(value: Any, chance: Chance) -> Any:
+def changed(value: Any, chance: Chance, strange: Sequence[object] = STRANGE) -> Any:
     """A value with one of the values in it changed, at any depth."""
     inside = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else []
     if not inside or chance.random() < 0.1:
-        return chance.choice(STRANGE)
+        return chance.choice(strange)
     place = chance.choice(list(inside))
     what = chance.random()
     if what < 0.15:
@@ -148,7 +148,7 @@ def changed(value: Any, chance: Chance) -> Any:
     elif what < 0.25:
         value[f"{place}x"] = value[place]
     else:
-        value[place] = changed(value[place], chance)
+        value[place] = changed(value[place], chance, strange)
     return value
 
 
