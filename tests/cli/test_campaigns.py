@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Reseal = Callable[..., None]  # computes every checksum and digest of a run folder anew
 
 TESTS = Path(__file__).parents[1]
 CHOSEN = ["--only", 'fault_type != "distance"']  # some of them always do harm, whatever their ids
@@ -200,7 +201,7 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
     assert "report/REPORT.md" in answer.out
 
 
-def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path) -> None:
+def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
     """It is written, with what failed on top, and the command ends with 1 and names the experiment."""
     run = Path(shutil.copytree(run, tmp_path / "run"))
     shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
@@ -208,6 +209,7 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
     head, first, *rest = path.read_text().splitlines()
     wrong = json.loads(first) | {"trace_digest": "0" * 64}
     path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
+    reseal(run)
     answer = cli("report", run)
     assert answer.code == 1
     assert f"experiment {wrong['experiment_id']} is another one" in answer.err
@@ -301,7 +303,7 @@ def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
     assert Path(answer["plot"]).is_file()
 
 
-def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path) -> None:
+def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
     """A record that the run does not reproduce is a failed check."""
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
@@ -312,6 +314,7 @@ def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path) -> None:
             if line.get("experiment_id") == name:
                 line["t_manifest"] += 1.0
         file.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    reseal(copy)
     answer = cli("rerun", name, "--run", copy)
     assert answer.code == 1
     assert "DIFFERS" in answer.out
