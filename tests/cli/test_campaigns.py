@@ -15,6 +15,9 @@ from typing import Any
 
 import pytest
 
+from mutator.review import gate
+from mutator.store.run_folder import CONTENT
+
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 Reseal = Callable[..., None]  # computes every checksum and digest of a run folder anew
 
@@ -332,6 +335,9 @@ def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
     assert Path("mine").exists()
 
 
+KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
+
+
 def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
     """After every command that writes into a run folder, `clean` deletes it; through a link it does not."""
     copy, other = tmp_path / "copy", tmp_path / "other"
@@ -341,13 +347,18 @@ def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) 
     for words in (
         ["show", name, "--run", copy],
         ["rerun", name, "--run", copy, "--trace"],
-        ["show", name, "--run", copy, "--still", "2.0"],
+        ["show", name, "--run", copy, "--still", "2.0", "--video", copy / "plots" / f"{name}.mp4"],
         *(["export", copy, "--format", f] for f in ("mutation-elements", "junit", "csv", "parquet")),
         ["compare", other, copy],
-        ["report", copy],
     ):
         assert cli(*words).code == 0, words
-    assert {path.name for path in copy.iterdir()} >= {"traces", "plots", "exports", "report"}
+    gate.write_approvals(copy, {"schema": gate.SCHEMA, "target": "toycar", "groups": []})
+    for file in (next((copy / "records").iterdir()), next((copy / "patches").rglob("*.patch"))):
+        file.write_bytes(file.read_bytes()[:-9])
+    assert cli("verify", copy, "--repair").code == 1
+    resumed = cli("run", "toy", "--out", copy, *CHOSEN, "--engine", "fork")  # so that there is a proof
+    assert resumed.code == 0, resumed.err
+    assert {path.name for path in copy.iterdir()} == KNOWN - {"workers", "work"}
     link = tmp_path / "link"
     link.symlink_to(copy)
     refused = cli("clean", link, "--yes")
