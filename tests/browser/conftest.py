@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mutator._common.hashing import digest
 from mutator.campaigns.plans import freeze, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
@@ -49,9 +50,9 @@ def browser() -> Iterator[Any]:
         started.close()
 
 
-def record(experiment: Experiment, number: int) -> Record:
-    """A made-up record: every fifth experiment is not active, three of ten end in a hazard; one harness
-    error, one crash."""
+def record(experiment: Experiment, number: int, patch: bytes) -> Record:
+    """A made-up record with that patch: every fifth experiment is not active, three of ten end in a hazard;
+    one harness error, one crash."""
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0
     hazard = status is Status.OK and number % 10 > 6
@@ -68,6 +69,7 @@ def record(experiment: Experiment, number: int) -> Record:
         hazards=(("H3", 4.0 + number / 10),) if hazard else (),
         alerts=(("brake_hard", 3.0),) if hazard and number % 2 else (),
         trace_digest="f" * 64,
+        patch=digest(patch),
     )
 
 
@@ -81,17 +83,18 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     manifest, models = workspace.manifest("toycar"), workspace.fault_models()
     lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
     for number, experiment in enumerate(plan.experiments):
-        lines.append(asdict(record(experiment, number)))
-        patch = out.patch(experiment.id)
-        patch.parent.mkdir(parents=True, exist_ok=True)
-        patch.write_bytes(build(manifest, models, experiment.fault, experiment.trigger).patch_bytes)
+        data = build(manifest, models, experiment.fault, experiment.trigger).patch_bytes
+        lines.append(asdict(record(experiment, number, data)))
+        place = out.patch(experiment.id)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(data)
     lines.close()
     results.build(out.path)
     t = np.arange(0.0, 6.0, 0.05)
     names = ("gas", "brake", "wheel_turn", "gap", "speed")
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}
     faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
-    series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7))
+    series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7, b""))
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures, "drawings", lambda frame: ())
         building.write(out.path, None)

@@ -77,7 +77,7 @@ def varied(draw: st.DrawFn) -> Fault:
 
 @st.composite
 def others(draw: st.DrawFn) -> Fault:
-    """A fault of any model of the templates, where the library has one."""
+    """A fault of any model of the templates, where the library has one; what may be left out may be."""
     manifest, models = paper()
     model = models.get(draw(st.sampled_from(sorted(models.models))))
     fault = draw(st.sampled_from(faults()))
@@ -86,20 +86,21 @@ def others(draw: st.DrawFn) -> Fault:
         kind = AnchorKind(location.anchor.kind.replace("after_", "before_"))
         location = replace(location, anchor=replace(location.anchor, kind=kind))
     names = sorted(parsed(manifest.tree, location.path).resolve(location).names)
-    params = tuple((p.name, draw(values(p, names))) for p in model.params)
+    given = [p for p in model.params if not (p.optional and draw(st.booleans()))]
+    params = tuple((p.name, draw(values(p, names))) for p in given)
     return replace(fault, injections=(Injection(location=location, model=model.name, params=params),))
 
 
 def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
-    found: st.SearchStrategy[Value] = {
+    return {
         "variable": st.sampled_from(names),
         "import": st.just("selfdrive.sim.effects.Rain"),
         "number": NUMBERS,
         "integer": st.integers(0, 63),
         "boolean": st.booleans(),
+        "constant": NUMBERS | st.booleans() | st.none() | st.text(),
         "seed": st.integers(0, 2**53),
     }[param.type]
-    return found | st.none() if param.optional else found
 
 
 def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, str]:

@@ -129,40 +129,40 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
     kind = type(err)
     if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
         return {"ended": "steps"}
+    message = text(err.code if isinstance(err, SystemExit) else err)[:_LONGEST]
+    errors = origins(err)
+    error = {"kind": kind.__name__, "message": message, "stacks": [passed(one, tree) for one in errors]}
+    return {"ended": "error", "error": error, "disk_full": any(map(of_full_disk, errors))}
+
+
+def text(thing: object) -> str:
+    """What it is as a text; classes of the target may fail to say so."""
     try:
-        message = str(err.code if isinstance(err, SystemExit) else err)[:_LONGEST]
+        return str(thing)
     except Exception as why:
-        message = f"its text cannot be told ({type(why).__name__})"
-    error = {"kind": kind.__name__, "message": message, "stacks": stacks(err, tree)}
-    return {"ended": "error", "error": error, "disk_full": of_full_disk(err)}
+        return f"its text cannot be told ({type(why).__name__})"
 
 
-def of_full_disk(err: BaseException | None) -> bool:
-    """Whether an error came of a full disk or quota, be it in the words of a library."""
-    while err is not None:
-        if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
-            return True
-        err = err.__cause__ or err.__context__
-    return False
+def of_full_disk(err: BaseException) -> bool:
+    """Whether an error tells of a full disk or quota, be it in the words of a library."""
+    return getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in text(err) for n in _NO_SPACE)
 
 
-def stacks(err: BaseException, tree: str) -> list[list[tuple[str, int]]]:
-    """Where the exception passed the tree, each (file, line) once, innermost first; then the same of those
-    that it came of or that are in it."""
-    found: list[list[tuple[str, int]]] = []
-    known: dict[int, BaseException] = {}
+def origins(err: BaseException) -> list[BaseException]:
+    """The exception, then those that it came of or that are in it, each once."""
+    found: dict[int, BaseException] = {}
     todo: list[BaseException | None] = [err]
     while todo and len(found) < _MOST_ERRORS:
         one = todo.pop()
-        if one is not None and id(one) not in known:
-            known[id(one)] = one
-            found.append(passed(one, tree))
+        if one is not None and id(one) not in found:
+            found[id(one)] = one
             inner = one.exceptions if isinstance(one, BaseExceptionGroup) else ()
             todo += [*inner, one.__context__, one.__cause__]
-    return found
+    return list(found.values())
 
 
 def passed(err: BaseException, tree: str) -> list[tuple[str, int]]:
+    """Where the exception passed the tree, each (file, line) once, innermost first."""
     places = []
     trace = err.__traceback__
     while trace is not None:

@@ -92,7 +92,8 @@ def test_a_name_from_outside(function: str, target: str, line: int, said: str) -
 )
 def test_a_name_that_may_be_set(function: str, anchor: Anchor | None, target: str) -> None:
     """Variables of the function, attributes, and names that it declares global or nonlocal are set."""
-    assert f"{target} = 1.0  # fi:ab12\n" in injected(MODELS, function, anchor, target=target)
+    line = f"{target} = _fi.like({target}, 1.0)  # fi:ab12\n"
+    assert line in injected(MODELS, function, anchor, target=target)
 
 
 @pytest.fixture

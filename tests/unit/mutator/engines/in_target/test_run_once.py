@@ -1,6 +1,8 @@
 """What the process of a run tells of its modules, of how it ended, and of its probe."""
 
 import errno
+import os
+import shutil
 import sys
 import types
 from collections.abc import Callable
@@ -123,10 +125,33 @@ def test_the_limit_of_steps_is_no_error(described: Callable[..., dict[str, Any]]
     assert described("stop") == {"ended": "steps"}
 
 
-def test_a_full_disk_is_told() -> None:
-    """An error for want of room says so."""
-    assert describe(OSError(errno.ENOSPC, "full"), TREE, None)["disk_full"]
-    assert not describe(OSError(errno.EACCES, "no"), TREE, None)["disk_full"]
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize(
+    ("error", "is_told"),
+    [
+        (OSError(errno.ENOSPC, "full"), True),
+        (shutil.Error([("from", "to", str(FULL))]), True),
+        (OSError(errno.EACCES, "no"), False),
+    ],
+)
+def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
+    """An error for want of room says so, in whatever words; also as one that others came of, even if these
+    came of each other."""
+    assert describe(error, TREE, None)["disk_full"] is is_told
+    later = ValueError("later")
+    later.__cause__ = KeyError("x")
+    later.__cause__.__cause__ = later
+    assert not describe(later, TREE, None)["disk_full"]
+    later.__cause__.__context__ = error
+    assert describe(later, TREE, None)["disk_full"] is is_told
+
+
+def test_a_full_disk_in_a_group_is_told(described: Callable[..., dict[str, Any]]) -> None:
+    """A group of exceptions tells of a full disk if one of them does; one without a text tells of none."""
+    assert described("several")["disk_full"]
+    assert not described("unspeakable")["disk_full"]
 
 
 def test_the_first_activation_is_noted(tmp_path: Path) -> None:
