@@ -14,6 +14,7 @@ from typing import Any
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
 
 
 class DiskFull(MutatorError):
@@ -29,6 +30,11 @@ def is_disk_full(err: BaseException | None) -> bool:
             return True
         err = err.__cause__ or err.__context__
     return False
+
+
+def is_no_file(err: OSError) -> bool:
+    """Whether there is no file in a place, but nothing, a folder, or a link that leads nowhere."""
+    return err.errno in _NO_FILE
 
 
 def disk_full(where: str | Path | None) -> DiskFull:
@@ -119,8 +125,11 @@ def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object of `schema` (`name/version`) or an older version of it."""
     try:
         data = json.loads(path.read_bytes())
-    except FileNotFoundError:
-        raise MutatorError("no such file", where=path) from None
+    except OSError as err:
+        if not is_no_file(err):
+            raise
+        got = "no such file" if isinstance(err, FileNotFoundError) else f"no file ({err.strerror})"
+        raise MutatorError(got, where=path) from None
     except (ValueError, RecursionError) as err:
         raise MutatorError(f"not JSON ({err})", where=path, remedy="delete it if it is damaged") from None
     if not isinstance(data, dict):

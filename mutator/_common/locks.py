@@ -3,7 +3,6 @@
 Locks are flocks: the kernel drops them when their process dies, however it dies.
 """
 
-import errno
 import fcntl
 import os
 import time
@@ -11,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mutator._common.files import raising_disk_full
+from mutator._common.files import is_no_file, raising_disk_full
 from mutator.errors import MutatorError
 
 OWNER = "owner.lock"
@@ -93,7 +92,7 @@ def _opened(path: Path, more: int = 0) -> int:
     try:
         return os.open(path, os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
     except OSError as err:
-        if err.errno not in (errno.EISDIR, errno.ELOOP):
+        if isinstance(err, FileNotFoundError) or not is_no_file(err):
             raise
         raise MutatorError(
             f"no file ({err.strerror})",

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic, write_json
+from mutator._common.files import is_no_file, json_bytes, raising_disk_full, read_json, write_atomic, write_json
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.store.lines import read_segment
@@ -42,7 +42,9 @@ class Digest:
                     sha256=hashlib.file_digest(file, "sha256").hexdigest(),
                     size=os.fstat(file.fileno()).st_size,
                 )
-        except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+        except OSError as err:
+            if not is_no_file(err):
+                raise
             return None
 
     def is_of(self, found: "Digest | None") -> bool:

@@ -122,7 +122,11 @@ def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
     """Damaged lines of segments that are still appended to, or that a killed command left."""
     for name in digests.segments(run):
         if name not in ledger.files:
-            segment = read_segment(run / name)
+            try:
+                segment = read_segment(run / name)
+            except MutatorError as err:
+                yield err
+                continue
             yield from map(segment.problem, segment.damaged)
 
 
@@ -144,7 +148,11 @@ def id_problems(
     for kind in digests.SEGMENTS:
         done: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
-            segment = read_segment(path, checksums=ledger is not None)
+            try:
+                segment = read_segment(path, checksums=ledger is not None)
+            except MutatorError as err:
+                yield err
+                continue
             yield from _head_problem(segment, head["plan"])
             yield from _id_problems(segment, planned, done)
         missing = [name for name in planned if name not in done]

@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import check_schema, raising_disk_full
+from mutator._common.files import check_schema, is_no_file, raising_disk_full
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
@@ -141,8 +141,9 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     """Verify the lines of a file; `data` are its bytes, if they were read already.
 
     Without `checksums` (a run folder of before there were any) every whole line counts as written.
+    MutatorError where there is no file.
     """
-    data = path.read_bytes() if data is None else data
+    data = _read(path) if data is None else data
     end = data.rfind(b"\n") + 1
     lines: dict[int, bytes] = {}
     damaged: list[int] = []
@@ -154,6 +155,20 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
             damaged.append(number)
         last = line[_SUM]
     return Segment(path=path, checksums=checksums, lines=lines, damaged=tuple(damaged), end=end)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as err:
+        if not is_no_file(err):
+            raise
+        raise MutatorError(
+            f"no file ({err.strerror})",
+            where=path,
+            expected="lines",
+            remedy="take it from a copy of the run folder, or delete it: `mutator verify` then says what is lost",
+        ) from None
 
 
 def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:

@@ -39,7 +39,7 @@ class Recorded:
 def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
     """The records of one kind that can be read, harness errors left out."""
     found = []
-    for path in sorted((folder.path / kind).glob("*.jsonl")):
+    for path in sorted(path for path in (folder.path / kind).glob("*.jsonl") if path.is_file()):
         segment = read_segment(path, checksums=folder.verifiable)
         for number in segment.lines:
             try:

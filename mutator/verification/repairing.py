@@ -4,6 +4,7 @@ Of a segment the intact lines stay. What nothing can make again (run.json, campa
 it is: only a copy of the folder has it.
 """
 
+import os
 import shutil
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -103,7 +104,11 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
     for kind, schema in SCHEMAS.items():
         done: set[str] = set()
         for path in sorted({*(run / kind).glob("*.jsonl")} - strangers):
-            name, data = path.relative_to(run).as_posix(), path.read_bytes()
+            name = path.relative_to(run).as_posix()
+            if not path.is_file():
+                yield name, None, f"{name} put aside: it is no file"
+                continue
+            data = path.read_bytes()
             segment, known = read_segment(path, data), ledger.files.get(name)
             dropped = lost if kind == "records" else ()
             kept = list(_kept(_trusted(segment, known, data), planned, dropped, done))
@@ -113,7 +118,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
                 said = f"{name}: {counted(gone, 'line')} put aside, {len(kept)} kept"
                 yield name, written(path, head, kept), said
     for name, known in ledger.files.items():
-        if known.lines is not None and not (run / name).is_file():
+        if known.lines is not None and not os.path.lexists(run / name):
             yield name, None, f"{name} is gone"
 
 
@@ -155,16 +160,19 @@ def _kept(
 
 
 def _put_aside(run: Path, name: str) -> None:
-    """Copy a file to where it harms nobody, under a name that is free."""
-    if not (run / name).is_file():
+    """Copy a file to where it harms nobody, under a name that is free; move what is no file."""
+    if not os.path.lexists(run / name):
         return
     place = run / ASIDE / name
     make_folder(place.parent)
     number = 1
-    while place.exists():
+    while os.path.lexists(place):
         number += 1
         place = (run / ASIDE / name).with_name(f"{Path(name).name}.{number}")
-    shutil.copy2(run / name, place)
+    if (run / name).is_file():
+        shutil.copy2(run / name, place)
+    else:
+        (run / name).rename(place)
 
 
 def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:

@@ -152,7 +152,7 @@ def api(place: Place) -> Told:
         told = [found.results.to_csv(), found.endings, found.seal, found.experiment(place.experiment).patch]
         return Told(code=0, said="", result=[*told, str(found.counts()), sorted(found.records)])
     except MutatorError as err:
-        return Told(code=err.exit_code, said=f"{err}\nto do: {err.remedy}" if err.remedy else str(err))
+        return Told(code=err.exit_code, said=f"{err}\nto do: {err.remedy or err.expected}")
 
 
 READERS: dict[str, Reader] = {

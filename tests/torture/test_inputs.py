@@ -25,7 +25,6 @@ LONGEST_S = 60  # on a busy machine
 VERBS: dict[str, tuple[str, ...]] = {
     "check": ("check",),
     "list": ("list",),
-    "stpa": ("stpa",),
     "plan small": ("plan", "small", "--out", "planned"),
     "plan toy": ("plan", "toy", "--out", "planned"),
     "diff": ("diff", "sensor/distance"),
