@@ -12,7 +12,14 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import is_no_file, json_bytes, raising_disk_full, read_json, write_atomic, write_json
+from mutator._common.files import (
+    is_no_file,
+    json_bytes,
+    raising_disk_full,
+    read_json,
+    write_atomic,
+    write_json,
+)
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.store.lines import read_segment

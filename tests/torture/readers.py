@@ -17,7 +17,9 @@ from mutator.errors import MutatorError
 
 from .damages import contents
 
-AUDITED = re.compile(r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/")
+AUDITED = re.compile(
+    r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/"
+)
 TABLES = ("results.csv", "results.parquet", "timings.parquet")  # verified if they are there
 HOW = re.compile(r"^## How the experiments were run$.*?^(?=## )", re.MULTILINE | re.DOTALL)  # of a report
 
@@ -160,4 +162,3 @@ READERS: dict[str, Reader] = {
     **{one.__name__: one for one in (rerun, verify, api)},
     **{f"export {format}": _export(format) for format in mutator.Format},
 }
-

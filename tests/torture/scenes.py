@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +23,6 @@ from .tally import Case
 from .worlds import judged
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP)
-VICTIMS = ("command", "group", "worker", "mutant or fork server")
 KILLS = 2  # of one command, at most
 
 
@@ -60,7 +60,9 @@ class Scene:
     def _is_done(self, command: Command) -> bool:
         """Whether it needs no other; nor does a merge that was killed when all was written: it would refuse
         to write over a run."""
-        return command.process.returncode == 0 or (self.name == "merge" and (self.at / "run/run.json").exists())
+        return command.process.returncode == 0 or (
+            self.name == "merge" and (self.at / "run/run.json").exists()
+        )
 
     def undisturbed(self) -> tuple[Told, float]:
         """What the command comes to when nobody kills it, and how long that takes, in s."""
@@ -107,14 +109,22 @@ def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
         words = (*SMALL, "--engine", "reference", "--shard", f"{number}/2")
         done("run", *words, "--out", homes / "shards" / f"shard{number}")
     shards = (at / "shard1", at / "shard2")
-    yield scene(name="merge", words=("merge", *shards, "--out", place.run), told=lambda: _merged(place), home=homes / "shards")
+    yield scene(
+        name="merge",
+        words=("merge", *shards, "--out", place.run),
+        told=lambda: _merged(place),
+        home=homes / "shards",
+    )
 
 
 def _damaged(home: Path) -> Path:
     """A line of the records lost, a golden run and a patch changed."""
     records = next((home / "run" / "records").iterdir())
     records.write_bytes(records.read_bytes()[:-1] + b"x\n")
-    for path in (next((home / "run" / "golden").rglob("*.npz")), next((home / "run" / "patches").rglob("*.patch"))):
+    for path in (
+        next((home / "run" / "golden").rglob("*.npz")),
+        next((home / "run" / "patches").rglob("*.patch")),
+    ):
         path.write_bytes(path.read_bytes()[:-1])
     return home
 
@@ -132,28 +142,29 @@ def _merged(place: Place) -> Told:
 
 
 def struck(command: Command, chance: Chance, longest_s: float) -> tuple[str, signal.Signals] | None:
-    """Send a signal to a process of a command, or to all, at some moment of the time that it takes; to which,
-    and which signal. None if the command ended before."""
-    number, victim = chance.choice(SIGNALS), chance.choice(VICTIMS)
-    try:
+    """Send a signal to a process of a command, or to all of them, at some moment of the time that it takes; to
+    which, and which signal. None if there was none any more."""
+    number, victim = chance.choice(SIGNALS), chance.choice(sorted(VICTIMS))
+    with suppress(subprocess.TimeoutExpired):
         command.process.wait(chance.uniform(0.0, longest_s))
-        return None
-    except subprocess.TimeoutExpired:
-        pass
-    workers = command.workers() if victim in VICTIMS[2:] else []
-    others = [pid for pid, _ in command.others() if pid not in workers] if victim == VICTIMS[3] else []
-    if victims := {"worker": workers, VICTIMS[3]: others}.get(victim, []):
-        _kill(chance.choice(victims), number)
-    elif victim == "group":
-        os.killpg(command.process.pid, number)
-    else:
-        victim = "command"
-        _kill(command.process.pid, number)
-    return victim, number
+    while command.process.poll() is None:
+        with suppress(ProcessLookupError):  # it has just ended by itself
+            if pids := VICTIMS[victim](command):
+                os.kill(chance.choice(pids), number)
+                return victim, number
+        time.sleep(0.02)
+    return None
 
 
-def _kill(pid: int, number: signal.Signals) -> None:
-    try:
-        os.kill(pid, number)
-    except ProcessLookupError:  # it has just ended by itself
-        return
+def _mutants(command: Command) -> list[int]:
+    """The mutants that are driven, fork servers, and whatever else it started but for its workers."""
+    workers = command.workers()
+    return [pid for pid, _ in command.others() if pid not in workers]
+
+
+VICTIMS: dict[str, Callable[[Command], list[int]]] = {
+    "command": lambda command: [command.process.pid],
+    "group": lambda command: [-command.process.pid],
+    "worker": Command.workers,
+    "mutant or fork server": _mutants,
+}

@@ -50,9 +50,7 @@ class Tally:
     def wrong(self) -> list[str]:
         """A line for each wrong end, with the seed that repeats it."""
         return [
-            f"--seed {seed}: {case.kind}: {case.story}"
-            for seed, case in self.cases
-            if case.end is End.WRONG
+            f"--seed {seed}: {case.kind}: {case.story}" for seed, case in self.cases if case.end is End.WRONG
         ]
 
     def __str__(self) -> str:
