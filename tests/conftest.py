@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.campaigns.provenance import add_stretch
 from mutator.model import (
     Activation,
     Anchor,
@@ -31,6 +32,7 @@ from mutator.store.digests import Digest
 from mutator.store.lines import LineWriter, read_segment
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
@@ -214,6 +216,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)
                 (out / name).write_bytes(data)
+        add_stretch(folder, Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux"))
         digests.close_segments(out, finished=True)
         return out
 

@@ -14,6 +14,7 @@ from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.store.run_folder import RunFolder
+from mutator.store.stretches import package_versions, told
 from mutator.verification.audit import Check, audit_checks
 from mutator.verification.repairing import repair as put_aside
 from mutator.verification.seal import seal_of
@@ -144,14 +145,14 @@ def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
 def _facts(folder: RunFolder) -> dict[str, str]:
     """What is audited, and what it was made with."""
     head: Any = folder.head
-    made = head["provenance"]
-    packages = made["packages"]
+    packages = package_versions(folder.stretches)
     return {
         "run": folder.path.name,
         "campaign": f"{head['campaign']} of {head['target']}, {head['reading']}, seed {head['seed']}",
         "experiments": f"{folder.planned}{f' of shard {folder.shard}' if folder.shard else ''}",
         "plan": head["plan"],
         **{f"digest of {name}": value for name, value in head["sources"].items()},
-        "made with": f"mutator {made['mutator']}, Python {made['python']}, {made['machine']}",
-        "packages": f"{len(packages)}, with digest {digest(packages)}",
+        "mutator": head["provenance"]["mutator"],
+        **told(folder.stretches),
+        **({"packages": f"{len(packages)}, with digest {digest(packages)}"} if packages else {}),
     }

@@ -150,6 +150,18 @@ def row_of(experiment: Experiment, record: Record, hazards: "Sequence[str]") -> 
     return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
 
 
+def same_parquet(path: Path, made: bytes) -> bool:
+    """Whether the Parquet file at `path` has the rows of one that was made now, maybe by another version of
+    pyarrow."""
+    import pyarrow as pa  # type: ignore[import-untyped]
+    from pyarrow import parquet
+
+    try:
+        return bool(parquet.read_table(path).equals(parquet.read_table(io.BytesIO(made))))
+    except (pa.ArrowException, OSError):
+        return False
+
+
 def _units(frame: "pd.DataFrame") -> dict[str, str]:
     """The unit of each column of numbers; `unit` names that of `value`, row by row."""
     numbers = frame.select_dtypes("number").columns

@@ -41,7 +41,7 @@ def film_experiment(
     Says whether the new record equals the campaign's (true if there is none yet). MutatorError for a target
     that cannot be filmed, a faulty run that left no film, and with what the target's command complains of.
     """
-    with TemporaryDirectory(prefix="film-", dir=run) as name:
+    with TemporaryDirectory(prefix="mutator-film-") as name:
         folder = Path(name).resolve()
         single, same = rerun(workspace, run, experiment_id, out=folder, film=True)
         if not (single.faulty / FILM).is_dir():

@@ -14,7 +14,11 @@ DIR/
   timings/<session>-<worker>.jsonl               CPU and wall time, host: what may differ between runs
   proof/<session>-<worker>.jsonl                 records of the sample run again on the reference engine
   traces/<experiment>/                           on request (`rerun --trace`)
+  plots/                                         plots, stills and films of experiments (`show`)
   results.csv, results.parquet, timings.parquet  derived; can be made again at any time
+  results.json          digests of these tables and of what they were made from
+  report/, exports/     derived, too (`report`, `compare`, `export`)
+  damaged/              what a repair put aside (`verify --repair`)
   owner.lock, workers/                           held by the running command and by its workers
   work/                                          scratch of running experiments
 """

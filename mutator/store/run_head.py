@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 from mutator._common.files import read_json
@@ -13,7 +14,19 @@ SCHEMA = "run/2"
 HEAD, CAMPAIGN = "run.json", "campaign.yaml"
 _REMEDY = "the run folder is damaged: take the file from a copy of it"
 _TEXTS = {str: str}
-# What keys hold: a type, or several; `[x]` a list of x; `{str: x}` names with x.
+# What keys hold: a type, or several; `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`;
+# `(x, y)` one of them.
+_STRETCH = {
+    "python": str,
+    "packages": _TEXTS,
+    "platform": str,
+    "cpu": str | None,
+    "blas": [dict.fromkeys(("library", "version", "kernel"), str | None) | {"threads": int | None}],
+    "threads": _TEXTS,
+    "git": ({str: {"commit": str, "changed": bool}}, NoneType),
+    "records": str,
+    "accepted": [str],
+}
 _SHAPES: dict[str, Any] = {
     "plan": str,
     "campaign": str,
@@ -33,8 +46,8 @@ _SHAPES: dict[str, Any] = {
     "canary_hazard": str,
     "sources": _TEXTS,
     "target_files": _TEXTS,
-    "provenance": {str: str | dict},
-    "stretches": [{str: object}],
+    "provenance": {str: (str, _TEXTS)},
+    "stretches": [_STRETCH],
     "chunks": [[int]],
 }
 _SIZES = {"goldens": 2, "chunks": 3}  # of each item
@@ -72,8 +85,14 @@ def _wrong(head: Head) -> Iterator[str]:
 
 
 def _fits(value: object, shape: Any) -> bool:
+    if isinstance(shape, tuple):
+        return any(_fits(value, one) for one in shape)
     if isinstance(shape, list):
         return isinstance(value, list) and all(_fits(item, shape[0]) for item in value)
     if isinstance(shape, dict):
-        return isinstance(value, dict) and all(_fits(item, shape[str]) for item in value.values())
+        if not isinstance(value, dict):
+            return False
+        if str in shape:
+            return all(_fits(item, shape[str]) for item in value.values())
+        return all(key in value and _fits(value[key], wanted) for key, wanted in shape.items())
     return isinstance(value, shape)

@@ -5,10 +5,10 @@ proof, tables. Each step lists every difference that it finds.
 """
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from mutator._common.files import read_json
-from mutator._common.hashing import digest
+from mutator._common.hashing import digest, plain
 from mutator.campaigns.plans import CSV, load_plan, plan_csv, plan_digest
 from mutator.campaigns.provenance import sources
 from mutator.errors import MutatorError
@@ -113,7 +113,7 @@ def _plan(folder: RunFolder) -> Problems:
         "campaign": campaign.name,
         "campaign_digest": digest(campaign.source),
         "target": campaign.target,
-        "limits": asdict(campaign.limits),
+        "limits": plain(campaign.limits),
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
         "canary_hazard": campaign.canary.hazard,
     }

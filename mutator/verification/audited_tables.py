@@ -1,12 +1,12 @@
 """Do the tables that are stored follow from plan, records and timings? They are made again to be compared."""
 
-import io
 from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 
 from mutator.errors import MutatorError
 from mutator.outcomes import results
+from mutator.outcomes.reader import same_parquet
 from mutator.store.run_folder import RunFolder
 
 _REMEDY = "`mutator report` makes it anew"
@@ -27,7 +27,7 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
         path = folder.path / name
         if name == results.CSV:
             yield from _cells(path, made[name])
-        elif not _same_content(path, made[name]):
+        elif not same_parquet(path, made[name]):
             yield MutatorError("not what the records give", where=path, remedy=_REMEDY)
 
 
@@ -43,14 +43,3 @@ def _cells(path: Path, made: bytes) -> Iterator[MutatorError]:
         else:
             continue
         yield MutatorError(told[0], where=path, line=number, expected=told[1], remedy=_REMEDY)
-
-
-def _same_content(path: Path, made: bytes) -> bool:
-    """Whether a Parquet file has the rows of one that was made now, maybe by another version of pyarrow."""
-    import pyarrow as pa  # type: ignore[import-untyped]
-    from pyarrow import parquet
-
-    try:
-        return bool(parquet.read_table(path).equals(parquet.read_table(io.BytesIO(made))))
-    except (pa.ArrowException, OSError):
-        return False

@@ -15,7 +15,11 @@ from typing import Any
 
 import pytest
 
+from mutator.review import gate
+from mutator.store.run_folder import CONTENT
+
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Reseal = Callable[..., None]  # computes every checksum and digest of a run folder anew
 
 TESTS = Path(__file__).parents[1]
 CHOSEN = ["--only", 'fault_type != "distance"']  # some of them always do harm, whatever their ids
@@ -200,7 +204,7 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
     assert "report/REPORT.md" in answer.out
 
 
-def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path) -> None:
+def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
     """It is written, with what failed on top, and the command ends with 1 and names the experiment."""
     run = Path(shutil.copytree(run, tmp_path / "run"))
     shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
@@ -208,6 +212,7 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
     head, first, *rest = path.read_text().splitlines()
     wrong = json.loads(first) | {"trace_digest": "0" * 64}
     path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
+    reseal(run)
     answer = cli("report", run)
     assert answer.code == 1
     assert f"experiment {wrong['experiment_id']} is another one" in answer.err
@@ -301,7 +306,7 @@ def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
     assert Path(answer["plot"]).is_file()
 
 
-def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path) -> None:
+def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
     """A record that the run does not reproduce is a failed check."""
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
@@ -312,6 +317,7 @@ def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path) -> None:
             if line.get("experiment_id") == name:
                 line["t_manifest"] += 1.0
         file.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    reseal(copy)
     answer = cli("rerun", name, "--run", copy)
     assert answer.code == 1
     assert "DIFFERS" in answer.out
@@ -329,6 +335,9 @@ def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
     assert Path("mine").exists()
 
 
+KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
+
+
 def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
     """After every command that writes into a run folder, `clean` deletes it; through a link it does not."""
     copy, other = tmp_path / "copy", tmp_path / "other"
@@ -338,13 +347,18 @@ def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) 
     for words in (
         ["show", name, "--run", copy],
         ["rerun", name, "--run", copy, "--trace"],
-        ["show", name, "--run", copy, "--still", "2.0"],
+        ["show", name, "--run", copy, "--still", "2.0", "--video", copy / "plots" / f"{name}.mp4"],
         *(["export", copy, "--format", f] for f in ("mutation-elements", "junit", "csv", "parquet")),
         ["compare", other, copy],
-        ["report", copy],
     ):
         assert cli(*words).code == 0, words
-    assert {path.name for path in copy.iterdir()} >= {"traces", "plots", "exports", "report"}
+    gate.write_approvals(copy, {"schema": gate.SCHEMA, "target": "toycar", "groups": []})
+    for file in (next((copy / "records").iterdir()), next((copy / "patches").rglob("*.patch"))):
+        file.write_bytes(file.read_bytes()[:-9])
+    assert cli("verify", copy, "--repair").code == 1
+    resumed = cli("run", "toy", "--out", copy, *CHOSEN, "--engine", "fork")  # so that there is a proof
+    assert resumed.code == 0, resumed.err
+    assert {path.name for path in copy.iterdir()} == KNOWN - {"workers", "work"}
     link = tmp_path / "link"
     link.symlink_to(copy)
     refused = cli("clean", link, "--yes")

@@ -186,7 +186,7 @@ def test_the_readme_shows_the_table_of_the_tutorial() -> None:
     """README and tutorial run the same campaign, so they show the same numbers."""
     [table] = TABLE.findall(README.read_text(encoding="utf-8"))
     [shown] = [said for command, said in sessions(TUTORIAL) if command.startswith(CAMPAIGN)]
-    assert table.splitlines()[:-1] == shown[:-1]  # the last line is the report's path
+    assert table.replace("runs/quickstart", "runs/first").splitlines() == shown
 
 
 def anchors(page: Path) -> set[str]:

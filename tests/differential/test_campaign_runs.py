@@ -8,12 +8,16 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import mutator
+from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
+from mutator.store import digests
 from mutator.workspace import Workspace
 
 from .command import DERIVED, Bytes, Command, pytest_words, results
@@ -87,12 +91,24 @@ def test_one_by_one(
     assert results(tmp_path / "run") == undisturbed
 
 
-def test_lost_records_run_again(toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes) -> None:
-    """Lines lost at the end of a records file are run again, and no others."""
+@pytest.mark.parametrize("closed", [False, True], ids=["by a killed session", "of a finished run"])
+def test_lost_records_run_again(
+    toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes, closed: bool
+) -> None:
+    """Lines lost at the end of a records file are run again, and no others. Of a file that a session has
+    closed nothing gets lost by a kill: it is refused until it was repaired."""
     out = shutil.copytree(whole, tmp_path / "run")
     [path] = (out / "records").iterdir()
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-3]) + lines[-3][:25])
+    if closed:
+        with pytest.raises(MutatorError, match="10 lines, all with their checksums; expected 13 lines"):
+            run_campaign(toy, "small", out)
+        assert mutator.verify(out, repair=True, workspace=toy).repaired
+    else:
+        known = digests.read(out)
+        files = {name: one for name, one in known.files.items() if not name.startswith("records/")}
+        digests.write(out, replace(known, files=files, finished=False))
     summary = run_campaign(toy, "small", out)
     assert (summary.exit_code, summary.ran) == (0, 3)
     assert results(out) == undisturbed

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.campaigns.plans import Choices, Plan, freeze, make_plan
 from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.review import gate
@@ -26,12 +26,13 @@ def decide(toy: Workspace, plan: Plan, verdict: Verdict = Verdict.APPROVED, coun
 
 def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
     """The run folder keeps who approved what, and a report can say so."""
-    assert gate.approval_summary(tmp_path) == ""
+    run = freeze(plan, tmp_path / "run", toycar).path
+    assert gate.approval_summary(run) == ""
     decide(toycar, plan)
     decide(toycar, plan, count=1)
-    gate.write_approvals(tmp_path, gate.approvals(toycar, plan))
+    gate.write_approvals(run, gate.approvals(toycar, plan))
     total = len(of_plan(toycar, plan))
-    assert gate.approval_summary(tmp_path) == (
+    assert gate.approval_summary(run) == (
         f"all of {total} groups approved, by Reviewer 1 (1), Reviewer None ({total - 1})"
     )
 

@@ -1,6 +1,7 @@
 """Cleaning: what a run wrote is deleted, and nothing else."""
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,10 @@ import pytest
 from mutator.campaigns.plans import freeze, make_plan
 from mutator.errors import MutatorError
 from mutator.store.cleaning import clean
+from mutator.store.run_folder import CONTENT
 from mutator.workspace import Workspace
+
+PAGE = Path(__file__).parents[4] / "docs" / "reference" / "run-folder.md"
 
 
 @pytest.fixture
@@ -86,6 +90,14 @@ def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="no run folder"):
         clean(tmp_path)
     assert contents(tmp_path) == {tmp_path / "thesis.tex"}
+
+
+def test_the_reference_lists_what_may_be_in_it() -> None:
+    """The page about run folders and the names that cleaning knows are the same, folder by folder."""
+    [listed] = re.findall(r"^DIR/\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    names = {name for line in listed.splitlines() for name in re.split(r" {2,}", line.strip())[0].split(", ")}
+    inside = {name.partition("/")[0] for name in names if not name.startswith(".")}
+    assert inside == {pattern.partition("/")[0] for pattern in CONTENT}
 
 
 def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import json
 import random
 import shutil
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from mutator.store import digests, integrity, plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]
@@ -226,3 +228,20 @@ def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> 
     (run / "run.json").write_text(json.dumps(data))
     with pytest.raises(MutatorError, match=rf"run\.json: no '{key}'"):
         _ = RunFolder.unverified(run).head[key]
+
+
+@pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])
+def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
+    """An audit tells what a folder was driven with before anything is verified: of each stretch every key is
+    there and holds what it should."""
+    data = json.loads((run / "run.json").read_text())
+    [stretch] = data["stretches"]
+    for value in (3, [3], {"a": [None]}, [{"library": "openblas"}], {"mutator": {"commit": "abc"}}):
+        data["stretches"] = [stretch | {key: value}]
+        (run / "run.json").write_text(json.dumps(data))
+        with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
+            RunFolder.unverified(run)
+    data["stretches"] = [{name: value for name, value in stretch.items() if name != key}]
+    (run / "run.json").write_text(json.dumps(data))
+    with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
+        RunFolder.unverified(run)

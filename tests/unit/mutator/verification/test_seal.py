@@ -46,7 +46,8 @@ def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, rese
     (path.with_name("0007-gw9.jsonl")).write_text("\n".join([head, *reversed(lines[:12]), ""]))
     shutil.rmtree(run / "timings")
     data = json.loads((run / "run.json").read_text())
-    data["provenance"]["machine"] = "Linux on another one"
+    [stretch] = data["stretches"]
+    data["stretches"] = [stretch, stretch | {"platform": "Linux on another one", "cpu": "Cray 1"}]
     (run / "run.json").write_text(json.dumps(data))
     reseal(run)
     known = sealed(made)
@@ -81,7 +82,7 @@ CHANGES: dict[str, Callable[[Path], None]] = {
     "a source": lambda run: edit(run / "run.json", '"templates": "', '"templates": "0'),
     "the campaign": lambda run: edit(run / "run.json", '"campaign_digest": "', '"campaign_digest": "0'),
     "a package": lambda run: edit(run / "run.json", '"numpy": "', '"numpy": "0'),
-    "Python": lambda run: edit(run / "run.json", '"python": "3', '"python": "4'),
+    "Python": lambda run: edit(run / "run.json", '"python": "CPython 3', '"python": "CPython 4'),
 }
 
 
