@@ -126,7 +126,10 @@ def test_derived_files_can_be_made_again(
     assert results(out) == undisturbed
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda s: s.name)
+SIGTERM = pytest.param(signal.SIGTERM, marks=pytest.mark.slow)  # it is handled as SIGINT is
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, SIGTERM, signal.SIGINT], ids=lambda s: s.name)
 def test_killed_and_resumed(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
 ) -> None:

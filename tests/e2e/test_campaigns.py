@@ -301,7 +301,7 @@ os.write(1, (out / "results.csv").read_bytes())
 """
 
 
-@pytest.mark.parametrize("workers", [0, 2])
+@pytest.mark.parametrize("workers", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_a_full_disk(toy: Workspace, finished: Path, tmp_path: Path, workers: int) -> None:
     """A disk that fills up stops the campaign with clear words; with room again the same command completes it
     to the same table, repeating nothing that was finished."""

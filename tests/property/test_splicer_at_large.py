@@ -50,7 +50,7 @@ def test_generated_modules(count: int) -> None:
     figures = proved(((seed, ModuleWriter(seed).module()) for seed in range(count)), behaviour)
     assert not figures.wrong
     assert figures.modules["spliced"] > 0.8 * count
-    assert all(figures.anchors[kind] >= count for kind in KINDS)
+    assert all(figures.anchors[kind] > count / 2 for kind in KINDS)
 
 
 @pytest.mark.parametrize("share", [0.004, pytest.param(1.0, marks=pytest.mark.slow)])

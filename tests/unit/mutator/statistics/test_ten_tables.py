@@ -49,7 +49,11 @@ def campaign(seed: int) -> Campaign:
     return Campaign(by_hand.usable(made), {sheet.name: sheet for sheet in sheets})
 
 
-@pytest.fixture(params=range(10))
+# Three at each change, all in the slow tests.
+SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(10)]
+
+
+@pytest.fixture(params=SEEDS)
 def made(request: pytest.FixtureRequest) -> Campaign:
     return campaign(request.param)
 
@@ -69,6 +73,7 @@ def same(found: Sequence[object], expected: Sequence[object]) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_there_are_ten_campaigns_with_every_table() -> None:
     """Large and small ones, and all eleven tables of a report in each."""
     made = [campaign(seed) for seed in range(10)]
