@@ -173,11 +173,11 @@ class Workspace:
     def target_name(self, given: str | None = None) -> str:
         """The target that was named, or the library's only one; MutatorError if it has none or several."""
         names = tuple(self.targets)
-        if given is None and len(names) != 1:
-            known = ", ".join(names) or "none"
-            raise MutatorError(
-                f"{len(names)} targets in the library ({known})", argument="target", remedy="name one"
-            )
+        if given is None and not names:
+            raise MutatorError("no manifest of a target", where=self.library / "targets", remedy="write one")
+        if given is None and len(names) > 1:
+            known = f"{len(names)} targets in the library ({', '.join(names)})"
+            raise MutatorError(known, argument="target", remedy="name one")
         return given or names[0]
 
     @property

@@ -88,7 +88,7 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
 
 
 def _opened(path: Path, more: int = 0) -> int:
-    """The file there, open; MutatorError for a folder, and for a link, to whose end nothing may be written."""
+    """The file there, open; MutatorError for a folder, and for a link: nothing is written to its end."""
     try:
         return os.open(path, os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
     except OSError as err:

@@ -167,7 +167,7 @@ def _read(path: Path) -> bytes:
             f"no file ({err.strerror})",
             where=path,
             expected="lines",
-            remedy="take it from a copy of the run folder, or delete it: `mutator verify` then says what is lost",
+            remedy="take it from a copy of the run folder, or delete it: `mutator verify` tells what is lost",
         ) from None
 
 

@@ -1,6 +1,5 @@
-"""Files as no sane person writes them: what can become of the YAML, templates and sources that people write."""
+"""Files as nobody writes them: what can become of YAML, templates and sources that people write."""
 
-import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,56 +9,23 @@ from .damages import DAMAGES, STRANGE, Chance, changed
 
 Malform = Callable[[str, Chance], str]
 
+# fmt: off
 WILD: tuple[object, ...] = (
     *STRANGE,
-    *(1e308, -1e-320, 10**9, 10**18, float("inf"), "inf", "nan", "1e999", "0x10", "yes", "2024-01-01", "~"),
-    *("{{ 7 * 7 }}", "{% for i in range(10**9) %}{% endfor %}", "__import__('os').system('true')", "a.b.c"),
-    *("t >= 1 and " * 500 + "true", "(" * 400 + "t" + ")" * 400, "-" * 900 + "1", "9" * 5000, "x" * 200_000),
-    *(
-        "../../../etc/passwd",
-        "/etc/passwd",
-        "a/../..",
-        "**/*",
-        "[",
-        "*",
-        "?" * 300,
-        "\u202e",
-        "\ud7ff",
-        "\x1b[2J",
-    ),
-    *([[[[[]]]]], {"a": {"a": {"a": {}}}}, [1] * 5000, {str(i): i for i in range(2000)}),
-    *({"from": 0, "to": 1e9, "step": 1e-9}, {"from": 0, "to": 1, "step": 0}, [0, 1e300], "0..1e9"),
+    1e308, -1e-320, 10**9, 10**18, float("inf"), "inf", "nan", "1e999", "0x10", "yes", "2024-01-01", "~",
+    "{{ 7 * 7 }}", "{% for i in range(10**9) %}{% endfor %}", "__import__('os').system('true')", "a.b.c",
+    "t >= 1 and " * 500 + "true", "(" * 400 + "t" + ")" * 400, "-" * 900 + "1", "9" * 5000, "x" * 200_000,
+    "../../../etc/passwd", "/etc/passwd", "a/../..", "**/*", "[", "*", "?" * 300, "\u202e", "\ud7ff",
+    "\x1b[2J", [[[[[]]]]], {"a": {"a": {"a": {}}}}, [1] * 5000, {str(i): i for i in range(2000)},
+    {"from": 0, "to": 1e9, "step": 1e-9}, {"from": 0, "to": 1, "step": 0}, [0, 1e300], "0..1e9",
 )
 SHAPES = (
-    *(
-        "[" * 900,
-        "[" * 50_000 + "]" * 50_000,
-        "{a: " * 20_000,
-        "- " * 100_000,
-        "? " * 50_000,
-        "a: *a",
-        "&a [*a]",
-    ),
-    *(
-        "!!python/object/apply:os.system [true]",
-        "<<: {a: 1}",
-        "%YAML 9.9\n---\n",
-        "---\n" * 5000,
-        "\t",
-        "\r",
-        "\0",
-    ),
-    *(
-        "".join(" " * i + "a:\n" for i in range(900)),
-        "'",
-        '"',
-        "|\n",
-        "\ufeff",
-        "\x85",
-        "#" * 100_000,
-        "a:" * 50_000,
-    ),
+    "[" * 900, "[" * 50_000 + "]" * 50_000, "{a: " * 20_000, "- " * 100_000, "? " * 50_000, "a:" * 50_000,
+    "a: *a", "&a [*a]", "<<: {a: 1}", "!!python/object/apply:os.system [true]", "%YAML 9.9\n---\n",
+    "---\n" * 5000, "\t", "\r", "\0", "'", '"', "|\n", "\ufeff", "\x85", "#" * 100_000,
+    "".join(" " * i + "a:\n" for i in range(900)),
 )
+# fmt: on
 
 
 def change_a_value(text: str, chance: Chance) -> str:

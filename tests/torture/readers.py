@@ -157,6 +157,17 @@ def api(place: Place) -> Told:
         return Told(code=err.exit_code, said=f"{err}\nto do: {err.remedy or err.expected}")
 
 
+def rows(place: Place) -> Told:
+    """Rows of the results that the undamaged folder has not: none. Of a run that was killed some may be lost,
+    for the same command drives them again."""
+    told = api(place)
+    if told.code != 0:
+        return told
+    known = mutator.load_run(place.genuine).results.to_csv().splitlines()
+    found = mutator.load_run(place.run).results.to_csv().splitlines()
+    return Told(code=0, said=told.said, result=[row for row in found if row not in known])
+
+
 READERS: dict[str, Reader] = {
     **{one.__name__: one for one in (run, repair, report, compare, show, show_plot)},
     **{one.__name__: one for one in (rerun, verify, api)},

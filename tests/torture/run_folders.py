@@ -10,13 +10,13 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 from ..differential.command import Command
-from .readers import READERS, Place, api, cli, merge, repair, report, run, show, verify
+from .readers import READERS, Place, cli, merge, repair, rows, run, verify
 from .worlds import World
 
 SMALL = ("small", "--limit", "6")
 SHIPPED = ("paper_reference", "--limit", "4", "--only", 'scenario == "S1"')
 REFERENCE = ("--engine", "reference")
-UNFINISHED = {one.__name__: one for one in (run, repair, verify, api, report)}
+UNFINISHED = {one.__name__: one for one in (run, repair, verify, rows)}
 QUICK = ("api", "compare", "show", "verify", "export csv", "export mutation-elements", "run")
 
 

@@ -13,12 +13,13 @@ from functools import partial
 from pathlib import Path
 
 import mutator
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 from ..differential.command import Command
 from .damages import Chance
 from .readers import HOW, Place, Told, run
-from .run_folders import SMALL, done
+from .run_folders import REFERENCE, SMALL, done
 from .tally import Case
 from .worlds import judged
 
@@ -58,11 +59,10 @@ class Scene:
         ]
 
     def _is_done(self, command: Command) -> bool:
-        """Whether it needs no other; nor does a merge that was killed when all was written: it would refuse
-        to write over a run."""
-        return command.process.returncode == 0 or (
-            self.name == "merge" and (self.at / "run/run.json").exists()
-        )
+        """Whether it needs no other: also a merge that was killed when all was written, as the next one would
+        not write over a run."""
+        merged = self.name == "merge" and RunFolder.exists(self.at / "run")
+        return command.process.returncode == 0 or merged
 
     def undisturbed(self) -> tuple[Told, float]:
         """What the command comes to when nobody kills it, and how long that takes, in s."""
@@ -94,37 +94,29 @@ class Scene:
 
 def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
     """A run without and with its checks, a report, a repair of a damaged run, a merge."""
-    words, place = (*SMALL, "--engine", "fork"), Place(folder=at, campaign=(*SMALL, "--engine", "fork"))
-    scene = partial(Scene, workspace=workspace, at=at)
-    running = ("run", *words, "-n", "2", "--out", place.run)
-    yield scene(name="run", words=running, told=lambda: run(place))
-    yield scene(name="run with checks", words=running, told=lambda: run(place), fresh_cache=True)
-    done("run", *words, "--out", homes / "finished" / "run")
+    words, shards = (*SMALL, "--engine", "fork"), (at / "shard1", at / "shard2")
+    place, scene = Place(folder=at, campaign=words), partial(Scene, workspace=workspace, at=at)
+    running, again = ("run", *words, "-n", "2", "--out", place.run), partial(run, place)
+    yield scene(name="run", words=running, told=again)
+    yield scene(name="run with checks", words=running, told=again, fresh_cache=True)
     whole = homes / "finished"
-    yield scene(name="report", words=("report", place.run), told=lambda: _written(place), home=whole)
+    done("run", *words, "--out", whole / "run")
+    yield scene(name="report", words=("report", place.run), told=partial(_written, place), home=whole)
     damaged = _damaged(shutil.copytree(whole, homes / "damaged"))
-    repairing = ("verify", place.run, "--repair")
-    yield scene(name="repair", words=repairing, told=lambda: run(place), home=damaged)
-    for number in (1, 2):
-        words = (*SMALL, "--engine", "reference", "--shard", f"{number}/2")
-        done("run", *words, "--out", homes / "shards" / f"shard{number}")
-    shards = (at / "shard1", at / "shard2")
-    yield scene(
-        name="merge",
-        words=("merge", *shards, "--out", place.run),
-        told=lambda: _merged(place),
-        home=homes / "shards",
-    )
+    yield scene(name="repair", words=("verify", place.run, "--repair"), told=again, home=damaged)
+    for shard in shards:
+        part = f"{shard.name[-1]}/2"
+        done("run", *SMALL, *REFERENCE, "--shard", part, "--out", homes / "shards" / shard.name)
+    merging = ("merge", *shards, "--out", place.run)
+    yield scene(name="merge", words=merging, told=partial(_merged, place), home=homes / "shards")
 
 
 def _damaged(home: Path) -> Path:
-    """A line of the records lost, a golden run and a patch changed."""
-    records = next((home / "run" / "records").iterdir())
+    """The run in a folder, with a line of the records lost, a golden run and a patch changed."""
+    run = home / "run"
+    records = next((run / "records").iterdir())
     records.write_bytes(records.read_bytes()[:-1] + b"x\n")
-    for path in (
-        next((home / "run" / "golden").rglob("*.npz")),
-        next((home / "run" / "patches").rglob("*.patch")),
-    ):
+    for path in (next((run / "golden").rglob("*.npz")), next((run / "patches").rglob("*.patch"))):
         path.write_bytes(path.read_bytes()[:-1])
     return home
 
@@ -142,8 +134,8 @@ def _merged(place: Place) -> Told:
 
 
 def struck(command: Command, chance: Chance, longest_s: float) -> tuple[str, signal.Signals] | None:
-    """Send a signal to a process of a command, or to all of them, at some moment of the time that it takes; to
-    which, and which signal. None if there was none any more."""
+    """Send a signal to a process of a command, or to all of them, at some moment of the time that it takes.
+    Returns to which, and the signal; None if there was none any more."""
     number, victim = chance.choice(SIGNALS), chance.choice(sorted(VICTIMS))
     with suppress(subprocess.TimeoutExpired):
         command.process.wait(chance.uniform(0.0, longest_s))

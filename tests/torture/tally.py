@@ -31,7 +31,7 @@ class Case:
 
 @dataclass(slots=True)
 class Tally:
-    """The cases of one torture, and the seeds that they came of: each can be repeated alone, with `--seed`."""
+    """The cases of one torture, with their seeds: each can be repeated alone, with `--seed`."""
 
     title: str
     cases: list[tuple[int, Case]] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Whatever stands in a file that people write: it is read, or refused soon with an error that names a file."""
+"""Whatever stands in a file that people write is read, or refused soon with an error that names a file."""
 
 import json
 import random
@@ -19,6 +19,7 @@ from .worlds import LAST, judged, limited
 
 pytestmark = pytest.mark.slow
 
+HOSTILE = Path(__file__).parents[1] / "toy" / "templates"
 TRIES = 600
 SOON_S = 5.0  # of CPU beyond what a verb takes of files that are in order
 LONGEST_S = 60  # on a busy machine
@@ -58,13 +59,14 @@ class Inputs:
         kind, verb = chance.choice(sorted(files)), chance.choice(sorted(VERBS))
         path = chance.choice(files[kind])
         how = malform(path, chance)
+        names = [one.name for one in self.root.rglob("*.*")] + [path.name, "targets in the library"]
         try:
             told, cpu_s = self._told(verb)
         finally:
             shutil.rmtree(self.root)
             shutil.copytree(self.home, self.root, symlinks=True)
             shutil.rmtree("planned", ignore_errors=True)
-        end, why = judged(told, Told(code=0, said=""), (one.name for one in self.home.rglob("*.*")))
+        end, why = judged(told, Told(code=0, said=""), names)
         if cpu_s > SOON_S:
             end, why = End.WRONG, f"took {cpu_s:.1f} s"
         story = f"{how} of {path.name}, then {verb}: {why}\n{told.said[-LAST:]}"
@@ -97,6 +99,8 @@ def test_inputs(
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
     monkeypatch.chdir(tmp_path)
     shutil.rmtree(toy.library / "faults" / "hostile")
+    for template in HOSTILE.iterdir():
+        (toy.templates / template.name).unlink()
     (toy.library / "campaigns" / "hostile.yaml").unlink()
     approve()
     inputs = Inputs(root)

@@ -1,4 +1,4 @@
-"""Whoever kills whatever of a command, whenever: the same command, given again, comes to the same results, and
+"""Whatever of a command is killed, whenever: the same command, given again, comes to the same results, and
 nothing of the killed one lives on."""
 
 from collections.abc import Callable, Sequence

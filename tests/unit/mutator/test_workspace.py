@@ -142,3 +142,7 @@ def test_the_only_target_is_meant(toycar: Workspace) -> None:
     with pytest.raises(MutatorError, match=r"2 targets in the library \(other, toycar\)"):
         toycar.target_name()
     assert toycar.target_name("other") == "other"
+    for path in (toycar.library / "targets").iterdir():
+        path.unlink()
+    with pytest.raises(MutatorError, match=r"targets: no manifest of a target"):
+        Workspace(library=toycar.library, templates=toycar.templates).target_name()

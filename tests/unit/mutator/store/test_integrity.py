@@ -54,6 +54,18 @@ SEALED = (
 )
 
 
+@pytest.mark.parametrize("name", [name for name in SEALED if name != "run.json"])
+@pytest.mark.parametrize("what", ["folder", "loop"])
+def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
+    """A folder in the place of a file is told with its name, and so is a link to itself."""
+    (run / name).unlink()
+    if what == "folder":
+        (run / name).mkdir()
+    else:
+        (run / name).symlink_to(run / name)
+    assert problem(run).where == str(run / name)
+
+
 def test_what_is_sealed_is_all_of_it(run: Path) -> None:
     """The folder opens, and has no file that the tests below leave out."""
     folder = RunFolder.open(run)

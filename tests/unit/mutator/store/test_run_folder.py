@@ -100,6 +100,22 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
     process.communicate()
 
 
+@pytest.mark.parametrize("name", ["owner.lock", "workers/1"])
+def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
+    """A folder in the place of a lock is named, and so is a link, whose end is not written to."""
+    place = folder.path / name
+    place.unlink(missing_ok=True)
+    place.mkdir(parents=True)
+    with pytest.raises(MutatorError, match=rf"{name}: no file"):
+        locks.owned(folder.path).__enter__()
+    place.rmdir()
+    head = (folder.path / "run.json").read_bytes()
+    place.symlink_to(folder.path / "run.json")
+    with pytest.raises(MutatorError, match=rf"{name}: no file"):
+        locks.owned(folder.path).__enter__()
+    assert (folder.path / "run.json").read_bytes() == head
+
+
 def test_a_damaged_folder_is_told(folder: RunFolder) -> None:
     """A run folder whose plan is gone is answered in words."""
     (folder.path / "plan" / "experiments.jsonl").unlink()

@@ -44,6 +44,7 @@ def edit(path: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
 
 
 RECORDS = "records/0001-a.jsonl"
+NO_FILES = [RECORDS, "timings/0001-a.jsonl", "golden/A/said.json", "plan.csv", digests.FILE]
 LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
     "a changed line": (lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]], 1),
     "a dropped line": (lambda x: [*x[:3], *x[4:]], 2),  # the one after it cannot tell that it is sound
@@ -183,3 +184,18 @@ def test_repair_waits_for_nobody(run: Path) -> None:
     head.write_text(head.read_text().replace("run/2", "run/1"))
     with pytest.raises(MutatorError, match="run/1 has no checksums"):
         repair(RunFolder.unverified(run))
+
+
+@pytest.mark.parametrize("name", NO_FILES)
+@pytest.mark.parametrize("is_link", [False, True])
+def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> None:
+    """A folder in the place of a file is moved with what it holds, and so is a link that leads nowhere."""
+    (run / name).unlink()
+    if is_link:
+        (run / name).symlink_to(run / "nowhere")
+    else:
+        (run / name).mkdir()
+        (run / name / "thesis.tex").write_text("mine")
+    assert any(name in text for text in repaired(run)[0])
+    aside = run / "damaged" / name
+    assert aside.is_symlink() if is_link else (aside / "thesis.tex").read_text() == "mine"
