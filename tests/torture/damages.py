@@ -170,12 +170,14 @@ def contents(folder: Path) -> dict[str, bytes | str]:
     }
 
 
-def damage(folder: Path, names: Sequence[str], chance: Chance) -> tuple[str, list[str]]:
-    """Damage one of these files in a folder until it is damaged; how, and the names of all that is another
-    now."""
+def damage(
+    folder: Path, names: Sequence[str], chance: Chance, damages: Sequence[str]
+) -> tuple[str, list[str]]:
+    """Damage one of these files in a folder, in one of these ways, until it is damaged; how, and the names of
+    all that is another now."""
     before = contents(folder)
     while True:
-        name, how = chance.choice(names), chance.choice(sorted(DAMAGES))
+        name, how = chance.choice(names), chance.choice(damages)
         DAMAGES[how](folder / name, [folder / one for one in names if one != name], chance)
         after = contents(folder)
         if touched := sorted(one for one in before | after if before.get(one) != after.get(one)):

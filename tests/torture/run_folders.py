@@ -17,6 +17,7 @@ SMALL = ("small", "--limit", "6")
 SHIPPED = ("paper_reference", "--limit", "4", "--only", 'scenario == "S1"')
 REFERENCE = ("--engine", "reference")
 UNFINISHED = {one.__name__: one for one in (run, repair, verify, rows)}
+FORGERIES = ("change_a_digit", "change_json", "double_a_line", "drop_a_line", "swap_two_lines")
 QUICK = ("api", "compare", "show", "verify", "export csv", "export mutation-elements", "run")
 
 
@@ -30,6 +31,15 @@ def finished(home: Path, at: Path) -> World:
     done("compare", home / "run", home / "run")
     done("report", home / "run")
     return World(home=home, place=_place(home, at, words, name), readers=READERS)
+
+
+def forged(home: Path, at: Path) -> World:
+    """A run of the toy whose damages are those of somebody who computes all digests anew."""
+    words = (*SMALL, "--engine", "fork")
+    done("run", *words, "--out", home / "run")
+    shutil.rmtree(home / "run" / "report")
+    place = _place(home, at, words, hazardous(home / "run"))
+    return World(home=home, place=place, readers=READERS, damages=FORGERIES)
 
 
 def half(home: Path, at: Path) -> World:
@@ -61,7 +71,7 @@ def shipped(home: Path, at: Path) -> World:
 
 
 BUILDERS: dict[str, Callable[[Path, Path], World]] = {
-    one.__name__: one for one in (finished, half, shards, shipped)
+    one.__name__: one for one in (finished, forged, half, shards, shipped)
 }
 
 

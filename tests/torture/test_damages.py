@@ -2,6 +2,7 @@
 names the file and what to do. Never another result, never a traceback."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from .tally import Tally
 pytestmark = pytest.mark.slow
 
 CLONE = Path(__file__).parents[2]
-TRIES = {"finished": 600, "half": 200, "shards": 120, "shipped": 80}
+TRIES = {"finished": 500, "forged": 150, "half": 150, "shards": 120, "shipped": 80}
 
 
 @pytest.mark.parametrize("name", TRIES)
@@ -25,6 +26,7 @@ def test_damages(
     kept_checks: None,
     seeds: Callable[[int], Sequence[int]],
     print_tally: Callable[[Tally], None],
+    reseal: Callable[..., None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A damage, then a reader."""
@@ -32,6 +34,8 @@ def test_damages(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "home").mkdir()
     world = BUILDERS[name](tmp_path / "home", tmp_path / "case")
+    if name == "forged":
+        world = replace(world, reseal=reseal)
     tally = Tally(f"damages to run folders: {name}")
     tally.drive(seeds(TRIES[name]), world.cases)
     print_tally(tally)

@@ -4,15 +4,19 @@ import random
 import shutil
 import signal
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from types import FrameType
 
-from .damages import damage
-from .readers import Place, Reader, Told
+from mutator.errors import MutatorError
+from mutator.store.run_folder import RunFolder
+from mutator.verification.seal import seal_of
+
+from .damages import DAMAGES, damage
+from .readers import Place, Reader, Told, expect
 from .tally import Case, End
 
 LONGEST_S = 180  # of a case, on a busy machine
@@ -26,6 +30,8 @@ class World:
     home: Path
     place: Place
     readers: Mapping[str, Reader]
+    damages: Sequence[str] = tuple(sorted(DAMAGES))
+    reseal: Callable[[Path], None] | None = None  # computes all digests of a damaged folder anew
     right: dict[str, Told] = field(default_factory=dict)  # what readers tell of the undamaged folder
 
     def cases(self, seed: int) -> list[Case]:
@@ -36,12 +42,26 @@ class World:
         with self._copied():
             kinds = kinds_of(self.home)
             kind = chance.choice(sorted(kinds))
-            how, touched = damage(self.place.folder, kinds[kind], chance)
-            told = self._tell(reader)
-        named = touched if kind != "digests.json" else chain(*kinds.values())  # it speaks of all the others
+            how, touched = damage(self.place.folder, kinds[kind], chance, self.damages)
+            told = self._tell(reader) if self.reseal is None else self._resealed(reader)
+        # digests.json speaks of all the others, and where all digests fit, another file may be the odd one
+        at_large = kind == "digests.json" or self.reseal is not None
+        named = ["seal", *kinds, *chain(*kinds.values())] if at_large else touched
         end, why = judged(told, right, named)
         story = f"{how} of {', '.join(touched)}, then {reader}: {why}\n{told.said[-LAST:]}"
         return [Case(kind=kind, damage=how, reader=reader, end=end, story=story)]
+
+    def _resealed(self, reader: str) -> Told:
+        """What a reader tells of a folder whose digests fit its damage, if it can have any. Whoever knows the
+        seal finds another result out."""
+        assert self.reseal
+        with suppress(MutatorError, AttributeError, KeyError, TypeError, ValueError):
+            self.reseal(self.place.run)
+        told = self._tell(reader)
+        if told.code == 0 and told.result != self.right[reader].result:
+            known = RunFolder.open(self.place.genuine)
+            return expect(self.place, str(seal_of(known)))
+        return told
 
     def _right(self, reader: str) -> Told:
         if reader not in self.right:
