@@ -38,6 +38,7 @@ class Scene:
     told: Callable[[], Told]  # of what the command has made
     home: Path | None = None  # what is in the folder before; None: nothing
     fresh_cache: bool = False  # so that the checks are run, too
+    victims: Sequence[str] = ("command", "group")
 
     def cases(self, right: Told, longest_s: float, seed: int) -> Sequence[Case]:
         """Kill the command, give it again, kill that, then let it end; a case for each kill that came."""
@@ -46,7 +47,7 @@ class Scene:
         kills = []
         for _ in range(KILLS):
             command = self._command()
-            kills.append(struck(command, chance, longest_s))
+            kills.append(struck(command, chance, self.victims, longest_s))
             command.end()  # and that of every process that it started, soon
             if self._is_done(command):
                 break
@@ -97,8 +98,9 @@ def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
     words, shards = (*SMALL, "--engine", "fork"), (at / "shard1", at / "shard2")
     place, scene = Place(folder=at, campaign=words), partial(Scene, workspace=workspace, at=at)
     running, again = ("run", *words, "-n", "2", "--out", place.run), partial(run, place)
-    yield scene(name="run", words=running, told=again)
-    yield scene(name="run with checks", words=running, told=again, fresh_cache=True)
+    driving = partial(scene, words=running, told=again, victims=tuple(VICTIMS))
+    yield driving(name="run")
+    yield driving(name="run with checks", fresh_cache=True)
     whole = homes / "finished"
     done("run", *words, "--out", whole / "run")
     yield scene(name="report", words=("report", place.run), told=partial(_written, place), home=whole)
@@ -133,12 +135,14 @@ def _merged(place: Place) -> Told:
     return Told(code=0, said="", result=[found.seal, (place.run / "results.csv").read_text()])
 
 
-def struck(command: Command, chance: Chance, longest_s: float) -> tuple[str, signal.Signals] | None:
+def struck(
+    command: Command, chance: Chance, victims: Sequence[str], longest_s: float
+) -> tuple[str, signal.Signals] | None:
     """Send a signal to a process of a command, or to all of them, at some moment of the time that it takes.
     Returns to which, and the signal; None if there was none any more."""
-    number, victim = chance.choice(SIGNALS), chance.choice(sorted(VICTIMS))
+    number, victim = chance.choice(SIGNALS), chance.choice(victims)
     with suppress(subprocess.TimeoutExpired):
-        command.process.wait(chance.uniform(0.0, longest_s))
+        command.process.wait(chance.uniform(0.0, 0.9 * longest_s))
     while command.process.poll() is None:
         with suppress(ProcessLookupError):  # it has just ended by itself
             if pids := VICTIMS[victim](command):

@@ -13,7 +13,7 @@ from .tally import Tally
 
 pytestmark = pytest.mark.slow
 
-TRIES = {"run": 45, "run with checks": 20, "report": 20, "repair": 20, "merge": 15}  # of two kills each
+TRIES = {"run": 45, "run with checks": 20, "report": 20, "repair": 20, "merge": 20}  # of two kills each
 
 
 @pytest.mark.parametrize("name", TRIES)
