@@ -36,13 +36,15 @@ class Digest:
     @classmethod
     def of_file(cls, path: Path) -> "Digest | None":
         """Of the file there; None where there is none."""
+        if not path.is_file():  # nobody waits for what a pipe may say
+            return None
         try:
             with path.open("rb") as file:
                 return cls(
                     sha256=hashlib.file_digest(file, "sha256").hexdigest(),
                     size=os.fstat(file.fileno()).st_size,
                 )
-        except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+        except FileNotFoundError:
             return None
 
     def is_of(self, found: "Digest | None") -> bool:

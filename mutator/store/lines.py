@@ -141,8 +141,12 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     """Verify the lines of a file; `data` are its bytes, if they were read already.
 
     Without `checksums` (a run folder of before there were any) every whole line counts as written.
+    MutatorError for what is no file.
     """
-    data = path.read_bytes() if data is None else data
+    if data is None:
+        if not path.is_file():
+            raise MutatorError("no file", where=path, expected="a worker's lines", remedy="remove it")
+        data = path.read_bytes()
     end = data.rfind(b"\n") + 1
     lines: dict[int, bytes] = {}
     damaged: list[int] = []
