@@ -108,7 +108,13 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 def is_half_written(name: str) -> bool:
     """Whether a file of that name was left by a killed `write_atomic`."""
-    return re.fullmatch(r"\..+\.\d+", name) is not None
+    return complete(name) != name
+
+
+def complete(name: str) -> str:
+    """The name that such a file was to get; any other name as it is."""
+    found = re.fullmatch(r"\.(.+)\.\d+", name)
+    return found[1] if found else name
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:

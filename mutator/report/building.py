@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import write_atomic
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import outcome_counts
 from mutator.report.browse import browse_data
 from mutator.report.page import Content, markdown, page_html
 from mutator.report.panel import FOLDER
 from mutator.report.panels import PANELS
 from mutator.report.panels.tables import NOTES
-from mutator.report.stamp import is_of, made_from, read_stamp, remove_stamp, write_stamp
+from mutator.report.stamp import is_current, made_from, remove_stamp, write_stamp
 from mutator.report.studies import ReportedRun
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -29,13 +30,12 @@ class Report:
 
 
 def ensure(run: Path, workspace: Workspace | None) -> Report:
-    """The report of a run folder: left alone when nothing that it is made from has changed, else written."""
+    """The report of a run folder: left alone when neither it nor what it is made from has changed, else
+    written."""
     folder, out = RunFolder.open(run), run / FOLDER
-    text, hypertext = _files(out)
-    stamp = read_stamp(out)
-    is_there = text.is_file() and hypertext.is_file()
-    if is_there and is_of(stamp, out, made_from(folder, workspace)):
-        return Report(markdown=text, page=hypertext, rows=stamp["rows"])
+    if is_current(out, made_from(folder, workspace)):
+        text, hypertext = _files(out)
+        return Report(markdown=text, page=hypertext, rows=len(list(Results.of_run(run).lines())))
     return write(run, workspace)
 
 
@@ -54,7 +54,7 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     text, hypertext = _files(out)
     write_atomic(text, markdown(content).encode())
     write_atomic(hypertext, page_html(content).encode())
-    write_stamp(out, sources, len(reported.rows))
+    write_stamp(out, sources)
     return Report(markdown=text, page=hypertext, rows=len(reported.rows))
 
 

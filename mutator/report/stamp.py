@@ -1,7 +1,6 @@
 """What a report was made from, so that resuming a complete run does not draw it all again."""
 
 from pathlib import Path
-from typing import Any
 
 from mutator._common.files import read_json, write_json
 from mutator._common.hashing import digest
@@ -34,28 +33,28 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     return digest([SCHEMA, own, results, engine, plots, references, *sealed])
 
 
-def read_stamp(out: Path) -> dict[str, Any]:
-    """What the report in `out` says it was made from; empty when there is none, or one cut short."""
+def is_current(out: Path, made_from: str) -> bool:
+    """Whether the report in `out` was made from `made_from`, and its files are as they were written."""
     try:
-        return read_json(out / FILE, SCHEMA)
+        stamp = read_json(out / FILE, SCHEMA)
     except MutatorError:  # whatever is wrong with it: the report can be written again
-        return {}
+        return False
+    return (stamp.get("made_from"), stamp.get("files")) == (made_from, _written(out))
 
 
-def is_of(stamp: dict[str, Any], out: Path, made_from: str) -> bool:
-    """Whether the report in `out` with this stamp was made from `made_from` and knows its series."""
-    return bool(stamp) and (stamp["made_from"], stamp.get("series")) == (made_from, _series(out))
+def write_stamp(out: Path, made_from: str) -> None:
+    """Say what the report in `out` was made from, and what was written; last of its files."""
+    write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "files": _written(out)})
 
 
-def write_stamp(out: Path, made_from: str, rows: int) -> None:
-    """Say what the report in `out` was made from and of how many experiments it tells; last of its files."""
-    stamp = {"schema": SCHEMA, "made_from": made_from, "rows": rows, "series": _series(out)}
-    write_json(out / FILE, stamp)
-
-
-def _series(out: Path) -> list[str]:
-    """The series beside the page. Writing a report writes some, so they are what it says of itself last."""
-    return sorted(path.name for path in (out / "series").glob("*.js"))
+def _written(out: Path) -> dict[str, str]:
+    """Digest of each file of a report, the series that its page loads included; comparisons are no part."""
+    paths = {path.relative_to(out): path for path in out.rglob("*") if path.is_file()}
+    return {
+        name.as_posix(): digest(path.read_bytes())
+        for name, path in sorted(paths.items())
+        if name.as_posix() != FILE and not name.parts[0].startswith("compare-")
+    }
 
 
 def remove_stamp(out: Path) -> None:

@@ -4,7 +4,7 @@ import os
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.files import is_half_written, read_json
+from mutator._common.files import complete, read_json
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
 from mutator.store.run_folder import CONTENT, SCRATCH, RunFolder
@@ -56,6 +56,12 @@ def check(path: Path) -> list[Path]:
     return ours
 
 
+def _is_known(name: str) -> bool:
+    """Whether a run writes a file of that name, or a kill leaves one while it does."""
+    whole = Path(name).with_name(complete(Path(name).name)).as_posix()
+    return any(fnmatchcase(whole, pattern) for pattern in CONTENT)
+
+
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
     """What a run wrote below `path`, without the folders, and what it did not. No link is followed."""
     ours: list[Path] = []
@@ -67,8 +73,7 @@ def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
             is_link = entry.is_symlink()
             if name in folders and not is_link and words.partition("/")[0] in _FOLDERS:
                 continue
-            known = is_half_written(name) or any(fnmatchcase(words, pattern) for pattern in CONTENT)
-            if known and (not is_link or words.startswith(f"{SCRATCH}/")):
+            if _is_known(words) and (not is_link or words.startswith(f"{SCRATCH}/")):
                 ours.append(entry)
             else:
                 strangers.append(entry)

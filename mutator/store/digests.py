@@ -43,6 +43,8 @@ class Digest:
     @classmethod
     def of_file(cls, path: Path) -> "Digest | None":
         """Of the file there; None where there is none."""
+        if not path.is_file():  # nobody waits for what a pipe may say
+            return None
         try:
             with path.open("rb") as file:
                 return cls(

@@ -1,8 +1,8 @@
 """The seal of a finished run: one digest of everything that counts, whoever computed it on how many machines.
 
-It is a function of content alone: of the plan and the sources, of the versions of Python and packages, of the
-checks and golden runs, and of each record with its patch. Costs, hosts, processors and the git commit are not
-in it, nor is how the work was cut into sessions, workers and shards.
+It is a function of content alone: of the plan, the choices that made it and the sources, of the versions of
+mutator, Python and packages, of the checks and golden runs, and of each record with its patch. Costs, hosts,
+processors and the git commit are not in it, nor is how the work was cut into sessions, workers and shards.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,8 @@ from mutator.store.lines import read_segment
 from mutator.store.run_folder import RunFolder, golden_key
 
 SCHEMA = "seal/1"
+# What run.json says of the results, and reports repeat.
+_HEAD = ("plan", "campaign_digest", "study", "seed", "reading", "hazards", "compared", "sources")
 
 
 def seal_of(folder: RunFolder) -> str | None:
@@ -25,8 +27,10 @@ def seal_of(folder: RunFolder) -> str | None:
     if not folder.finished:
         return None
     head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
-    facts = {key: head[key] for key in ("plan", "campaign_digest", "sources")}
+    facts = {key: head[key] for key in _HEAD}
     facts |= {
+        "choices": head["choices"] | {"shard": None},  # how the work was cut
+        "mutator": head["provenance"]["mutator"],
         "checks": checks["results"],
         "goldens": golden_digests(folder, head["golden_files"]),
         "versions": _versions(folder),

@@ -168,13 +168,34 @@ def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
     assert drawn_again(run, HERE)
 
 
+@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "series/2222222222222222.js", "tables/a.csv"])
+def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
+    """Each file of it is compared with what was written; a comparison beside it is none of its files."""
+    out = run / "report"
+    for folder in ("series", "tables", "compare-other"):
+        (out / folder).mkdir(parents=True)
+    for folder, file in (("series", "2222222222222222.js"), ("tables", "a.csv")):
+        (out / folder / file).write_text("written")
+    building.write(run, None)
+    (out / "compare-other" / "index.html").write_text("another command's")
+    assert not drawn_again(run, None)
+    (out / name).write_text((out / name).read_text() + "edited")
+    assert drawn_again(run, None)
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', '{"schema": "report/1", "files": 1}'])
+def test_a_damaged_note_of_what_a_report_was_made_from_is_none(run: Path, text: str) -> None:
+    """Whatever is left of it, the report is written again."""
+    building.write(run, None)
+    (run / "report" / "made_from.json").write_text(text)
+    assert drawn_again(run, None)
+
+
 @pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
 def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
-    """A page or the note of what it was made from may be missing or cut short."""
+    """A page or the note of what it was made from may be missing."""
     building.write(run, None)
     (run / "report" / damage).unlink()
-    assert drawn_again(run, None)
-    (run / "report" / "made_from.json").write_text("{")
     assert drawn_again(run, None)
 
 

@@ -48,6 +48,8 @@ def test_all_that_a_run_wrote_goes(run: Path) -> None:
         "report/mine.docx",
         "golden/notes",
         "plan/x/y.txt",
+        ".notes.1",
+        "records/.vimrc.2",
     ],
 )
 def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:

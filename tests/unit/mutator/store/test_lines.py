@@ -152,3 +152,12 @@ def test_a_file_is_never_shared(tmp_path: Path) -> None:
     LineWriter(tmp_path / "a.jsonl", HEAD).close()
     with pytest.raises(FileExistsError):
         LineWriter(tmp_path / "a.jsonl", HEAD)
+
+
+def test_what_is_no_file_is_told(tmp_path: Path) -> None:
+    """A folder or a pipe in the place of a segment is refused; nobody waits for what a pipe may say."""
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    (tmp_path / "folder.jsonl").mkdir()
+    for name in ("pipe.jsonl", "folder.jsonl"):
+        with pytest.raises(MutatorError, match="no file"):
+            read_segment(tmp_path / name)

@@ -81,6 +81,13 @@ CHANGES: dict[str, Callable[[Path], None]] = {
     "a check": lambda run: edit(run / "checks.json", "[]", '["failed"]'),
     "a source": lambda run: edit(run / "run.json", '"templates": "', '"templates": "0'),
     "the campaign": lambda run: edit(run / "run.json", '"campaign_digest": "', '"campaign_digest": "0'),
+    "the reading": lambda run: edit(run / "run.json", '"reading": "', '"reading": "other_'),
+    "the seed": lambda run: edit(run / "run.json", '"seed": ', '"seed": 1'),
+    "the study": lambda run: edit(run / "run.json", '"study": null', '"study": "paper"'),
+    "a choice": lambda run: edit(run / "run.json", '"limit": null', '"limit": 24'),
+    "the hazards": lambda run: edit(run / "run.json", '"hazards": [', '"hazards": [\n"H9",'),
+    "the channels": lambda run: edit(run / "run.json", '"compared": [', '"compared": [\n"gear",'),
+    "mutator": lambda run: edit(run / "run.json", '"mutator": "', '"mutator": "9'),
     "a package": lambda run: edit(run / "run.json", '"numpy": "', '"numpy": "0'),
     "Python": lambda run: edit(run / "run.json", '"python": "CPython 3', '"python": "CPython 4'),
 }
@@ -88,7 +95,7 @@ CHANGES: dict[str, Callable[[Path], None]] = {
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_all_that_counts_is_in_it(made: Path, run: Path, reseal: Reseal, change: str) -> None:
-    """Another record, patch, golden run, check, source or version, and the seal is another one."""
+    """Another record, patch, golden run, check, source, choice or version, and the seal is another one."""
     CHANGES[change](run)
     reseal(run)
     assert sealed(run) not in (None, sealed(made))
