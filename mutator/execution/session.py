@@ -87,7 +87,8 @@ class Session:
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
         self._manifest = workspace.manifest(folder.head["target"])
-        self.engine = choose_engine(engine, self._manifest, folder.planned)
+        # of the whole plan, so that all shards of it, and the run of one machine, have a proof, or none has
+        self.engine = choose_engine(engine, self._manifest, folder.head["experiments"])
         self.problem = ""
         self.interrupted = False
         self._began = time.monotonic()

@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.engines import registry
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.merging import merge
 from mutator.execution.running import run_campaign
+from mutator.execution.session import Session
 from mutator.review import gate
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
@@ -67,6 +69,15 @@ def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     seals = [seal_of(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
+
+
+def test_shards_have_the_engine_of_the_whole(
+    runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A share of a plan that is worth forking is forked, too, however small: the merged run has the proof,
+    and with it the seal, of the whole."""
+    monkeypatch.setattr(registry, "_WORTH_IT", RunFolder.open(runs["whole"]).planned)
+    assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
 def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
