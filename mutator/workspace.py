@@ -174,7 +174,11 @@ class Workspace:
         """The target that was named, or the library's only one; MutatorError if it has none or several."""
         names = tuple(self.targets)
         if given is None and not names:
-            raise MutatorError("no manifest of a target", where=self.library / "targets", remedy="write one")
+            raise MutatorError(
+                "no manifest of a target",
+                where=self.library / "targets",
+                remedy="write one, as docs/how-to/add-a-target.md says",
+            )
         if given is None and len(names) > 1:
             known = f"{len(names)} targets in the library ({', '.join(names)})"
             raise MutatorError(known, argument="target", remedy="name one")

@@ -59,7 +59,8 @@ class Inputs:
         kind, verb = chance.choice(sorted(files)), chance.choice(sorted(VERBS))
         path = chance.choice(files[kind])
         how = malform(path, chance)
-        names = [one.name for one in self.root.rglob("*.*")] + [path.name, "targets in the library"]
+        names = [one.name for one in self.root.rglob("*.*")]
+        names += [path.name, path.parent.name, "targets in the library"]
         try:
             told, cpu_s = self._told(verb)
         finally:
