@@ -16,6 +16,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from time import process_time
 
+from mutator._common.hashing import digest
 from mutator.campaigns.plans import Plan, freeze, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
@@ -35,6 +36,7 @@ SIZES = (1_000, 5_000, 20_000, 50_000)
 TABLE, LOAD_GOAL_S = 100_000, 2.0
 PAPER, OPEN_GOAL_S = 11_280, 1.0
 GOLDEN_BYTES = 650_000  # of a golden run
+PATCH_BYTES = 7200  # of a stored patch
 CHUNK = 20
 MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
 
@@ -105,8 +107,8 @@ def working(size: int, out: Path) -> dict[str, float]:
     return {"work_ms": (process_time() - began) / number * 1e3, "memory_mb": most_mb()}
 
 
-def written_run(size: int, out: Path) -> RunFolder:
-    """A run folder with so many made-up records."""
+def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
+    """A run folder with so many made-up records, and with the patch that they name, if any, as often."""
     workspace = Workspace.find(root=ROOT)
     plan = make_plan(workspace, "paper")
     more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
@@ -114,14 +116,19 @@ def written_run(size: int, out: Path) -> RunFolder:
     folder = freeze(replace(plan, experiments=experiments, chunks=(size,)), out, workspace)
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
     for number, experiment in enumerate(experiments):
-        lines.append(asdict(record(experiment, number)))
+        if patch:
+            file = folder.patch(experiment.id)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(patch)
+        named = digest(patch) if patch else ""
+        lines.append(asdict(replace(record(experiment, number), patch=named)))
     lines.close()
     return folder
 
 
 def opening(size: int, out: Path) -> dict[str, float]:
     """Open a finished run of so many experiments: all digests, checksums and ids are compared. Its seal."""
-    folder = written_run(size, out)
+    folder = written_run(size, out, bytes(PATCH_BYTES))
     head, data = folder.head, bytes(GOLDEN_BYTES)
     goldens = [folder.golden(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
     paths = [golden / name for golden in goldens for name in head["golden_files"]]

@@ -154,7 +154,8 @@ def id_problems(
                 yield err
                 continue
             yield from _head_problem(segment, head["plan"])
-            yield from _id_problems(segment, planned, done)
+            with_patches = kind == "records" and ledger is not None
+            yield from _id_problems(segment, planned, done, patches=with_patches)
         missing = [name for name in planned if name not in done]
         if ledger is not None and ledger.finished and kind == "records" and missing:
             more = f" and {len(missing) - _MANY} more" if len(missing) > _MANY else ""
@@ -182,8 +183,11 @@ def _head_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
         yield err
 
 
-def _id_problems(segment: Segment, planned: Collection[str], done: dict[str, int]) -> Iterator[MutatorError]:
-    """Those of one segment; `done` is what the segments before it had, and is added to."""
+def _id_problems(
+    segment: Segment, planned: Collection[str], done: dict[str, int], *, patches: bool
+) -> Iterator[MutatorError]:
+    """Those of one segment, with those of the `patches` that its records name; `done` is what the segments
+    before it had, and is added to."""
     for number in segment.lines:
         if number == 1:
             continue
@@ -202,7 +206,27 @@ def _id_problems(segment: Segment, planned: Collection[str], done: dict[str, int
                 remedy=_remedy(segment.path.parent.parent, ""),
             )
         elif status != Status.HARNESS_ERROR.value:
+            if patches:
+                yield from patch_problems(segment.path.parent.parent, name, str(data.get("patch", "")))
             content = hash(segment.body(number))
             if name in done:
                 yield second_record(segment.path, number, name, same=done[name] == content)
             done[name] = content
+
+
+def patch_file(run: Path, experiment_id: str) -> Path:
+    """The source diff of an experiment (exists once it was run)."""
+    return run / "patches" / experiment_id[:2] / f"{experiment_id}.patch"
+
+
+def patch_problems(run: Path, experiment_id: str, known: str) -> Iterator[MutatorError]:
+    """A stored patch that is missing, or not the one whose digest the record has; empty for no mutant."""
+    path = patch_file(run, experiment_id)
+    found = Digest.of_file(path)
+    if known and (found is None or found.sha256 != known):
+        yield MutatorError(
+            f"another patch than was run: SHA-256 {found.sha256[:16]}" if found else "missing",
+            where=path,
+            expected=f"SHA-256 {known[:16]}, as the record says",
+            remedy=_remedy(run, ""),
+        )

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.files import check_is_text
-from mutator._common.hashing import digest, plain
+from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
@@ -68,7 +68,7 @@ class RunFolder:
         """An existing run folder whose content is what was written.
 
         MutatorError when there is none, one of a newer schema, or anything in it is damaged, missing or not
-        of its plan. Patches are verified when they are read.
+        of its plan.
         """
         folder = cls.unverified(path)
         for problem in folder.problems():
@@ -176,7 +176,7 @@ class RunFolder:
 
     def patch(self, experiment_id: str) -> Path:
         """The source diff of an experiment (exists once it was run)."""
-        return self.path / "patches" / experiment_id[:2] / f"{experiment_id}.patch"
+        return integrity.patch_file(self.path, experiment_id)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
         """The stored diff of an experiment with that record; None where it has not run, or had no mutant.
@@ -184,20 +184,12 @@ class RunFolder:
         MutatorError when it is missing, or not the one that the record names.
         """
         path = self.patch(experiment_id)
-        data = path.read_bytes() if path.is_file() else None
-        if not self.verifiable:
-            return data
-        if record is None or not record.patch:
-            return None
-        if data is None or digest(data) != record.patch:
-            raise MutatorError(
-                "missing" if data is None else f"another patch than was run: SHA-256 {digest(data)[:16]}",
-                where=path,
-                expected=f"SHA-256 {record.patch[:16]}, as the record says",
-                remedy=f"`mutator verify {self.path} --repair` puts it aside; "
-                "the same `mutator run` then fills the gap",
-            )
-        return data
+        if self.verifiable:
+            if record is None or not record.patch:
+                return None
+            for problem in integrity.patch_problems(self.path, experiment_id, record.patch):
+                raise problem
+        return path.read_bytes() if path.is_file() else None
 
     def records(self, kind: str = "records") -> dict[str, Record]:
         """The records of the experiments, or those of the `proof`, by experiment id."""
