@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import check_schema, is_no_file, raising_disk_full
+from mutator._common.files import check_schema, raising_disk_full
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
@@ -158,17 +158,14 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
 
 
 def _read(path: Path) -> bytes:
-    try:
+    if path.is_file():  # nobody waits for what a pipe may say
         return path.read_bytes()
-    except OSError as err:
-        if not is_no_file(err):
-            raise
-        raise MutatorError(
-            f"no file ({err.strerror})",
-            where=path,
-            expected="lines",
-            remedy="take it from a copy of the run folder, or delete it: `mutator verify` tells what is lost",
-        ) from None
+    raise MutatorError(
+        "no file",
+        where=path,
+        expected="lines",
+        remedy="take it from a copy of the run folder, or delete it: `mutator verify` tells what is lost",
+    )
 
 
 def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
