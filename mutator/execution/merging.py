@@ -1,5 +1,6 @@
 """Merge the run folders of all shards of a plan into the run folder that one machine would have made."""
 
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -17,7 +18,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.review.gate import FILE as REVIEWED
-from mutator.store import digests
+from mutator.store import cleaning, digests
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
@@ -29,6 +30,7 @@ from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
+_MARK = ".merging."  # with a process id: a file that says that a merge was begun
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
@@ -59,15 +61,21 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             _check_complete(folder)
         stretches = [plain(s) for s in _stretches(folders, accept=accept_versions)]
         _check_goldens(folders)
+        if any(out.glob(f"{_MARK}*")):  # a merge was killed here
+            with owned(out, patience_s=0.0):
+                cleaning.clear(out)
         make_run_folder(out)
         stack.enter_context(owned(out))
+        mark = out / f"{_MARK}{os.getpid()}"
         try:
             with raising_disk_full(out):
+                mark.touch()
                 _copy(folders, out, stretches)
-            return results.build(out)
+            made = results.build(out)
+            mark.unlink()
+            return made
         except BaseException:
-            for path in out.iterdir():
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+            cleaning.clear(out)
             raise
 
 

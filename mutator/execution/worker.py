@@ -139,6 +139,8 @@ class Worker:
         path = self.folder.patch(experiment.id)
         with raising_disk_full(path):
             path.parent.mkdir(parents=True, exist_ok=True)
+            if path.is_symlink():  # nothing is written to its end
+                path.unlink()
             path.write_bytes(data)
 
     def _file(self, kind: str) -> Path:

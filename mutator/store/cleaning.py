@@ -1,6 +1,8 @@
 """Deletes what a run wrote into its folder, and nothing else."""
 
 import os
+from collections.abc import Iterable
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -19,9 +21,22 @@ def clean(path: Path) -> None:
     check(path)
     with owned(path, patience_s=0.0):
         found = check(path)  # once more, now that nobody writes to it
-        for file in sorted(found, key=lambda file: file == path / HEAD):  # without it, it is no run folder
-            file.unlink()
-        for folder, _, _ in os.walk(path, topdown=False):
+        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # without it, it is no run folder
+
+
+def clear(path: Path) -> None:
+    """Delete what a killed command left in a folder that was to become a run folder, first what makes it one,
+    last the marks of who was at work. What others put there stays."""
+    ours, _ = _sorted_out(path)
+    _delete(path, sorted(ours, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
+
+
+def _delete(path: Path, files: Iterable[Path]) -> None:
+    """Delete files below `path`, then every folder with nothing in it."""
+    for file in files:
+        file.unlink()
+    for folder, _, _ in os.walk(path, topdown=False):
+        with suppress(OSError):
             Path(folder).rmdir()
 
 

@@ -47,6 +47,8 @@ def repair(folder: RunFolder) -> list[str]:
         changes = [*_files(folder, ledger), *_segments(folder, ledger, lost)]
         for name in [name for name, *_ in changes] + [_patch(folder, one) for one in lost]:
             _put_aside(folder.path, name)
+        for one in lost:  # or it would be written to, and with it what a link leads to
+            folder.patch(one).unlink(missing_ok=True)
         if changes or renewed:
             _carry_out(folder.path, changes, ledger)
     return [*renewed, *(said for *_, said in changes), *(f"patch of {one} put aside" for one in lost)]

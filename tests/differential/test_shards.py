@@ -208,14 +208,31 @@ def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> N
     assert (runs["whole"] / "results.csv").read_bytes() == before
 
 
+def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
+    """The same command makes the merged run, whatever was written before the kill; what others put there is
+    not deleted."""
+    out, shards = tmp_path / "out", [runs["1/2"], runs["2/2"]]
+    for name in (".merging.1", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
+        (out / name).touch()
+    with pytest.raises(MutatorError, match=r"not empty \(thesis\.tex\)"):
+        merge(shards, out)
+    (out / "thesis.tex").unlink()
+    (out / ".merging.1").touch()
+    (out / "records").mkdir()
+    merge(shards, out)
+    assert seal_of(RunFolder.open(out)) == seal_of(RunFolder.open(runs["whole"]))
+    assert not list(out.glob(".merging*"))
+
+
 def test_a_merge_that_fails_leaves_nothing(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When results cannot be built the folder is empty again, and the same command can be given again."""
+    """When results cannot be built nothing is left, and the same command can be given again."""
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
         patch.setattr("mutator.outcomes.results.build", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
     assert merge([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()
 
 

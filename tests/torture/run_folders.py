@@ -49,6 +49,7 @@ def half(home: Path, at: Path) -> World:
     command.wait_for_records(4)
     os.killpg(command.process.pid, signal.SIGKILL)
     command.end()
+    done("export", out, "--format", "csv")
     name = next(iter(RunFolder.open(out).records()))
     return World(home=home, place=_place(home, at, words, name), readers=UNFINISHED)
 

@@ -22,7 +22,7 @@ from .damages import Chance
 from .readers import HOW, Place, Told, run
 from .run_folders import REFERENCE, SMALL, done
 from .tally import Case
-from .worlds import judged
+from .worlds import LAST, judged
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP)
 KILLS = 3  # of one command, at most
@@ -58,7 +58,7 @@ class Scene:
                 break
         told = self.told() if self._is_done(command) else self._finish()
         end, why = judged(told, right, [])
-        story = f"{self.name}: {kills}: {why}"
+        story = f"{self.name}: {kills}: {why}\n{told.said[-LAST:]}"
         return [
             Case(kind=victim, damage=number.name, reader=self.name, end=end, story=story)
             for victim, number in filter(None, kills)
@@ -95,7 +95,7 @@ class Scene:
 
     def _command(self) -> Command:
         cache = {"XDG_CACHE_HOME": str(self.at / "cache")} if self.fresh_cache else {}
-        return Command(self.workspace, self.at, "-m", "mutator", *map(str, self.words), **cache)
+        return Command(self.workspace, self.at / "run", "-m", "mutator", *map(str, self.words), **cache)
 
 
 def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:

@@ -16,7 +16,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.verification.seal import seal_of
 
 from .damages import DAMAGES, damage
-from .readers import Place, Reader, Told, expect
+from .readers import TABLES, Place, Reader, Told, expect
 from .tally import Case, End
 
 LONGEST_S = 180  # of a case, on a busy machine
@@ -44,8 +44,9 @@ class World:
             kind = chance.choice(sorted(kinds))
             how, touched = damage(self.place.folder, kinds[kind], chance, self.damages)
             told = self._tell(reader) if self.reseal is None else self._resealed(reader)
-        # digests.json speaks of all the others, and where all digests fit, another file may be the odd one
+        # digests.json speaks of all the others; where all digests fit, another file may be the odd one
         at_large = kind == "digests.json" or self.reseal is not None
+        touched += TABLES if kind in ("records", "timings") else ()  # they follow from these
         named = ["seal", *kinds, *chain(*kinds.values())] if at_large else touched
         end, why = judged(told, right, named)
         story = f"{how} of {', '.join(touched)}, then {reader}: {why}\n{told.said[-LAST:]}"

@@ -199,3 +199,14 @@ def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> No
     assert any(name in text for text in repaired(run)[0])
     aside = run / "damaged" / name
     assert aside.is_symlink() if is_link else (aside / "thesis.tex").read_text() == "mine"
+
+
+def test_a_patch_that_is_a_link_is_put_aside(run: Path) -> None:
+    """It is taken away, or the patch that is made anew would be written to where it leads."""
+    one, other = sorted((run / "patches").rglob("*.patch"))[:2]
+    other.write_bytes(b"not the patch of the record")
+    one.unlink()
+    one.symlink_to(other)
+    repaired(run)
+    assert not one.is_symlink() and not one.exists()
+    assert (run / "damaged" / one.relative_to(run)).read_bytes() == b"not the patch of the record"
