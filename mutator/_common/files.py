@@ -25,9 +25,11 @@ class DiskFull(MutatorError):
 
 def is_disk_full(err: BaseException | None) -> bool:
     """Whether an error came of a full disk or quota, be it in the words of another library."""
-    while err is not None:
+    seen: list[BaseException] = []  # a chain of causes may be a circle
+    while err is not None and not any(err is one for one in seen):
         if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
             return True
+        seen.append(err)
         err = err.__cause__ or err.__context__
     return False
 

@@ -1,5 +1,6 @@
 """Merge the run folders of all shards of a plan into the run folder that one machine would have made."""
 
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -23,13 +24,13 @@ from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import read_segment, written
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
-from mutator.store.run_folder import SCRATCH, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
-_MARK = f"{SCRATCH}/merging"  # a file that says that a merge was begun
+_MARK = f".{HEAD}."  # with a process id: the head as it is half written, from the beginning of a merge
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
@@ -60,20 +61,16 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             _check_complete(folder)
         stretches = [plain(s) for s in _stretches(folders, accept=accept_versions)]
         _check_goldens(folders)
-        mark = out / _MARK
-        if mark.exists():  # a merge was killed here
+        if any(out.glob(f"{_MARK}*")):  # a merge was killed here
             with owned(out, patience_s=0.0):
                 cleaning.clear(out)
         make_run_folder(out)
         stack.enter_context(owned(out))
         try:
             with raising_disk_full(out):
-                mark.parent.mkdir()
-                mark.touch()
+                (out / f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
-            made = results.build(out)
-            shutil.rmtree(mark.parent)
-            return made
+            return results.build(out)
         except BaseException:
             cleaning.clear(out)
             raise

@@ -6,7 +6,7 @@ from contextlib import suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.files import complete, read_json
+from mutator._common.files import complete, is_half_written, read_json
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
 from mutator.store.run_folder import CONTENT, SCRATCH, RunFolder
@@ -26,9 +26,9 @@ def clean(path: Path) -> None:
 
 def clear(path: Path) -> None:
     """Delete what a killed command left in a folder that was to become a run folder, first what makes it one,
-    last its scratch, which says that it was at work. What others put there stays."""
+    last what it had half written, which says that it was at work. What others put there stays."""
     ours, _ = _sorted_out(path)
-    _delete(path, sorted(ours, key=lambda file: (file.is_relative_to(path / SCRATCH), file != path / HEAD)))
+    _delete(path, sorted(ours, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
 
 
 def _delete(path: Path, files: Iterable[Path]) -> None:

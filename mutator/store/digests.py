@@ -120,10 +120,13 @@ def _plain(one: Digest) -> dict[str, Any]:
 
 
 @contextmanager
-def rewriting(run: Path, coming: Mapping[str, Digest | None]) -> Iterator[None]:
+def rewriting(
+    run: Path, coming: Mapping[str, Digest | None], *, finished: bool | None = None
+) -> Iterator[None]:
     """Within it these files become what is said (None: they go). Whoever is killed within it leaves a folder
-    that opens, and that can be rewritten again."""
+    that opens, and that can be rewritten again. `finished` as for `close_segments`, from the beginning."""
     before = settled(run)
+    before = replace(before, finished=before.finished if finished is None else finished)
     write(run, replace(before, rewriting=coming))
     yield
     files = {name: one for name, one in before.files.items() if name not in coming}

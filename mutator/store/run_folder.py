@@ -45,9 +45,12 @@ SCRATCH = "work"
 CONTENT = (  # all that may be in a run folder; * stands for any text, folders included
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *("golden/*/*", "patches/*.patch", "records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
-    *("traces/*/*", "plots/*", "results.csv", "results.parquet", "timings.parquet", "results.json"),
+    *("traces/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
+    *("results.csv", "results.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
-    *("report/tables/*", "report/figures/*", "report/compare-*/*", "exports/*"),
+    *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
+    *("exports/mutation-elements.json", "exports/junit.xml"),
+    *("exports/results.csv", "exports/results.parquet"),
     *("damaged/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 

@@ -186,10 +186,11 @@ def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
         for name, data, _ in changes
         if not name.startswith("timings/")
     }
-    with digests.rewriting(run, coming):
+    finished = ledger.finished and {*coming} <= {CSV}
+    with digests.rewriting(run, coming, finished=finished):
         for name, data, _ in changes:
             if data is None:
                 (run / name).unlink(missing_ok=True)
             else:
                 write_atomic(run / name, data)
-    digests.close_segments(run, finished=ledger.finished and {*coming} <= {CSV})
+    digests.close_segments(run)

@@ -18,7 +18,10 @@ from mutator.store.run_folder import RunFolder, golden_key
 
 SCHEMA = "seal/1"
 # What run.json says of the results, and reports repeat.
-_HEAD = ("plan", "campaign_digest", "study", "seed", "reading", "hazards", "compared", "sources")
+_HEAD = (
+    *("plan", "campaign_digest", "study", "seed", "reading", "runs"),
+    *("hazards", "compared", "sources", "target_files"),
+)
 
 
 def seal_of(folder: RunFolder) -> str | None:

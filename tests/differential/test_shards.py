@@ -212,18 +212,17 @@ def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
     """The same command makes the merged run, whatever was written before the kill; what others put there is
     not deleted."""
     out, shards = tmp_path / "out", [runs["1/2"], runs["2/2"]]
-    for name in ("work/merging", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
+    for name in (".run.json.1", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
         (out / name).parent.mkdir(parents=True, exist_ok=True)
         (out / name).touch()
     with pytest.raises(MutatorError, match=r"not empty \(thesis\.tex\)"):
         merge(shards, out)
     (out / "thesis.tex").unlink()
-    (out / "work").mkdir(exist_ok=True)
-    (out / "work" / "merging").touch()
+    (out / ".run.json.1").touch()
     (out / "records").mkdir()
     merge(shards, out)
     assert seal_of(RunFolder.open(out)) == seal_of(RunFolder.open(runs["whole"]))
-    assert not (out / "work").exists()
+    assert not list(out.glob(".*"))
 
 
 def test_a_merge_that_fails_leaves_nothing(

@@ -83,5 +83,9 @@ def test_a_full_disk_in_other_words(tmp_path: Path, monkeypatch: pytest.MonkeyPa
             raise RuntimeError("cannot encode") from None
     with pytest.raises(RuntimeError), raising_disk_full(tmp_path):
         raise RuntimeError("cannot encode")
+    one, other = RuntimeError("one"), RuntimeError("other")
+    one.__context__, other.__context__ = other, one  # frameworks make circles of causes
+    with pytest.raises(RuntimeError, match="one"), raising_disk_full(tmp_path):
+        raise one
     with pytest.raises(MutatorError, match="mine"), raising_disk_full(tmp_path):
         raise MutatorError("mine") from OSError(errno.ENOSPC, "")

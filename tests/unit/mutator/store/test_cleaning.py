@@ -50,6 +50,11 @@ def test_all_that_a_run_wrote_goes(run: Path) -> None:
         "plan/x/y.txt",
         ".notes.1",
         "records/.vimrc.2",
+        "plots/talk.pptx",
+        "exports/mine.csv",
+        "report/tables/summary.ods",
+        "report/figures/drawing.afdesign",
+        "report/compare-old/notes.txt",
     ],
 )
 def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:

@@ -176,6 +176,20 @@ def test_a_sound_run_is_left_alone(run: Path) -> None:
     assert (run / digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
+def test_a_killed_repair_leaves_no_finished_run(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever it is killed after it has put anything aside: the folder opens, and the run goes on."""
+    edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(digests, "close_segments", kill)
+        repair(RunFolder.unverified(run))
+    folder = RunFolder.open(run)
+    assert (len(folder.records()), folder.finished) == (23, False)
+
+
+def kill(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt
+
+
 def test_repair_waits_for_nobody(run: Path) -> None:
     """A folder in use, and one of an earlier schema, are refused."""
     with owned(run), pytest.raises(MutatorError, match="in use"):

@@ -83,6 +83,10 @@ CHANGES: dict[str, Callable[[Path], None]] = {
     "the campaign": lambda run: edit(run / "run.json", '"campaign_digest": "', '"campaign_digest": "0'),
     "the reading": lambda run: edit(run / "run.json", '"reading": "', '"reading": "other_'),
     "the seed": lambda run: edit(run / "run.json", '"seed": ', '"seed": 1'),
+    "the runs": lambda run: edit(run / "run.json", '"runs": ', '"runs": 1'),
+    "a file of the target": lambda run: edit(
+        run / "run.json", '"target_files": {', '"target_files": {"x.py": "0",'
+    ),
     "the study": lambda run: edit(run / "run.json", '"study": null', '"study": "paper"'),
     "a choice": lambda run: edit(run / "run.json", '"limit": null', '"limit": 24'),
     "the hazards": lambda run: edit(run / "run.json", '"hazards": [', '"hazards": [\n"H9",'),
