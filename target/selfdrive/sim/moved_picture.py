@@ -10,6 +10,7 @@ from math import tan
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import dot, product
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan, picture_to_car
@@ -28,7 +29,7 @@ class GroundView:
         self._model = model
         self._first = first_road_row(model)
         self._to_car = picture_to_car(model, self._first)
-        self._from_car = np.linalg.inv(self._to_car)
+        self._from_car = _inverse(self._to_car)
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
         """The frame as seen `offset` m further left (m), turned left by `heading` (rad)."""
@@ -53,7 +54,7 @@ class GroundView:
             columns = min(-(-columns // VECTOR) * VECTOR, width)
             cv2.warpPerspective(
                 frame[first:],
-                self._from_car @ car_to_road(0.0, offset, heading) @ self._to_car,
+                product(product(self._from_car, car_to_road(0.0, offset, heading)), self._to_car),
                 (columns, rows - first),
                 dst=picture[first:, :columns],
                 flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
@@ -79,6 +80,13 @@ class ShiftedView:
             return picture
 
         return frame.changed(("shift", shift), make)
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Of a matrix of three rows."""
+    a, b, c = matrix
+    columns = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+    return np.array(columns).T / dot(a, columns[0])
 
 
 def moved(frame: np.ndarray, columns: int, out: np.ndarray) -> None:

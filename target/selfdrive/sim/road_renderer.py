@@ -10,7 +10,9 @@ from math import ceil, cos, floor, sin, tan
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.ordered import total
 from selfdrive.sim.lead_picture import draw_car, draw_lead, tinted
 from selfdrive.sim.road_look import Look, standard_look
 from selfdrive.sim.road_texture import Strip, paint_strip
@@ -98,10 +100,8 @@ def picture_to_car(model: CameraModel, first: int = 0) -> np.ndarray:
     foot = model.height * tan(model.pitch)
     below = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, first - model.horizon), (0.0, 0.0, 1.0)])
     across = fall / model.fx
-    return (
-        np.array([(0.0, -foot, fall / cos(model.pitch)), (-across, 0.0, across * model.cx), (0, 1, 0)])
-        @ below
-    )
+    ground = np.array([(0.0, -foot, fall / cos(model.pitch)), (-across, 0.0, across * model.cx), (0, 1, 0)])
+    return product(ground, below)
 
 
 def car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
@@ -142,8 +142,8 @@ def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
 def _draw_band(picture: np.ndarray, band: Band, to_road: np.ndarray) -> None:
     """Draw the band's rows, seen from where `to_road` puts the car."""
     rows, width = band.last - band.first, picture.shape[1]
-    matrix = band.to_texels @ to_road @ band.to_car
-    (columns, lines, scales) = (matrix @ _corners(width, rows)).tolist()
+    matrix = product(product(band.to_texels, to_road), band.to_car)
+    (columns, lines, scales) = product(matrix, _corners(width, rows)).tolist()
     across = [column / scale for column, scale in zip(columns, scales, strict=True)]
     along = [line / scale for line, scale in zip(lines, scales, strict=True)]
     length, limit = band.texels.shape[0], band.texels.shape[1] - 1
@@ -183,7 +183,7 @@ def _background(model: CameraModel, look: Look, rng: np.random.Generator) -> np.
         rng.standard_normal((12, 24), dtype=np.float32), (width, rows), interpolation=cv2.INTER_CUBIC
     )
     sky += 6.0 * clouds
-    outline = sum(
+    outline = total(
         cv2.resize(
             rng.standard_normal((1, width // step), dtype=np.float32),
             (width, 1),

@@ -5,10 +5,13 @@ last row is followed by its first.
 """
 
 from dataclasses import dataclass
+from math import cos, exp, sin
 
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each
+from selfdrive.common.ordered import total
 from selfdrive.sim.road_look import DASH_PERIOD, Look, Paint
 
 HALF_WIDTH = 12.0  # m from the lane's middle to the strip's edge
@@ -91,7 +94,7 @@ def _profile(look: Look) -> np.ndarray:
         tone[np.abs(np.abs(y) - edge) < 0.5 * KERB_WIDTH] = look.kerb
     for lane in (-look.lane_width, 0.0, look.lane_width):
         for side in (-TRACK_OFFSET, TRACK_OFFSET):
-            tone -= look.tracks * np.exp(-(((y - lane - side) / TRACK_WIDTH) ** 2))
+            tone -= look.tracks * each(exp, -(((y - lane - side) / TRACK_WIDTH) ** 2))
     return tone.astype(np.float32)
 
 
@@ -137,8 +140,8 @@ def _polyline(
     """A crooked dark line that begins somewhere on the road."""
     steps = max(3, int(length / 0.4))
     turns = heading + np.cumsum(rng.normal(0.0, 0.25 if length < 10.0 else 0.004, steps))
-    x = rng.uniform(0.0, len(texels) * ROW_LENGTH) + np.cumsum(0.4 * np.cos(turns))
-    y = rng.uniform(-6.0, 6.0) + np.cumsum(0.4 * np.sin(turns))
+    x = rng.uniform(0.0, len(texels) * ROW_LENGTH) + np.cumsum(0.4 * each(cos, turns))
+    y = rng.uniform(-6.0, 6.0) + np.cumsum(0.4 * each(sin, turns))
     points = np.stack([(HALF_WIDTH - y) / COLUMN_WIDTH, x / ROW_LENGTH], axis=1)
     thickness = int(rng.integers(1, 4))
     cv2.polylines(texels, [points.astype(np.int32)], False, tone, thickness, cv2.LINE_AA)
@@ -148,7 +151,7 @@ def _line(texels: np.ndarray, y: float, paint: Paint, look: Look, rng: np.random
     """Paint a line at `y`, exact to a fraction of a texel."""
     centres = (y - paint.width, y + paint.width) if paint.double else (y,)
     first, last = _column(max(centres) + paint.width), _column(min(centres) - paint.width) + 1
-    across = sum(
+    across = total(
         np.clip((0.5 * paint.width - np.abs(_lateral()[first:last] - centre)) / COLUMN_WIDTH + 0.5, 0.0, 1.0)
         for centre in centres
     )

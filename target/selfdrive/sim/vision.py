@@ -94,18 +94,24 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
     )
 
 
+def build_detector(name: str, model: CameraModel):
+    """The detector of DETECTORS that is called so, for one run's pictures."""
+    if name == PAPER:
+        from selfdrive.visiond.paper_detector import PaperDetector as Detector
+    else:
+        from selfdrive.visiond.robust_detector import RobustDetector as Detector
+    return Detector(model)
+
+
 def _detector(pictures: Pictures, library) -> LaneDetector:
     from selfdrive.sim.detection_memory import DetectionMemory
     from selfdrive.sim.remembering_detector import RememberingDetector
 
-    if pictures.detector == PAPER:
-        from selfdrive.visiond.paper_detector import PaperDetector as Detector
-    else:
-        from selfdrive.visiond.robust_detector import RobustDetector as Detector
     if pictures.forget:
         compiled.use(None)
+    detector = build_detector(pictures.detector, library.model)
     if pictures.forget or pictures.cache is None:
-        return Detector(library.model)
-    detector, memory = Detector(library.model), DetectionMemory(pictures.cache)
+        return detector
+    memory = DetectionMemory(pictures.cache)
     made_of = (pictures.detector, library.model, detector.calculated_by)
     return RememberingDetector(detector, made_of, memory)

@@ -73,7 +73,7 @@ def _crests(sure: np.ndarray, contrast: np.ndarray) -> Points:
     at = np.flatnonzero(crest)  # np.nonzero of two dimensions takes four times as long
     weight = np.minimum(sure.ravel()[at], 1.0)
     if len(at) > STRONGEST:
-        keep = np.sort(np.argpartition(weight, -STRONGEST)[-STRONGEST:])
+        keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
         at, weight = at[keep], weight[keep]
     row, column = np.divmod(at, sure.shape[1])
     return Points(row, column + EDGE, weight)

@@ -55,5 +55,5 @@ def _order(labels: np.ndarray, count: int) -> np.ndarray:
     first[labels[::-1]] = np.arange(labels.size)[::-1]  # of equal ones the last assignment counts
     order = np.empty(count, np.uint16)
     order[0] = _NONE  # the background
-    order[1 + np.argsort(first[1:])] = np.arange(count - 1, dtype=np.uint16)
+    order[1 + np.argsort(first[1:], kind="stable")] = np.arange(count - 1, dtype=np.uint16)
     return order

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from selfdrive.common.array_math import dot
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.detector import RoadLine
 from selfdrive.visiond.road_region import RoadRegion
@@ -62,7 +63,7 @@ class EdgeLines:
         sides = []
         for side in (1.0, -1.0):
             away = np.where(usable, side * (y + BESIDE * slope), -1.0)
-            order = np.argsort(away)
+            order = np.argsort(away, kind="stable")
             order = order[away[order] >= 0.0][:TRIES]
             clusters = np.stack((away, a, b), axis=1)[order].tolist()
             sides.append(self._first_line(clusters, points))
@@ -108,7 +109,7 @@ class EdgeLines:
         away = _away(own, a, b)
         if spread < MIN_SPREAD or abs(slope) > MAX_SLOPE or not _is_mark(away, own.rising):
             return None, 0
-        doubt = float(away @ away) / away.size / SURE_SPREAD**2
+        doubt = dot(away, away) / away.size / SURE_SPREAD**2
         prob = min(1.0, own.row.size / SURE_PIXELS) / (1.0 + doubt)
         return RoadLine(y=y, slope=slope, prob=prob), own.row.size
 
@@ -138,8 +139,8 @@ def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
     """Standard deviation of the rows, a and b of column = a * row + b."""
     mean_row, mean_column = float(row.sum()) / row.size, float(column.sum()) / row.size
     down = row - mean_row
-    power = float(down @ down)
-    a = float(down @ column) / max(power, 1.0)
+    power = dot(down, down)
+    a = dot(down, column) / max(power, 1.0)
     return (power / row.size) ** 0.5, a, mean_column - a * mean_row
 
 

@@ -6,6 +6,7 @@ their cells and blocks, so these are computed once.
 """
 
 from dataclasses import dataclass
+from math import atan2, pi
 
 import cv2
 import numpy as np
@@ -37,11 +38,12 @@ def _tables() -> _Tables:
     """Calculated for a quarter of the gradients, to the right and down; the others are its mirror images."""
     step = np.arange(_STEPS // 2 + 1)
     dx, dy = step[np.newaxis, :], step[:, np.newaxis]
-    orientation = (np.degrees(np.arctan2(dy, dx)) * (BINS / 180.0)).astype(np.uint8)
+    angle = np.array([[atan2(y, x) for x in range(_STEPS // 2 + 1)] for y in range(_STEPS // 2 + 1)])
+    orientation = (angle * (BINS / pi)).astype(np.uint8)
     mirrored = BINS - 1 - orientation
     mirrored[0] = 0  # along a row left is right, as orientations have no sign
     down = np.hstack((mirrored[:, :0:-1], orientation))
-    length = np.hypot(dx, dy) / CELL**2
+    length = np.sqrt(dx * dx + dy * dy) / CELL**2
     length = np.hstack((length[:, :0:-1], length))
     return _Tables(np.vstack((down[:0:-1, ::-1], down)).ravel(), np.vstack((length[:0:-1], length)).ravel())
 
@@ -68,7 +70,7 @@ class Hog:
     def blocks(self, picture: np.ndarray) -> np.ndarray:
         """Normalised blocks (rows, columns, 36), float32, of a uint8 picture, until the next call."""
         cells = self._votes(picture)
-        power = np.einsum("ijk,ijk->ij", cells, cells)
+        power = (cells * cells).sum(axis=2)
         power = power[:-1] + power[1:]
         scale = 1.0 / np.sqrt(power[:, :-1] + power[:, 1:] + np.float32(_TINY))
         self._scaled(cells, scale)

@@ -1,11 +1,15 @@
 """The neural net that tells windows with a lane mark from those without: one hidden layer of ten nodes."""
 
+from math import tanh
 from pathlib import Path
 
 import numpy as np
 
+from selfdrive.common.array_math import each
+
 WEIGHTS = Path(__file__).with_name("lane_net.npz")
 HIDDEN = 10
+FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # in 1: of what a window shows, and of what it counts
 
 
 class LaneNet:
@@ -16,6 +20,7 @@ class LaneNet:
     ) -> None:
         self._hidden, self._hidden_bias = hidden, hidden_bias
         self._out, self._out_bias = out, out_bias
+        self._whole = np.rint(hidden * float(WEIGHT_STEPS))
 
     @classmethod
     def load(cls, path: Path = WEIGHTS) -> "LaneNet":
@@ -36,6 +41,9 @@ class LaneNet:
     def score(self, features: np.ndarray) -> np.ndarray:
         """Log odds that there is a mark, for `features` (..., windows, features) in float32.
 
-        A stack of few windows each is multiplied without further threads, and so alike on any machine.
+        Features and weights are rounded to whole numbers of steps, so that a double holds each sum exactly:
+        then it does not matter in which order a processor adds.
         """
-        return np.tanh(features @ self._hidden + self._hidden_bias) @ self._out + self._out_bias
+        steps = np.rint(features * np.float32(FEATURE_STEPS)).astype(float) @ self._whole
+        hidden = each(tanh, steps / (FEATURE_STEPS * WEIGHT_STEPS) + self._hidden_bias)
+        return (hidden * self._out).sum(axis=-1) + self._out_bias

@@ -18,7 +18,6 @@ from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, w
 from selfdrive.visiond.road_region import RoadRegion
 
 EPS, MIN_SAMPLES = 4, 8  # pixels, edge pixels
-STACK = 8  # windows that the net looks at in one multiplication
 NEED = 2  # marked windows of the four that share a tile
 
 
@@ -59,9 +58,6 @@ class PaperDetector:
         marked = looked_at & windows_on(tiles)
         row, column = marked.nonzero()
         if row.size:
-            spare = np.full(-row.size % STACK, row.size - 1)
-            stacked = np.concatenate((np.arange(row.size), spare))
-            found = windows(self._hog.blocks(part))[row[stacked], column[stacked]]
-            score = self._net.score(found.reshape(-1, STACK, FEATURES)).ravel()
-            marked[row, column] = score[: row.size] > 0.0
+            found = windows(self._hog.blocks(part))[row, column]
+            marked[row, column] = self._net.score(found.reshape(-1, FEATURES)) > 0.0
         return marked

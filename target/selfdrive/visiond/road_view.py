@@ -60,7 +60,7 @@ class RoadView:
 
     def rows_with_content(self, road: np.ndarray) -> float:
         """How many of the picture's rows the map's rows that are not all of one tone stand for."""
-        return float(self.share @ (road.max(axis=1) > road.min(axis=1)))
+        return float(self.share[road.max(axis=1) > road.min(axis=1)].sum())
 
 
 def _rows_of(model: CameraModel, level: int) -> list[float]:

@@ -5,11 +5,13 @@ pitched otherwise than it was calibrated moves it up or down. A line `y` m besid
 px below the known horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
 """
 
+from math import exp
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each, log, product
 from selfdrive.visiond.band_filter import Points
 from selfdrive.visiond.road_view import RoadView
 
@@ -85,7 +87,7 @@ def elect(voters: Voters, belief: Belief) -> Pose:
     left, dip = np.repeat(left, len(dip)), np.tile(dip, len(left))
     votes = _votes(voters, left, dip)
     around = cv2.filter2D(votes, -1, AROUND, borderType=cv2.BORDER_REFLECT)
-    support = np.log1p(np.maximum(votes - around, 0.0) / (around + np.float32(SCATTER)))
+    support = log(np.float32(1.0) + np.maximum(votes - around, 0.0) / (around + np.float32(SCATTER)))
     support -= (0.25 * (_unlikely(left, *belief.left) + _unlikely(dip, *belief.dip)))[:, None]
     y = SIDEWAYS - BIN * (np.arange(votes.shape[1]) + 0.5)
     best, found = -np.inf, (0, 0, 0)
@@ -137,25 +139,35 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
     believed = means / sigmas
     state = np.array(pose[:4])
     n = len(voters.left)
-    terms = np.zeros((2, n, 5))  # what error changes with each unknown, and the error
-    terms[:, :, 0] = 1.0
+    terms = np.zeros((5, 2, n))  # what error changes with each unknown, and the error
+    terms[0] = 1.0
     for near in ROUNDS:
         metre = voters.metre * (voters.drop + state[1])
         y = state[2:, None]
         error = voters.left - state[0] - y * metre
         count = np.maximum(1.0 - (error / (metre * near)) ** 2, 0.0)
-        terms[:, :, 1] = y * voters.metre
-        terms[0, :, 2] = terms[1, :, 3] = metre
-        terms[:, :, 4] = error
-        design = terms.reshape(2 * n, 5)
-        # One product, small enough for one thread: the sum's order must not depend on the number of cores.
-        sums = design.T @ (design[:, :4] * (count * voters.precision).reshape(-1, 1))
-        information = sums[:4] + expected.T @ expected
-        pull = sums[4] + expected.T @ (believed - expected @ state)
-        state = state + np.linalg.solve(information, pull)
+        terms[1] = y * voters.metre
+        terms[2, 0] = terms[3, 1] = metre
+        terms[4] = error
+        design = terms.reshape(5, 2 * n)
+        sums = product(design, (design[:4] * (count * voters.precision).reshape(-1)).T)
+        information = sums[:4] + product(expected.T, expected)
+        surprise = believed - (expected * state).sum(axis=1)
+        pull = sums[4] + (expected.T * surprise).sum(axis=1)
+        state = state + _solved(information, pull)
     off = np.abs(error / metre)
-    beside = ((off > near) & (off < BESIDE)) @ voters.weight / voters.rows
+    beside = (((off > near) & (off < BESIDE)) * voters.weight).sum(axis=1) / voters.rows
     chance = beside * (4.0 / 3.0 * near / (2.0 * (BESIDE - near)))
-    seen = np.maximum(count @ voters.weight / voters.rows - chance, 0.0)
-    prob = 1.0 - np.exp(-seen / (FAINT + chance))
+    seen = np.maximum((count * voters.weight).sum(axis=1) / voters.rows - chance, 0.0)
+    prob = 1.0 - each(exp, -seen / (FAINT + chance))
     return Pose(*state.tolist(), *prob.tolist())
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """x of matrix * x = right, for a positive definite matrix, by elimination."""
+    rows = np.column_stack((matrix, right)).tolist()
+    for i, pivot in enumerate(rows):
+        for row in rows[:i] + rows[i + 1 :]:
+            factor = row[i] / pivot[i]
+            row[:] = [x - factor * y for x, y in zip(row, pivot, strict=True)]
+    return np.array([row[-1] / row[i] for i, row in enumerate(rows)])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from selfdrive.car.params import CarParams
+from selfdrive.common.ordered import total
 from selfdrive.controls.lib.mpc_solver import Iteration, Ocp, build_solver
 
 Poly = tuple[float, float, float, float]
@@ -60,8 +61,8 @@ def _residuals(z: ca.SX, rate: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
     by_right = seen * right_prob / (left_prob + right_prob + 0.0001)
     shares = (by_left, by_right, 1 - seen)
     lines = (left - width / 2, right + width / 2, model)
-    off_path = sum(share * line for share, line in zip(shares, lines, strict=True)) - y
-    off_heading = sum(share * angle for share, angle in zip(shares, headings, strict=True)) - heading
+    off_path = total(share * line for share, line in zip(shares, lines, strict=True)) - y
+    off_heading = total(share * angle for share, angle in zip(shares, headings, strict=True)) - heading
 
     distances = ca.vertcat(off_path, left_prob * ca.exp(y - left), right_prob * ca.exp(right - y))
     stage = ca.vertcat(distances, (v + 1) * off_heading, (v + 1) * rate)

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 from operator import mul
 
+from selfdrive.common.ordered import total
+
 Poly = tuple[float, float, float, float]
 
 ZERO: Poly = (0.0, 0.0, 0.0, 0.0)
@@ -17,9 +19,9 @@ class CubicFit:
     """
 
     def __init__(self, n: int = 50) -> None:
-        normal = [[sum(x ** (i + j) for x in range(n)) for j in POWERS] for i in POWERS]
+        normal = [[total(x ** (i + j) for x in range(n)) for j in POWERS] for i in POWERS]
         self._weights = tuple(
-            tuple(float(sum(c * x**p for c, p in zip(row, POWERS, strict=True))) for x in range(n))
+            tuple(float(total(c * x**p for c, p in zip(row, POWERS, strict=True))) for x in range(n))
             for row in _inverse(normal)
         )
 
@@ -27,10 +29,10 @@ class CubicFit:
         """The cubic through `points` (m)."""
         a, b, c, d = self._weights
         return (
-            sum(map(mul, a, points)),
-            sum(map(mul, b, points)),
-            sum(map(mul, c, points)),
-            sum(map(mul, d, points)),
+            total(map(mul, a, points)),
+            total(map(mul, b, points)),
+            total(map(mul, c, points)),
+            total(map(mul, d, points)),
         )
 
 

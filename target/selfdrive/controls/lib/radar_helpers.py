@@ -5,6 +5,7 @@ from math import dist, pi
 
 from selfdrive.common.interp import clip, interp
 from selfdrive.common.kalman import SteadyKalman
+from selfdrive.common.ordered import total
 from selfdrive.common.realtime import DT_MDL
 from selfdrive.messages import LeadData
 
@@ -97,7 +98,7 @@ class Cluster:
         self.v_lat = self._mean([t.v_lat for t in tracks])
 
     def _mean(self, values: Sequence[float]) -> float:
-        return sum(values) / len(self._tracks)
+        return total(values) / len(self._tracks)
 
     def is_lead(self, v_ego: float) -> bool:
         """Whether it drives ahead of the car, or is about to cut in."""

@@ -5,11 +5,12 @@ arrives, and the rest is replaced by airlight, the level of the horizon. Visibil
 which contrast falls to 5 %, so b = -ln(0.05) / visibility (meteorological optical range, WMO No. 8).
 """
 
-from math import cos, log, sin
+from math import cos, exp, log, sin
 
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Effect, Scene
 
@@ -37,7 +38,7 @@ def ways(camera: CameraModel) -> np.ndarray:
 
 def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
     """Share of each pixel's light, float32, that air of this extinction coefficient (1/m) lets through."""
-    return np.exp(np.float32(-coefficient) * ways(camera))
+    return each(exp, np.float32(-coefficient) * ways(camera)).astype(np.float32)
 
 
 def airlight(picture: np.ndarray, camera: CameraModel) -> float:

@@ -1,10 +1,11 @@
 """Too much light and too little: the sun low ahead, and dusk on a small sensor."""
 
-from math import cos, exp, pi, radians, sin, sqrt
+from math import acos, cos, exp, log, pi, radians, sin, sqrt
 
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each, length
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 
@@ -41,7 +42,7 @@ class SunGlare(Effect):
         beam = 127500.0 * exp(-0.21 / sin(height))  # lux, across the beam
         ground = beam * sin(height) + 800.0 + 15500.0 * sqrt(sin(height))  # lux, on the road
         white = WHITE_REFLECTANCE * ground / pi  # cd/m^2
-        angle = np.arccos(np.clip(rays @ sun, -1.0, 1.0))
+        angle = each(acos, np.clip((rays * sun).sum(axis=-1), -1.0, 1.0))
         seen = self.amount * 10.0 * beam / np.degrees(np.maximum(angle, SUN_RADIUS)) ** 2
         seen += mirrored(rays, sun) * beam
         light = WHITE * seen / white + 2.0 * WHITE * (angle < SUN_RADIUS)
@@ -58,7 +59,7 @@ def level_rays(camera: CameraModel) -> np.ndarray:
     down = low * cos(camera.pitch) + sin(camera.pitch)
     ahead = cos(camera.pitch) - low * sin(camera.pitch)
     rays = np.stack([right, down, ahead], axis=-1)
-    return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    return rays / length(rays)
 
 
 def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
@@ -68,13 +69,14 @@ def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     """
     down = np.maximum(rays[..., 1], 0.02)
     half = sun - rays
-    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    half /= length(half)
+    across = np.clip((half * sun).sum(axis=-1), 0.0, 1.0)
     upright = np.maximum(-half[..., 1], 1e-3)
     slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
-    facets = np.exp(-slope) / (pi * ASPHALT_SLOPES**2 * upright**4)
-    mirror = MIRROR + (1.0 - MIRROR) * (1.0 - np.clip(half @ sun, 0.0, 1.0)) ** 5
+    facets = each(exp, -slope) / (pi * ASPHALT_SLOPES**2 * (upright * upright) ** 2)
+    mirror = MIRROR + (1.0 - MIRROR) * (1.0 - across) * ((1.0 - across) ** 2) ** 2
     # A rough surface shadows itself where it is seen or lit at a flat angle.
-    shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.clip(half @ sun, 1e-3, 1.0))
+    shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.maximum(across, 1e-3))
     return np.where(rays[..., 1] > 0.0, POLISHED * mirror * facets * shadow / (4.0 * down), 0.0)
 
 
@@ -106,16 +108,24 @@ class LowLight(Effect):
 
 def _noisy(electrons: float, shown: float) -> np.ndarray:
     """Levels of a pixel with this many electrons on average, one for each quantile of its noise, uint8."""
-    spread = 8.0 * sqrt(electrons) + 10.0
-    numbers = np.arange(max(0, int(electrons - spread)), int(electrons + spread))
+    reach = 8.0 * sqrt(electrons) + 10.0
+    numbers = np.arange(max(0, int(electrons - reach)), int(electrons + reach))
     # Poisson's chances from the ratio of neighbours, relative to the first.
-    steps = np.log(max(electrons, 1e-9) / np.maximum(numbers[1:], 1))
+    steps = each(log, max(electrons, 1e-9) / np.maximum(numbers[1:], 1))
     chance = np.concatenate([[0.0], np.cumsum(steps)])
-    chance = np.exp(chance - chance.max())
+    chance = each(exp, chance - chance.max())
     reach = int(6.0 * READ_NOISE)
-    reading = np.exp(-0.5 * (np.arange(-reach, reach + 1) / READ_NOISE) ** 2)
-    summed = np.cumsum(np.convolve(chance, reading))
+    reading = each(exp, -0.5 * (np.arange(-reach, reach + 1) / READ_NOISE) ** 2)
+    summed = np.cumsum(_spread(chance, reading))
     counts = np.arange(summed.size) + 0.5 + numbers[0] - reach
     share = (np.arange(QUANTILES) + 0.5) / QUANTILES
     values = np.interp(share, summed / summed[-1], counts)
     return np.clip(np.rint(WHITE * values / shown), 0, WHITE).astype(np.uint8)
+
+
+def _spread(chances: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Chances of the sum of two numbers with these chances each."""
+    summed = np.zeros(chances.size + by.size - 1)
+    for k, share in enumerate(by.tolist()):
+        summed[k : k + chances.size] += share * chances
+    return summed

@@ -12,6 +12,7 @@ from math import cos, radians, sin
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each
 from selfdrive.sim.effects.canvas import Tile, seamless, splat, strokes
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 
@@ -60,8 +61,8 @@ class PaperRain(_PaperWeather):
         points = int(length) + 1
         share, across, down = strokes(start, end, np.full(count, points))
         phase, wobble = np.repeat(phase, points), np.repeat(wobble, points)
-        light = 1.0 + 0.35 * np.sin(2 * np.pi * (phase + (1.0 + 2.0 * wobble) * share))
-        light *= np.sqrt(np.sin(np.pi * share)) * WHITE
+        light = 1.0 + 0.35 * each(sin, 2 * np.pi * (phase + (1.0 + 2.0 * wobble) * share))
+        light *= np.sqrt(each(sin, np.pi * share)) * WHITE
         side = np.arange(width)
         levels = np.zeros((rows, columns), dtype=np.float32)
         splat(levels, (across[:, None] + side).ravel(), np.repeat(down, width), np.repeat(light, width))

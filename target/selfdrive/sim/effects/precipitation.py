@@ -7,11 +7,12 @@ singly weighs as much.
 """
 
 from abc import abstractmethod
-from math import exp
+from math import exp, log
 
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each
 from selfdrive.sim.effects.air import airlight, clearness
 from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.effects.particles import Box, Cover, Particles
@@ -60,7 +61,7 @@ class _Precipitation(Effect):
         """Diameters (mm) of so many of these particles."""
         _, slope = self._spectrum()
         few, many = exp(-slope * most), exp(-slope * least)
-        return -np.log(few + (many - few) * random.uniform(size=count)) / slope
+        return -each(log, few + (many - few) * random.uniform(size=count)) / slope
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         taken = self._cover.taken(self._particles.streaks(scene, EXPOSURE))
@@ -112,7 +113,7 @@ class Rain(_Precipitation):
         return 6.0  # mm: larger ones break up
 
     def _flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return 0.001 * melted, 9.65 - 10.3 * np.exp(-0.6 * melted)
+        return 0.001 * melted, 9.65 - 10.3 * each(exp, -0.6 * melted)
 
     def _extinction(self) -> float:
         # Attenuation of light by rain, as Halder and others (2019) use it for rendering.
@@ -137,8 +138,12 @@ class Snow(_Precipitation):
         return 5.0  # mm of water
 
     def _flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return 0.001 * melted**1.5 / np.sqrt(0.17), 1.6 * (0.1 * melted) ** 0.3
+        return 0.001 * melted * np.sqrt(melted / 0.17), 1.6 * each(_to_the_0_3, 0.1 * melted)
 
     def _extinction(self) -> float:
         # Attenuation of light by dry snow, 5.5 dB/km at 1 mm/h (ITU-R P.1814).
-        return 5.5e-3 * self.amount**1.38 * np.log(10.0) / 10.0
+        return 5.5e-3 * self.amount**1.38 * log(10.0) / 10.0
+
+
+def _to_the_0_3(value: float) -> float:
+    return value**0.3

@@ -1,11 +1,12 @@
 """Rain drops on the windscreen in front of the camera: they stay where they land until the wiper comes by."""
 
-from math import tan
+from math import exp, tan
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from selfdrive.common.array_math import each
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Scene
 
@@ -90,7 +91,7 @@ def _landed(
     free = np.ones((camera.rows, camera.width), dtype=bool)
     grid = np.arange(free.size).reshape(free.shape)
     middles = random.uniform(size=(diameters.size, 2)) * (camera.width, camera.rows)
-    shapes = np.exp(random.normal(0.0, 0.12, size=diameters.size))
+    shapes = each(exp, random.normal(0.0, 0.12, size=diameters.size))
     drops: list[np.ndarray] = []
     for (column, row), shape, radius in zip(
         middles, shapes, 0.5 * SPREAD * camera.fx / DISTANCE * diameters, strict=True

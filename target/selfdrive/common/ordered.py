@@ -1,0 +1,10 @@
+"""Sums in a written order: the same bytes on any Python, which compensates its own sums since 3.12."""
+
+from collections.abc import Iterable
+from functools import reduce
+from operator import add
+
+
+def total(values: Iterable[float]) -> float:
+    """The first and the second value, then the third, and so on; 0 of none."""
+    return reduce(add, values, 0)

@@ -1,0 +1,99 @@
+"""Digests of all that a run's bytes hang on: pictures, what detectors see in them, and traces.
+
+`python tests/differential/arithmetic.py` prints them as JSON, on whatever Python and processor it runs.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.sim import vision
+from selfdrive.sim.effects.effect import Moment
+from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.moved_picture import GroundView, ShiftedView
+from selfdrive.sim.picture import Picture
+from selfdrive.sim.road_look import Look, Paint
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.sim.run import simulate
+from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
+from selfdrive.sim.trace_file import pieces
+from selfdrive.sim.vision import DETECTORS, Pictures
+
+SCENARIOS = Path(__file__).parents[2] / "fault_library" / "scenarios"
+WORN = Look(  # with all that a road can have
+    left=Paint(dashed=True, wear=0.4, fade=0.2),
+    right=Paint(double=True, wear=0.2),
+    cracks=30.0,
+    seams=10.0,
+    patches=10.0,
+    shadows=0.3,
+    joints=5.0,
+)
+MOMENTS = [Moment(1.5 + 0.05 * k, 40.0 + 1.34 * k, 26.8) for k in range(20)]
+
+
+def digests() -> Iterator[tuple[str, str]]:
+    """Names and digests."""
+    yield from ((name, digest(picture)) for name, picture in roads().items())
+    for detector in DETECTORS:
+        for level in (4, 9):
+            yield from seen(detector, level)
+    for path in sorted(SCENARIOS.glob("*.yaml")):
+        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other one knows no bends
+            yield f"{path.stem} on the {plant} plant", trace(path, plant, None)
+    for detector in DETECTORS:
+        pictures = Pictures(detector=detector, marks=vision.DASHED)
+        yield f"S1 through {detector}", trace(SCENARIOS / "S1.yaml", "standard", pictures)
+
+
+def roads() -> dict[str, np.ndarray]:
+    """Rendered roads, and one seen from elsewhere."""
+    model = CameraModel()
+    found = {
+        name: RoadRenderer(model, look, seed=3).grey(31.0, 0.4, 0.02)
+        for name, look in (("solid", "solid"), ("dashed", "dashed"), ("worn", WORN))
+    }
+    frame = Picture(("frame",), found["solid"].shape, lambda *_: found["solid"])
+    for mover in (GroundView(model), ShiftedView(model)):
+        found[type(mover).__name__] = mover.seen(frame, 0.7, -0.015).pixels()
+    return found
+
+
+def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
+    """What a detector sees through each effect at that level, at most, and the pictures themselves."""
+    model = CameraModel()
+    road = RoadRenderer(model, WORN, seed=3)
+    frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]
+    for effect, amounts in LEVELS.items():
+        made = effect(amounts[min(level, len(amounts) - 1)], 3, model)
+        shown = [made.apply(frame, moment) for frame, moment in zip(frames, MOMENTS, strict=True)]
+        eyes = vision.build_detector(detector, model)
+        lines = [eyes.detect(view(picture)) for picture in shown]
+        name = f"{effect.__name__} {made.amount:g}"
+        yield name, digest(np.array(shown))
+        yield f"{detector} through {name}", sha256(repr(lines).encode()).hexdigest()
+
+
+def view(picture: np.ndarray) -> CameraView:
+    there = {"left_lane_y": 0.0, "right_lane_y": 0.0, "path_y": 0.0, "bend": (), "lead_d_rel": 50.0}
+    return CameraView(**there, picture=picture)
+
+
+def trace(path: Path, plant: str, pictures: Pictures | None) -> str:
+    scenario = on_plant(load_scenario(path), plant)
+    if pictures:
+        scenario = replace(scenario, steps=1500)
+    return sha256(b"".join(pieces(simulate(scenario, 0, pictures).trace))).hexdigest()
+
+
+def digest(picture: np.ndarray) -> str:
+    return sha256(np.ascontiguousarray(picture).tobytes()).hexdigest()
+
+
+if __name__ == "__main__":
+    print(json.dumps(dict(digests()), indent=1))

@@ -1,0 +1,29 @@
+"""The same bytes on every Python, and on processors with narrower vectors: pictures, detections, traces."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+HERE = Path(__file__).parent
+RECORDED = HERE.parent / "fixtures" / "arithmetic.json"
+PROCESSORS = {
+    "as it is": {},
+    "narrower vectors": {"NPY_DISABLE_CPU_FEATURES": "X86_V3"},
+    "another kernel of BLAS": {"OPENBLAS_CORETYPE": "Prescott"},
+}
+
+
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_bytes_are_those_that_were_recorded(processor: str) -> None:
+    """Whoever changes results on purpose records them anew, with `python tests/differential/arithmetic.py`."""
+    command = [sys.executable, str(HERE / "arithmetic.py")]
+    environment = os.environ | PROCESSORS[processor] | {"PYTHONPATH": str(HERE.parents[1] / "target")}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    recorded, found = json.loads(RECORDED.read_text()), json.loads(done.stdout)
+    assert [name for name in recorded | found if recorded.get(name) != found.get(name)] == []
