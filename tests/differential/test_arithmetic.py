@@ -21,7 +21,7 @@ PROCESSORS = {
 
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_bytes_are_those_that_were_recorded(processor: str) -> None:
-    """Whoever changes results on purpose records them anew, with `python tests/differential/arithmetic.py`."""
+    """Who changes results on purpose records them anew, with `python tests/differential/arithmetic.py`."""
     command = [sys.executable, str(HERE / "arithmetic.py")]
     environment = os.environ | PROCESSORS[processor] | {"PYTHONPATH": str(HERE.parents[1] / "target")}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
