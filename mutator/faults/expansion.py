@@ -99,7 +99,7 @@ class _Expander:
                 unit=unit,
                 aim=variant.aim,
                 injections=self._injections(variant, value, number),
-                hold=variant.hold,
+                hold=variant.hold(self.reading),
                 changes=variant.changes,
             )
 

@@ -47,21 +47,30 @@ class Draw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """One row of the library: injections that share a trigger and a draw, by reading, the default first."""
+    """One row of the library: injections that share a trigger and a draw, by reading, the default first.
+
+    `holds` has how long the fault stays active in a reading, where it does not follow the trigger.
+    """
 
     name: str
     aim: str
     about: str
     draw: Draw | None
-    hold: Hold | None
     changes: tuple[str, ...]
     readings: Mapping[str, tuple[InjectionSpec, ...]]
+    holds: Mapping[str, Hold | None]
     keys: Keys
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
         """The injections under `reading`; where it is not written, those of the default."""
-        default = next(iter(self.readings.values()))
-        return self.readings.get(reading, default)
+        return self.readings[self._written(reading)]
+
+    def hold(self, reading: str) -> Hold | None:
+        """How long the fault stays active under `reading`, likewise; None: as its trigger says."""
+        return self.holds[self._written(reading)]
+
+    def _written(self, reading: str) -> str:
+        return reading if reading in self.readings else next(iter(self.readings))
 
     @property
     def count(self) -> int:
@@ -148,7 +157,15 @@ class _DrawModel(StrictModel, title="A draw"):
     )
 
 
+_LATCHES = (
+    "How long the fault stays active, where it does not follow the trigger: `to_end` for a fault that latches"
+)
+
+
 class _ReadingModel(StrictModel, title="A reading"):
+    hold: Literal["while", "to_end"] | None = Field(
+        None, description=f"{_LATCHES} in this reading; default: the variant's."
+    )
     injections: list[InjectionModel] = Field(
         description="At least one; any of them executed while triggered counts as activation."
     )
@@ -164,11 +181,7 @@ class _VariantBase(StrictModel, title="A variant"):
         description="Changes of the scenario that belong to the fault, by their names in the target's "
         "manifest.",
     )
-    hold: Literal["while", "to_end"] | None = Field(
-        None,
-        description="How long the fault stays active, where it does not follow the trigger: `to_end` for a "
-        "fault that latches.",
-    )
+    hold: Literal["while", "to_end"] | None = Field(None, description=f"{_LATCHES}.")
     draw: dict[str, _DrawModel] | None = Field(
         None, description="One draw: name and unit -> draw. Without it the variant is a single fault."
     )
@@ -231,16 +244,17 @@ def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, sour
     keys: Keys = ("variants", name)
     _check_name(name, source, keys)
     written: dict[str, _ReadingModel | None] = {name: getattr(model, name) for name in readings.names}
+    holds = {reading: one.hold or model.hold for reading, one in written.items() if one}
     return Variant(
         name=name,
         aim=model.aim,
         about=model.about,
         draw=_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw")) if model.draw is not None else None,
-        hold=Hold(model.hold) if model.hold else None,
         changes=tuple(model.changes),
         readings={
             reading: _injections(one, source, (*keys, reading)) for reading, one in written.items() if one
         },
+        holds={reading: hold and Hold(hold) for reading, hold in holds.items()},
         keys=keys,
     )
 

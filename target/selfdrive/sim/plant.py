@@ -38,6 +38,7 @@ class Plant:
     """
 
     gearbox_scale = 1.0
+    swaps_lines = False  # whether the simulator around it sends the lane's right line as the left one
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         self.speed = speed

@@ -9,7 +9,11 @@ from selfdrive.messages import Actuators, LeadData
 from selfdrive.sim.truth import GroundTruth
 
 # Alerts that count as the driver being warned, in the order of their bits in channel `alert`.
-COUNTED_ALERTS = ("steer_saturated", "fcw", "can_error", "radar_error", "model_error")
+# The last is a refusal to engage, which the original shows and its users counted, too.
+COUNTED_ALERTS = (
+    *("steer_saturated", "fcw", "can_error", "radar_error", "model_error"),
+    "model_error_no_entry",
+)
 PLAN_SOURCES = ("cruise", "mpc1", "mpc2")
 LONG_STATES = ("off", "pid", "stopping", "starting")
 _PLAN_SOURCE = {name: float(code) for code, name in enumerate(PLAN_SOURCES)}

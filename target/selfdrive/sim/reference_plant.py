@@ -46,11 +46,13 @@ class CrudeLateral:
 class ReferencePlant(Plant):
     """The standard plant's longitudinal motion with the original's errors around it.
 
-    The gearbox sends km/h where m/s are meant. Camera and radar see a car in mid-lane wherever it is.
+    The gearbox sends km/h where m/s are meant. Camera and radar see a car in mid-lane wherever it is, and
+    what is seen as the left line is sent as the right one: it counts right positive, the controller left.
     A distance ends at 0; headway time starts at 30 s and stays as it was while the car stands.
     """
 
     gearbox_scale = MS_TO_KPH
+    swaps_lines = True
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         super().__init__(car, speed=speed, offset=offset)

@@ -22,6 +22,7 @@ from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.sim.vision import Pictures, build_vision
+from selfdrive.visiond.detector import SwappedLines
 from selfdrive.visiond.visiond import Visiond
 
 RECORD_SCHEMA = "sim-record/1"
@@ -69,7 +70,9 @@ class Simulator:
         make_plant = PLANTS[scenario.plant]
         self._plant = make_plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
         self._sensors = CarSensors(self._plant.gearbox_scale)
-        self.manager = Manager(car, RadarInterface(), Visiond(self._vision.detector))
+        detector = self._vision.detector
+        seen_by = SwappedLines(detector) if make_plant.swaps_lines else detector
+        self.manager = Manager(car, RadarInterface(), Visiond(seen_by))
         self.hazards = HazardMonitor()
         self.recorder = Recorder()
 

@@ -47,6 +47,18 @@ class IdealDetector:
         )
 
 
+class SwappedLines:
+    """Sees what another detector sees, and takes each of the lane's lines for the other one."""
+
+    def __init__(self, detector: LaneDetector) -> None:
+        self._detector = detector
+
+    def detect(self, view: CameraView) -> LaneLines:
+        """The lines in this view."""
+        left, right, path = self._detector.detect(view)
+        return LaneLines(left=right, right=left, path=path)
+
+
 def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
     """The lane's middle: between two lines, or half a `width` (m) beside the one that is seen.
 
