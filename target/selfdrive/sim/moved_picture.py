@@ -19,6 +19,8 @@ from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan, pictur
 OFFSET_STEP = 0.004  # m
 HEADING_STEP = 0.00025  # rad
 SHIFT_DISTANCE = 10.0  # m ahead where a shift of the whole frame is right
+CODED_METRES_PER_PIXEL = 0.03895
+CODED_REACH = 1.0  # m: further the picture never moves
 VECTOR = 64  # columns: of so many OpenCV calculates a row's pixels alike, however long the row is
 
 
@@ -72,14 +74,27 @@ class ShiftedView:
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
         """The frame as seen `offset` m further left (m), turned left by `heading` (rad)."""
         away = offset + SHIFT_DISTANCE * tan(heading)
-        shift = round(away * self._pixels_per_metre)
+        return _shifted(frame, round(away * self._pixels_per_metre))
 
-        def make(rows: int, columns: int) -> np.ndarray:
-            picture = np.empty((rows, frame.shape[1]), np.uint8)
-            moved(frame.pixels()[:rows], shift, picture)
-            return picture
 
-        return frame.changed(("shift", shift), make)
+class CodedView:
+    """Moves frames sideways as a whole, as the paper's authors coded it: by the metres of another row than
+    the one in which their detector reads lines, so that it sees 64 % of the way. Heading is not seen."""
+
+    def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
+        """The frame as seen `offset` m further left (m); `heading` is of no account."""
+        return _shifted(frame, round(min(max(offset, -CODED_REACH), CODED_REACH) / CODED_METRES_PER_PIXEL))
+
+
+def _shifted(frame: Picture, columns: int) -> Picture:
+    """The frame moved that far to the right."""
+
+    def make(rows: int, width: int) -> np.ndarray:
+        picture = np.empty((rows, frame.shape[1]), np.uint8)
+        moved(frame.pixels()[:rows], columns, picture)
+        return picture
+
+    return frame.changed(("shift", columns), make)
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

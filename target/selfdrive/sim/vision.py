@@ -16,9 +16,9 @@ from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.detector import IdealDetector, LaneDetector
 
-DETECTORS = PAPER, ROBUST = "paper", "robust"
+DETECTORS = PAPER, ROBUST, AS_CODED = "paper", "robust", "as_coded"
 MARKS = SOLID, DASHED = "solid", "dashed"
-TRANSLATIONS = GROUND, SHIFT = "ground", "shift"
+TRANSLATIONS = GROUND, SHIFT, CODED = "ground", "shift", "as_coded"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,10 +27,11 @@ class Pictures:
 
     `frames` is a folder of a user's own frames; None: a rendered road with these `marks` (left and right
     both solid, or the right one dashed). `translation` is how a frame is moved to the car's offset and
-    heading: by the ground's homography, or shifted as a whole, as in the paper. Frames, and what was seen in
-    pictures, are kept in the folder `cache`; None: nothing is kept. With `forget` every picture is looked at,
-    also where `cache` tells what was seen in it. What is seen is the same, unless the code that sees acts
-    differently at different times: such code must run with `forget` or without a cache.
+    heading: by the ground's homography, or shifted as a whole, as in the paper's text or as in its authors'
+    code. Frames, and what was seen in pictures, are kept in the folder `cache`; None: nothing is kept. With
+    `forget` every picture is looked at, also where `cache` tells what was seen in it. What is seen is the
+    same, unless the code that sees acts differently at different times: such code must run with `forget` or
+    without a cache.
     """
 
     detector: str = PAPER
@@ -98,6 +99,8 @@ def build_detector(name: str, model: CameraModel):
     """The detector of DETECTORS that is called so, for one run's pictures."""
     if name == PAPER:
         from selfdrive.visiond.paper_detector import PaperDetector as Detector
+    elif name == AS_CODED:
+        from selfdrive.visiond.coded_detector import CodedDetector as Detector
     else:
         from selfdrive.visiond.robust_detector import RobustDetector as Detector
     return Detector(model)

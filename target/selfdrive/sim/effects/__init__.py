@@ -1,11 +1,13 @@
 """Weather, dirt and light that come between the road and the camera's picture.
 
-Only faults put these to use: a run without a fault never imports this package. Two presets: the paper's
-effects with its parameters (PaperRain, PaperFog, PaperSnow, PaperOcclusion, and the tone changes), and
+Only faults put these to use: a run without a fault never imports this package. Three presets: the paper's
+effects with its parameters (PaperRain, PaperFog, PaperSnow, PaperOcclusion, and the tone changes), those as
+its authors coded them (CodedRain, CodedFog, CodedSnow, CodedOcclusion, and the same tone changes), and
 physical ones in real units (Fog, Rain, Snow, LensMud, SunGlare, LowLight).
 """
 
 from selfdrive.sim.effects.air import Fog
+from selfdrive.sim.effects.as_coded import CodedFog, CodedOcclusion, CodedRain, CodedSnow
 from selfdrive.sim.effects.lens import LensMud, PaperOcclusion
 from selfdrive.sim.effects.light import LowLight, SunGlare
 from selfdrive.sim.effects.paper_weather import PaperFog, PaperRain, PaperSnow
@@ -15,6 +17,10 @@ from selfdrive.sim.effects.tone import AveragingBlur, Brightness, Contrast, Gaus
 __all__ = [
     "AveragingBlur",
     "Brightness",
+    "CodedFog",
+    "CodedOcclusion",
+    "CodedRain",
+    "CodedSnow",
     "Contrast",
     "Fog",
     "GaussianBlur",

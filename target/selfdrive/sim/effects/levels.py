@@ -15,6 +15,12 @@ PAPER: dict[type[Effect], tuple[float, ...]] = {
     effects.GaussianBlur: (3, 5, 7),
     effects.MedianBlur: (3, 5),
 }
+CODED: dict[type[Effect], tuple[float, ...]] = {
+    effects.CodedRain: TEN,
+    effects.CodedFog: TEN,
+    effects.CodedSnow: TEN,
+    effects.CodedOcclusion: TEN,
+}
 PHYSICAL: dict[type[Effect], tuple[float, ...]] = {
     effects.Fog: (1000, 500, 300, 200, 150, 100, 75, 50, 35, 25),
     effects.Rain: (2, 5, 10, 20, 30, 50, 75, 100, 150, 200),
@@ -23,4 +29,4 @@ PHYSICAL: dict[type[Effect], tuple[float, ...]] = {
     effects.SunGlare: (0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1, 1.5, 2, 3),
     effects.LowLight: (1000, 300, 100, 50, 20, 10, 5, 3, 2, 1),
 }
-LEVELS = PAPER | PHYSICAL
+LEVELS = PAPER | CODED | PHYSICAL

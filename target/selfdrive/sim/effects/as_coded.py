@@ -1,0 +1,122 @@
+"""Rain, fog, snow and occlusion as the paper's authors coded them, which is not what their text says.
+
+Every picture is drawn anew from the seed and its own number: streaks, flakes, droplets and blobs do not stay
+or move, they are elsewhere in the next picture. Contrast, brightness and blur are the ones in `tone`.
+Gaussians end at two sigma, as those of MATLAB do unless it is told otherwise.
+"""
+
+from math import ceil, cos, radians, sin
+from typing import ClassVar
+
+import cv2
+import numpy as np
+
+from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+from selfdrive.sim.effects.paper_weather import motion_kernel
+
+PICTURES_PER_SECOND = 20
+CANVAS = 2  # times the picture's size each way: streaks are drawn on it
+CROP = 264 / 480  # of the picture's rows: where in the canvas the picture begins
+STREAKS = 100  # of each pass for each level
+STREAK_GAINS = tuple(0.10 + 0.01 * k for k in range(1, 11))  # a pass for each
+STREAK_LENGTH, STREAK_LEAN = 32, radians(15.0)  # px; off the vertical
+DROPLETS = 15_000  # pixels for each level
+DROPLET_BLUR = 7.0  # px
+FLAKES = 250  # blocks in a layer
+FLAKE_SIZE = 2  # px
+BLOB_RADII = 5, 50  # px
+BLOB_BLUR = 7.0  # px
+COVERED = 150  # grey level of the blurred mask below which the mask is seen, not the road
+
+
+class _AsCoded(Effect):
+    """A level from 1 to 10, drawn anew in every picture."""
+
+    UNIT: ClassVar[str] = "level"
+    LEAST, MOST, WHOLE = 1, 10, True
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        """Nothing is the same for all pictures."""
+
+    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+        number = round(PICTURES_PER_SECOND * abs(scene.t))
+        stream = [self.seed, number, *type(self).__name__.encode()]
+        return self._drawn(picture, int(self.amount), np.random.Generator(np.random.PCG64(stream)))
+
+    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+        """The picture at that level, with what chance puts into it."""
+        raise NotImplementedError
+
+
+class CodedRain(_AsCoded):
+    """Ten passes of streaks, each brighter than the last, on a blurred and darker picture."""
+
+    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+        rows, columns = picture.shape
+        wet = cv2.convertScaleAbs(gaussian(picture, 0.5 + level / 10.0), alpha=0.75 - level / 100.0)
+        way = np.rint(STREAK_LENGTH * np.array([-sin(STREAK_LEAN), cos(STREAK_LEAN)])).astype(np.int32)
+        size = np.array([CANVAS * columns, CANVAS * rows])
+        first = np.array([0, round(CROP * rows)])
+        layer = np.empty_like(picture)
+        for gain in STREAK_GAINS:
+            start = (random.random((STREAKS * level, 2), np.float32) * size).astype(np.int32) - first
+            end = start + way
+            there = (end[:, 0] < columns) & (start[:, 0] >= 0) & (end[:, 1] >= 0) & (start[:, 1] < rows)
+            layer.fill(0)
+            streaks = np.stack([start[there], end[there]], axis=1)
+            cv2.polylines(layer, [*streaks], False, round(WHITE * gain))
+            cv2.add(wet, layer, dst=wet)
+        return wet
+
+
+class CodedFog(_AsCoded):
+    """White pixels in random places, blurred, added to a picture with less contrast."""
+
+    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+        return hazed(picture, level, random)
+
+
+class CodedSnow(_AsCoded):
+    """The fog, and in front of it one layer of flakes for each level, blurred ever more, then smeared."""
+
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._smear = motion_kernel(5, 75.0)
+
+    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+        rows, columns = picture.shape
+        snow, layer = np.zeros_like(picture), np.empty_like(picture)
+        for number in range(1, level + 1):
+            layer.fill(0)
+            places = random.integers(0, (rows - FLAKE_SIZE) * columns - FLAKE_SIZE, FLAKES)
+            for shift in (0, 1, columns, columns + 1):
+                layer.reshape(-1)[places + shift] = WHITE
+            cv2.add(snow, gaussian(layer, 0.5 + number / 10.0), dst=snow)
+        return cv2.add(hazed(picture, level, random), cv2.filter2D(snow, -1, self._smear))
+
+
+class CodedOcclusion(_AsCoded):
+    """One blob for each level in the picture's lower half: a black core, and a gray rim with a hard edge."""
+
+    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+        rows, columns = picture.shape
+        mask = np.full_like(picture, WHITE)
+        for size, across, down in random.random((level, 3)).tolist():
+            radius = round(BLOB_RADII[0] + size * (BLOB_RADII[1] - BLOB_RADII[0]))
+            lowest = rows - radius
+            centre = round(across * (columns - 1)), round(rows / 2 + down * (lowest - rows / 2))
+            cv2.circle(mask, centre, radius, 0, cv2.FILLED)
+        mask = gaussian(mask, BLOB_BLUR)
+        return cv2.copyTo(mask, cv2.compare(mask, COVERED, cv2.CMP_LT), picture.copy())
+
+
+def hazed(picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+    """The picture behind the fog of that level."""
+    droplets = np.zeros_like(picture)
+    droplets.reshape(-1)[random.integers(0, picture.size, DROPLETS * level)] = WHITE
+    return cv2.addWeighted(picture, 0.9 - 0.05 * level, gaussian(droplets, DROPLET_BLUR), 1.0, 0.0)
+
+
+def gaussian(picture: np.ndarray, sigma: float) -> np.ndarray:
+    """Blurred by a Gaussian that is cut at two sigma."""
+    size = 2 * ceil(2.0 * sigma) + 1
+    return cv2.GaussianBlur(picture, (size, size), sigma)

@@ -1,0 +1,146 @@
+"""The lane detector as the paper's authors coded it, which is more credulous than their text.
+
+Each window with a mark stands for itself, edges of all of them are clustered through whatever links them, and
+the two clusters next to the picture's middle are the lane's lines, whatever they look like. The net is ours,
+as theirs is not published.
+"""
+
+from math import pi, sqrt
+
+import cv2
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from selfdrive.common.array_math import dot
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.messages import CameraView
+from selfdrive.visiond.compiled_hog import build_hog
+from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine
+from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, windows
+from selfdrive.visiond.lane_net import LaneNet
+
+WIDTH, ROWS = 640, 480  # px: of the pictures that all places below are meant for
+FIRST_ROW, FIRST_COLUMN = 235, 90  # of the windows
+WINDOWS = 6, 29  # down, across
+SIZE = tuple((count - 1) * STRIDE + WINDOW for count in WINDOWS)  # px of the part that they cover
+PART = slice(FIRST_ROW, FIRST_ROW + SIZE[0]), slice(FIRST_COLUMN, FIRST_COLUMN + SIZE[1])
+THRESHOLD = 1.656  # log odds from which on a window has a mark; see coded_threshold
+STEEP = 4.0  # times the mean of the window's squared gradients: an edge
+LEAST_EDGES = 25  # px of a window that is looked at
+NEIGHBOURS = 5  # points that the clusters' radius is chosen to hold, were they spread evenly
+LEAST_POINTS = 30  # of a cluster
+MIDDLE = 320  # column on whose sides the lane's lines are looked for
+ROW = 278  # where lines are read
+INWARD = 3  # px by which a line is read nearer to the middle
+METRES_PER_PIXEL = 0.024856
+MISSING = 0  # column in which a line without a cluster is taken to be
+
+
+class CodedDetector:
+    """Looks at pictures of 640 x 480 pixels; remembers where it last saw the lines.
+
+    It is sure of all that it says: lines are straight along the car, and its path never leaves the car's.
+    Raises ConfigError for a camera with pictures of another size.
+    """
+
+    def __init__(self, model: CameraModel) -> None:
+        if (model.width, model.rows) != (WIDTH, ROWS):
+            raise ConfigError(
+                f"pictures of {model.width} x {model.rows}",
+                where="the camera's calibration",
+                expected=f"{WIDTH} x {ROWS} for the detector as coded",
+                remedy="take another detector",
+            )
+        self._hog = build_hog(*SIZE)
+        self.calculated_by = self._hog.calculated_by
+        self._net = LaneNet.load()
+        self.state: tuple[float, ...] = (0.5 * LANE_WIDTH, -0.5 * LANE_WIDTH)  # y (m) of left and right line
+
+    def detect(self, view: CameraView) -> LaneLines:
+        """The lines in `view.picture`. Where no edge is seen at all they stay where they were."""
+        part = np.ascontiguousarray(view.picture[PART])
+        points = self._points(part)
+        if points.size:
+            left, right = _columns_of_lines(points)
+            self.state = metres(left + INWARD), metres(right - INWARD)
+        left, right = (RoadLine(y=y) for y in self.state)
+        return LaneLines(left=left, right=right, path=RoadLine(y=0.0))
+
+    def _points(self, part: np.ndarray) -> np.ndarray:
+        """(row, column) in the picture of the edges in windows with a mark; an edge in several of them is
+        there as often."""
+        edges = edges_in_windows(part)
+        looked_at = np.flatnonzero(edges.sum(axis=(1, 2)) >= LEAST_EDGES)
+        if not looked_at.size:
+            return np.empty((0, 2), np.intp)
+        found = windows(self._hog.blocks(part)).reshape(-1, FEATURES)[looked_at]
+        marked = looked_at[self._net.score(found) > THRESHOLD]
+        which, row, column = edges[marked].nonzero()
+        down, across = np.divmod(marked[which], WINDOWS[1])
+        return np.column_stack((FIRST_ROW + STRIDE * down + row, FIRST_COLUMN + STRIDE * across + column))
+
+
+def edges_in_windows(part: np.ndarray) -> np.ndarray:
+    """Which pixels (windows, 32, 32) are edges in each window of the part: crests of the gradient down the
+    picture that are steep for their window, however faint."""
+    gradient = cv2.Sobel(part, cv2.CV_16S, 0, 1).astype(np.int32)
+    power = gradient * gradient
+    crest = np.zeros_like(power)
+    above, here, below = power[:-2], power[1:-1], power[2:]
+    np.copyto(crest[1:-1], here, where=(above <= here) & (here > below))
+    down, across = (size // STRIDE for size in part.shape)
+    tiles = power.reshape(down, STRIDE, across, STRIDE).sum(axis=(1, 3))
+    sums = tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]
+    limits = STEEP / WINDOW**2 * sums
+    of_windows = np.lib.stride_tricks.sliding_window_view(crest, (WINDOW, WINDOW))[::STRIDE, ::STRIDE]
+    return (of_windows > limits[:, :, np.newaxis, np.newaxis]).reshape(-1, WINDOW, WINDOW)
+
+
+def _columns_of_lines(points: np.ndarray) -> tuple[float, float]:
+    """In which columns the clusters of `points` (row, column) next to the middle cross the row where lines
+    are read, left and right of it."""
+    pixels, counts = np.unique(points, axis=0, return_counts=True)
+    labels = _linked(pixels, _radius(points))
+    size = np.bincount(labels, counts)
+    mean = np.bincount(labels, counts * pixels[:, 1]) / size
+    large = size >= LEAST_POINTS
+    columns = []
+    for beside, sign in ((large & (mean < MIDDLE), 1.0), (large & (mean > MIDDLE), -1.0)):
+        if beside.any():
+            nearest = np.where(beside, sign * mean, -np.inf).argmax()
+            columns.append(_crossing(pixels[labels == nearest], counts[labels == nearest]))
+        else:
+            columns.append(MISSING)
+    return columns[0], columns[1]
+
+
+def _radius(points: np.ndarray) -> float:
+    """Of a circle that holds NEIGHBOURS of the points, were they spread evenly over the box around them."""
+    down, across = (points.max(axis=0) - points.min(axis=0)).tolist()
+    return sqrt(down * across * NEIGHBOURS / (len(points) * pi))
+
+
+def _linked(pixels: np.ndarray, radius: float) -> np.ndarray:
+    """Cluster of each pixel: those are together that pixels lead to, none further away than the radius."""
+    pairs = cKDTree(pixels).query_pairs(radius, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(pixels),) * 2)
+    return connected_components(links, directed=False)[1]
+
+
+def _crossing(pixels: np.ndarray, counts: np.ndarray) -> float:
+    """The column in which the straight line through a cluster crosses the row where lines are read."""
+    row, column = pixels.T.astype(float)
+    weight = counts / counts.sum()
+    mean_row, mean_column = dot(weight, row), dot(weight, column)
+    down = row - mean_row
+    power = dot(weight * down, down)
+    slope = dot(weight * down, column) / power if power else 0.0
+    return mean_column + slope * (ROW - mean_row)
+
+
+def metres(column: float) -> float:
+    """How far (m, left positive) the road is to the side in a column of the row in which lines are read."""
+    return (MIDDLE - column) * METRES_PER_PIXEL
