@@ -1,11 +1,11 @@
 """Campaign files: which faults, in which scenarios, under which triggers, within which limits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
-from pydantic import Field, WithJsonSchema, field_validator, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from mutator.campaigns.studies import Study, find_study
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
@@ -14,7 +14,8 @@ from mutator.faults.readings import FILE, Readings
 from mutator.model import Limits, Method
 
 SCHEMA = "campaign/1"
-EVERY_READING = "*"  # whose time is in `armed_after_s` if that is one number
+EVERY_READING = "*"  # what holds in all of them, where a file does not tell them apart
+_Told = TypeVar("_Told")
 _MOST = 1_000_000_000  # of a limit or a time: no machine has more, and no run takes longer
 
 
@@ -50,7 +51,7 @@ class Campaign:
     `sample` is how many experiments are taken: each variant as often, or, with `proportional`, each fault
     type in each scenario in proportion to its number, guided and random ones in pairs.
     `study` names the published work that reports of the campaign stand beside (None: none).
-    `setting` names changes of the manifest that every run of the campaign is made with.
+    `setting_in(reading)` names changes of the manifest that every run of the campaign is made with.
     `reading` is None for the library's default. Before `armed_after(reading)` no trigger fires and no random
     time is drawn.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
@@ -64,7 +65,7 @@ class Campaign:
     source: bytes
     target: str
     scenarios: tuple[str, ...]
-    setting: tuple[str, ...]
+    setting: Mapping[str, tuple[str, ...]]
     faults: tuple[Selection, ...]
     reading: str | None
     methods: tuple[Method, ...]
@@ -83,12 +84,28 @@ class Campaign:
 
     def armed_after(self, reading: str) -> float:
         """When triggers are armed under a reading."""
-        times = self.armed_after_s
-        return times[reading] if reading in times else times[EVERY_READING]
+        return _in(self.armed_after_s, reading)
+
+    def setting_in(self, reading: str) -> tuple[str, ...]:
+        """The changes of the manifest under a reading."""
+        return _in(self.setting, reading)
+
+    def setting_keys(self, reading: str) -> Keys:
+        """Where in the file they stand."""
+        return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
         """An error (not raised) that points into the campaign file."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
+
+
+def _in(told: Mapping[str, _Told], reading: str) -> _Told:
+    return told[reading] if reading in told else told[EVERY_READING]
+
+
+def _by_reading(given: object) -> object:
+    """What is told of each reading; what is told once is told of all."""
+    return given if isinstance(given, dict) else {EVERY_READING: given}
 
 
 class _SelectionModel(StrictModel, title="A selection"):
@@ -104,6 +121,11 @@ class _SelectionModel(StrictModel, title="A selection"):
 
 _Seconds = Annotated[float, Field(ge=0.0, le=_MOST, allow_inf_nan=False)]
 _SECONDS = {"type": "number", "minimum": 0.0, "maximum": _MOST}
+_NAMES = {"type": "array", "items": {"type": "string"}}
+
+
+def _or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
 
 class _TriggersModel(StrictModel, title="Triggers"):
@@ -112,8 +134,7 @@ class _TriggersModel(StrictModel, title="Triggers"):
     table: str = Field(description="A context table, by its name.")
     rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
     armed_after_s: Annotated[
-        dict[str, _Seconds],
-        WithJsonSchema({"anyOf": [_SECONDS, {"type": "object", "additionalProperties": _SECONDS}]}),
+        dict[str, _Seconds], BeforeValidator(_by_reading), WithJsonSchema(_or_by_reading(_SECONDS))
     ] = Field(
         min_length=1,
         description="Before that time no trigger fires and no random time is drawn, in s since the start "
@@ -132,11 +153,6 @@ class _TriggersModel(StrictModel, title="Triggers"):
         description="How long a fault stays active once triggered; without it, while its context holds, or "
         "from its random time to the end.",
     )
-
-    @field_validator("armed_after_s", mode="before")
-    @classmethod
-    def _by_reading(cls, given: object) -> object:
-        return given if isinstance(given, dict) else {EVERY_READING: given}
 
     @model_validator(mode="after")
     def _check(self) -> "_TriggersModel":
@@ -181,9 +197,12 @@ class CampaignModel(StrictModel, title="The file"):
     )
     target: str = Field(description="The target, by the name of its manifest.")
     scenarios: list[str] = Field(min_length=1, description="Names of scenarios, each once.")
-    setting: list[str] = Field(
-        default_factory=list,
-        description="Changes of the manifest that every run is made with, fault-free ones included.",
+    setting: Annotated[
+        dict[str, list[str]], BeforeValidator(_by_reading), WithJsonSchema(_or_by_reading(_NAMES))
+    ] = Field(
+        {EVERY_READING: []},
+        description="Changes of the manifest that every run is made with, fault-free ones included: one "
+        "list, or one for each reading by its name.",
     )
     faults: list[_SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
     reading: str | None = Field(
@@ -228,12 +247,17 @@ def load_campaign(path: Path) -> Campaign:
     Whether its study can be had is asked by `load_study` alone: old runs open without it.
     """
     model, source = read(path, CampaignModel, SCHEMA)
-    for key in ("scenarios", "setting", "methods"):
+    settings: dict[Keys, Sequence[str]] = {
+        ("setting",) if name == EVERY_READING else ("setting", name): names
+        for name, names in model.setting.items()
+    }
+    once: dict[Keys, Sequence[str]] = {("scenarios",): model.scenarios, ("methods",): model.methods}
+    for keys, values in (once | settings).items():
         seen = set[str]()
-        for i, value in enumerate(getattr(model, key)):
+        for i, value in enumerate(values):
             if value in seen:
                 raise source.error(
-                    (key, i), f"'{value}' stands here a second time", remedy="remove one of the two"
+                    (*keys, i), f"'{value}' stands here a second time", remedy="remove one of the two"
                 )
             seen.add(value)
     triggers = model.triggers
@@ -245,7 +269,7 @@ def load_campaign(path: Path) -> Campaign:
         source=path.read_bytes(),
         target=model.target,
         scenarios=tuple(model.scenarios),
-        setting=tuple(model.setting),
+        setting={reading: tuple(names) for reading, names in model.setting.items()},
         faults=tuple(Selection(spec=item.spec, values=item.values) for item in model.faults),
         reading=model.reading,
         methods=tuple(Method(name) for name in model.methods),
@@ -278,23 +302,30 @@ def load_study(campaign: Campaign) -> Study | None:
 
 def check_readings(campaign: Campaign, readings: Readings) -> None:
     """MutatorError with file and line for a reading that the library does not declare, or for one that
-    `armed_after_s` leaves out."""
-    known, keys = ", ".join(readings.names), ("triggers", "armed_after_s")
+    `armed_after_s` or `setting` leaves out."""
+    known = ", ".join(readings.names)
     remedy = f"correct the name, or declare the reading in the library's {FILE}"
     if campaign.reading is not None and campaign.reading not in readings.names:
         raise campaign.error(
             ("reading",), f"reading '{campaign.reading}'", expected=f"one of {known}", remedy=remedy
         )
-    if EVERY_READING in campaign.armed_after_s:
-        return
-    for name in campaign.armed_after_s:
-        if name not in readings.names:
-            raise campaign.error(
-                (*keys, name), f"reading '{name}'", expected=f"one of {known}", remedy=remedy
-            )
-    for name in readings.names:
-        if name not in campaign.armed_after_s:
-            remedy = f"add `{name}: ...`, or write one number for all of them"
-            raise campaign.error(
-                keys, f"no time for reading '{name}'", expected=f"one for each of {known}", remedy=remedy
-            )
+    places: dict[Keys, tuple[str, Mapping[str, object]]] = {
+        ("triggers", "armed_after_s"): ("time", campaign.armed_after_s),
+        ("setting",): ("setting", campaign.setting),
+    }
+    for keys, (what, told) in places.items():
+        if EVERY_READING in told:
+            continue
+        for name in told:
+            if name not in readings.names:
+                raise campaign.error(
+                    (*keys, name), f"reading '{name}'", expected=f"one of {known}", remedy=remedy
+                )
+        for name in readings.names:
+            if name not in told:
+                raise campaign.error(
+                    keys,
+                    f"no {what} for reading '{name}'",
+                    expected=f"one for each of {known}",
+                    remedy=f"add `{name}: ...`, or write one for all of them",
+                )

@@ -65,10 +65,11 @@ class Expansion:
         return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
 
     def _check_setting(self) -> None:
-        for i, change in enumerate(self.campaign.setting):
+        keys = self.campaign.setting_keys(self.reading)
+        for i, change in enumerate(self.campaign.setting_in(self.reading)):
             if change not in self.manifest.changes:
                 raise self.campaign.error(
-                    ("setting", i),
+                    (*keys, i),
                     f"change '{change}'",
                     expected=f"one of {', '.join(self.manifest.changes) or 'none'}",
                     remedy="name a change of the target's manifest",
@@ -154,7 +155,7 @@ class Expansion:
             method=method,
             trigger=trigger,
             seed=self.seed,
-            setting=self.campaign.setting,
+            setting=self.campaign.setting_in(self.reading),
         )
 
     def _scenario_digest(self, scenario: str) -> str:

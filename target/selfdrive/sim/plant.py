@@ -38,7 +38,7 @@ class Plant:
     """
 
     gearbox_scale = 1.0
-    swaps_lines = False  # whether the simulator around it sends the lane's right line as the left one
+    mirrors = False  # whether what is left in the camera's picture is right for who sends what it shows
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         self.speed = speed
@@ -65,4 +65,8 @@ class Plant:
 
     def shown(self, truth: GroundTruth) -> GroundTruth:
         """What camera and radar can see: all there is."""
+        return truth
+
+    def pictured(self, truth: GroundTruth) -> GroundTruth:
+        """What the camera's pictures are taken of: likewise."""
         return truth

@@ -46,13 +46,14 @@ class CrudeLateral:
 class ReferencePlant(Plant):
     """The standard plant's longitudinal motion with the original's errors around it.
 
-    The gearbox sends km/h where m/s are meant. Camera and radar see a car in mid-lane wherever it is, and
-    what is seen as the left line is sent as the right one: it counts right positive, the controller left.
+    The gearbox sends km/h where m/s are meant. Lanes count right positive, where the controller counts left:
+    so the left one is sent as the right one, and pictures move to the other side. Without pictures, camera
+    and radar see a car in mid-lane wherever it is.
     A distance ends at 0; headway time starts at 30 s and stays as it was while the car stands.
     """
 
     gearbox_scale = MS_TO_KPH
-    swaps_lines = True
+    mirrors = True
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         super().__init__(car, speed=speed, offset=offset)
@@ -72,3 +73,7 @@ class ReferencePlant(Plant):
     def shown(self, truth: GroundTruth) -> GroundTruth:
         """The car's drift is kept from camera and radar."""
         return truth._replace(lateral_offset=0.0)
+
+    def pictured(self, truth: GroundTruth) -> GroundTruth:
+        """The car is as far on the other side."""
+        return truth._replace(lateral_offset=-truth.lateral_offset)

@@ -22,7 +22,7 @@ from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.sim.vision import Pictures, build_vision
-from selfdrive.visiond.detector import SwappedLines
+from selfdrive.visiond.detector import MirroredDetector
 from selfdrive.visiond.visiond import Visiond
 
 RECORD_SCHEMA = "sim-record/1"
@@ -62,7 +62,7 @@ class Simulator:
         self._lead = LeadVehicle(lead.gap, lead.times, lead.speeds) if lead else None
         self._radar = RadarSensor(self._road)
         self._vision = build_vision(pictures, self._road, seed)
-        self._camera = self._vision.camera
+        self._camera, self._takes_pictures = self._vision.camera, pictures is not None
         self._film = Film(film, self._vision.model) if film else None
         self._receiver = ActuatorReceiver()
         self._actuators = Actuators()
@@ -71,8 +71,9 @@ class Simulator:
         self._plant = make_plant(car.params, speed=scenario.speed, offset=scenario.lateral_offset)
         self._sensors = CarSensors(self._plant.gearbox_scale)
         detector = self._vision.detector
-        seen_by = SwappedLines(detector) if make_plant.swaps_lines else detector
-        self.manager = Manager(car, RadarInterface(), Visiond(seen_by))
+        if make_plant.mirrors:
+            detector = MirroredDetector(detector)
+        self.manager = Manager(car, RadarInterface(), Visiond(detector))
         self.hazards = HazardMonitor()
         self.recorder = Recorder()
 
@@ -92,7 +93,7 @@ class Simulator:
         if self.frame % CYCLE == 0:
             shown = self._plant.shown(truth)
             measured += self._radar.measure(shown)
-            view = self._camera.look(shown)
+            view = self._camera.look(self._plant.pictured(truth) if self._takes_pictures else shown)
         frames: list[CanFrame] = []
         frames.extend(measured)
         sent = self.manager.step(t, frames, view)

@@ -47,16 +47,20 @@ class IdealDetector:
         )
 
 
-class SwappedLines:
-    """Sees what another detector sees, and takes each of the lane's lines for the other one."""
+class MirroredDetector:
+    """Sees what another detector sees, and takes left for right."""
 
     def __init__(self, detector: LaneDetector) -> None:
         self._detector = detector
 
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in this view."""
-        left, right, path = self._detector.detect(view)
-        return LaneLines(left=right, right=left, path=path)
+        return LaneLines(*(_mirrored(line) for line in self._detector.detect(view)))
+
+
+def _mirrored(line: RoadLine) -> RoadLine:
+    bend = line.bend and tuple(-y for y in line.bend)
+    return RoadLine(y=-line.y, slope=-line.slope, prob=line.prob, bend=bend)
 
 
 def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
