@@ -27,7 +27,7 @@ FIRST_ROW, FIRST_COLUMN = 235, 90  # of the windows
 WINDOWS = 6, 29  # down, across
 SIZE = tuple((count - 1) * STRIDE + WINDOW for count in WINDOWS)  # px of the part that they cover
 PART = slice(FIRST_ROW, FIRST_ROW + SIZE[0]), slice(FIRST_COLUMN, FIRST_COLUMN + SIZE[1])
-THRESHOLD = 1.656  # log odds from which on a window has a mark; see coded_threshold
+THRESHOLD = 4.0  # log odds from which on a window has a mark; see coded_threshold
 STEEP = 4.0  # times the mean of the window's squared gradients: an edge
 LEAST_EDGES = 25  # px of a window that is looked at
 NEIGHBOURS = 5  # points that the clusters' radius is chosen to hold, were they spread evenly
@@ -46,7 +46,7 @@ class CodedDetector:
     Raises ConfigError for a camera with pictures of another size.
     """
 
-    def __init__(self, model: CameraModel) -> None:
+    def __init__(self, model: CameraModel, threshold: float = THRESHOLD) -> None:
         if (model.width, model.rows) != (WIDTH, ROWS):
             raise ConfigError(
                 f"pictures of {model.width} x {model.rows}",
@@ -56,7 +56,7 @@ class CodedDetector:
             )
         self._hog = build_hog(*SIZE)
         self.calculated_by = self._hog.calculated_by
-        self._net = LaneNet.load()
+        self._net, self._threshold = LaneNet.load(), threshold
         self.state: tuple[float, ...] = (0.5 * LANE_WIDTH, -0.5 * LANE_WIDTH)  # y (m) of left and right line
 
     def detect(self, view: CameraView) -> LaneLines:
@@ -77,7 +77,7 @@ class CodedDetector:
         if not looked_at.size:
             return np.empty((0, 2), np.intp)
         found = windows(self._hog.blocks(part)).reshape(-1, FEATURES)[looked_at]
-        marked = looked_at[self._net.score(found) > THRESHOLD]
+        marked = looked_at[self._net.score(found) > self._threshold]
         which, row, column = edges[marked].nonzero()
         down, across = np.divmod(marked[which], WINDOWS[1])
         return np.column_stack((FIRST_ROW + STRIDE * down + row, FIRST_COLUMN + STRIDE * across + column))
