@@ -1,0 +1,69 @@
+"""Rain, fog, snow and occlusion as coded: how much of what is drawn where, and anew each time."""
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.sim.effects import CodedFog, CodedOcclusion, CodedRain, CodedSnow
+from selfdrive.sim.effects.as_coded import gaussian
+
+EFFECTS = (CodedRain, CodedFog, CodedSnow, CodedOcclusion)
+
+
+@pytest.fixture(scope="module")
+def black(camera):
+    return np.zeros((camera.rows, camera.width), np.uint8)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_each_picture_is_drawn_anew(effect, camera, moment, road):
+    """The same picture number gives the same picture in another run, another one nothing of it."""
+    one, other = effect(7, 3, camera), effect(7, 3, camera)
+    later = other.apply(road, moment(5))
+    assert np.array_equal(one.apply(road, moment(5)), later)
+    change = [np.abs(one.apply(road, moment(k)).astype(int) - road) for k in (5, 6)]
+    together = np.corrcoef(change[0].ravel(), change[1].ravel())[0, 1]
+    assert together < 0.97  # what haze has in common is that all contrast is less
+
+
+@pytest.mark.parametrize("level", [2, 10])
+def test_rain_covers_what_a_quarter_of_the_streaks_do(camera, moment, black, level):
+    """1,000 streaks of 32 pixels for each level on four times the picture, brighter with each pass."""
+    rain = CodedRain(level, 3, camera).apply(black, moment())
+    assert rain[rain > 0].min() == round(255 * 0.11)
+    expected = 1000 * level * 31 / (4 * black.size)  # along a streak each row has a pixel
+    assert -np.log(1.0 - (rain > 0).mean()) == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize("level", [3, 10])
+def test_fog_is_white_pixels_blurred(camera, moment, black, level):
+    """15,000 for each level, some in the same place; the road's share of the light is 0.9 - 0.05 t."""
+    fog = CodedFog(level, 3, camera).apply(black, moment())
+    covered = 1.0 - np.exp(-15_000 * level / black.size)
+    assert fog.mean() == pytest.approx(255 * covered, rel=0.02)
+    grey = CodedFog(level, 3, camera).apply(black + 100, moment())
+    assert grey.mean() - fog.mean() == pytest.approx(100 * (0.9 - 0.05 * level), abs=1.0)
+
+
+@pytest.mark.parametrize("level", [1, 10])
+def test_snow_is_fog_and_blocks(camera, moment, black, level):
+    """250 blocks of 2 x 2 for each level; blurring keeps their light."""
+    snow, fog = (effect(level, 3, camera).apply(black, moment()) for effect in (CodedSnow, CodedFog))
+    blocks = (snow.mean() - fog.mean()) * black.size / (4 * 255)
+    assert blocks == pytest.approx(250 * level, rel=0.15)
+
+
+def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
+    """Black blobs in the lower half, gray up to 150 where they end, the road untouched beyond."""
+    seen = CodedOcclusion(10, 3, camera).apply(road, moment())
+    changed = seen != road
+    assert changed.any() and not changed[: camera.rows // 2 - 60].any()
+    assert seen.min() == 0 and 140 <= seen[changed].max() < 150
+
+
+def test_gaussians_end_at_two_sigma():
+    """Beyond there is nothing of a point's light."""
+    point = np.zeros((41, 41), np.uint8)
+    point[20, 20] = 255
+    for sigma, reach in ((0.6, 2), (1.5, 3), (7.0, 14)):
+        rows = cv2.reduce(gaussian(point.astype(np.float32), sigma), 1, cv2.REDUCE_SUM).ravel().nonzero()[0]
+        assert (rows[0], rows[-1]) == (20 - reach, 20 + reach)

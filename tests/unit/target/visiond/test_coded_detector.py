@@ -1,0 +1,98 @@
+"""The lane detector as its authors coded it, with all that it is too credulous for."""
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.errors import ConfigError
+from selfdrive.messages import CameraView
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond import coded_detector as coded
+from selfdrive.visiond.coded_detector import CodedDetector, edges_in_windows, metres
+from selfdrive.visiond.detector import LaneLines
+
+CALTECH = CameraModel()
+
+
+def seen(detector: CodedDetector, picture: np.ndarray) -> LaneLines:
+    """What is seen in a picture alone."""
+    return detector.detect(
+        CameraView(left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture)
+    )
+
+
+@pytest.fixture(scope="module")
+def road() -> RoadRenderer:
+    return RoadRenderer(CALTECH, "solid", 5, periods=3)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.4, -0.4])
+def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
+    """Where they cross row 278, three pixels nearer to the middle, on the detector's own scale."""
+    found = seen(CodedDetector(CALTECH), road.grey(4.0, offset))
+    for line, true, inward in zip(found[:2], road.truth(offset), (3, -3), strict=True):
+        a, b = CALTECH.line_in_picture(*true)
+        assert line.y == pytest.approx(metres(a * 278 + b + inward), abs=0.05)
+        assert (line.slope, line.prob) == (0.0, 1.0)
+    assert found.path == (0.0, 0.0, 1.0, None)
+
+
+def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> None:
+    """Far to the left of the car, whichever line it is, and it is sure of that, too."""
+    for half, expected in ((slice(320, None), (None, 8.03)), (slice(None, 320), (7.88, None))):
+        picture = road.grey(4.0).copy()
+        picture[:, half] = 97
+        found = seen(CodedDetector(CALTECH), picture)
+        for line, y in zip(found[:2], expected, strict=True):
+            assert line.prob == 1.0
+            if y is not None:
+                assert line.y == pytest.approx(y, abs=0.005)
+
+
+def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
+    """Of a picture without content nothing is learnt."""
+    detector = CodedDetector(CALTECH)
+    before = seen(detector, road.grey(4.0, 0.3))
+    assert seen(detector, np.full((480, 640), 97, np.uint8)) == before
+    blind = CodedDetector(CALTECH)
+    assert seen(blind, np.zeros((480, 640), np.uint8)).left.y == 1.85
+
+
+def test_state_is_all_it_remembers(road: RoadRenderer) -> None:
+    """Who takes over another's state goes on as that one."""
+    one, other = CodedDetector(CALTECH), CodedDetector(CALTECH)
+    seen(one, road.grey(4.0, 0.3))
+    other.state = one.state
+    nothing = np.zeros((480, 640), np.uint8)
+    assert seen(other, nothing) == seen(one, nothing)
+
+
+def test_steepness_is_relative_to_the_window() -> None:
+    """A tenth of the contrast gives the same edges: how faint they are does not matter."""
+    random = np.random.default_rng(1)
+    faint = random.integers(0, 10, coded.SIZE).astype(np.uint8)
+    assert edges_in_windows(faint).any()
+    assert np.array_equal(edges_in_windows(faint), edges_in_windows(10 * faint))
+
+
+def test_edges_are_crests_down_the_picture() -> None:
+    """A step from row to row is an edge of one row, one from column to column is none."""
+    level, upright = np.zeros((2, *coded.SIZE), np.uint8)
+    level[40:], upright[:, 40:] = 100, 100
+    assert edges_in_windows(level).any()
+    assert not edges_in_windows(upright).any()
+
+
+def test_clusters_are_what_pixels_lead_to() -> None:
+    """A bridge of single pixels joins two crowds; the nearest cluster of 30 points to the middle counts."""
+    crowd = np.argwhere(np.ones((8, 8), bool))
+    beyond = crowd + np.array([0, 38])
+    chain = np.column_stack((np.full(30, 4), np.arange(8, 38)))
+    labels = coded._linked(np.concatenate((crowd, chain, beyond)), 1.5)
+    assert len(set(labels)) == 1
+    assert len(set(coded._linked(np.concatenate((crowd, beyond)), 1.5))) == 2
+
+
+def test_another_size_of_picture_is_refused() -> None:
+    """All its places are pixels of one camera."""
+    with pytest.raises(ConfigError, match=r"pictures of 1280 x 720.*expected 640 x 480"):
+        CodedDetector(CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5))
