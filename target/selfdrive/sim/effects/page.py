@@ -15,9 +15,10 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim.effects.effect import Effect, Moment
-from selfdrive.sim.effects.levels import PAPER, PHYSICAL
+from selfdrive.sim.effects.levels import CODED, PAPER, PHYSICAL
 from selfdrive.sim.effects.severity import RoadGauge, Severity
 from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.detector import LaneDetector, LaneLines
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
@@ -28,6 +29,7 @@ STEP, SPEED = 0.05, 26.82  # s, m/s
 DETECTORS: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)
     "paper": (PaperDetector, (60, 60, 255), 7),
     "robust": (RobustDetector, (255, 200, 0), 2),
+    "as_coded": (CodedDetector, (80, 220, 80), 1),
 }
 AHEAD, ERROR = 10.0, 0.3  # m: a line counts as found where it is no further off than this
 SMALL = 320, 240
@@ -43,9 +45,9 @@ flakes fall and come nearer from picture to picture, dirt stays on the lens. The
 bytes. Grey levels are taken as proportional to light, so that laws of optics hold for them as they stand.
 
 The pictures show levels 1, 5 and 10, or the mildest, a middle and the strongest where there are fewer; lines
-show what detectors find: **broad red** the `paper` detector, **narrow blue** the `robust` one. The tables
-give means over {seeds} seeds and {pictures} pictures each, 20 a second, at 60 mph in the middle of a rendered
-lane with solid lines, by the default camera:
+show what detectors find: **broad red** the `paper` detector, **narrow blue** the `robust` one, **thin green**
+the one `as_coded`. The tables give means over {seeds} seeds and {pictures} pictures each, 20 a second, at
+60 mph in the middle of a rendered lane with solid lines, by the default camera:
 
 * PSNR against the clean picture: the higher, the more alike.
 * Mark contrast: grey levels between the lane's lines and the road beside them, 5 to 30 m ahead. Clean
@@ -60,6 +62,12 @@ PRESETS = (
         "The paper's effects",
         PAPER,
         "With the paper's parameters; an amount is a level, a gain, a bias or a kernel.",
+    ),
+    (
+        "The paper's effects as coded",
+        CODED,
+        "As the paper's authors coded them: drawn anew in every picture. Contrast, brightness and blur are "
+        "those above.",
     ),
     ("Physical effects", PHYSICAL, "In real units, after published laws, which the modules name."),
 )

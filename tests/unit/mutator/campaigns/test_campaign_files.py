@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.campaign_files import check_readings, load_campaign, load_study
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.verification.library import check_library
@@ -111,6 +111,25 @@ def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
     assert [campaign.armed_after(name) for name in toycar.readings().names] == [1.25, 1.25]
 
 
+def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
+    """A list stands for every reading; without one there is none; nothing stands in one list twice."""
+    for text, expected in (
+        ("", {"as_described": (), "as_coded": ()}),
+        ("setting: [alone]\n", {"as_described": ("alone",), "as_coded": ("alone",)}),
+        ("setting: {as_described: [], as_coded: [alone]}\n", {"as_described": (), "as_coded": ("alone",)}),
+    ):
+        path = in_library(toycar, "methods:", f"{text}methods:")
+        campaign = load_campaign(path)
+        check_readings(campaign, toycar.readings())
+        assert {name: campaign.setting_in(name) for name in expected} == expected
+    for name in expected:
+        made = make_plan(toycar, path, Choices(reading=name)).experiments
+        assert {experiment.setting for experiment in made} == {expected[name]}
+    twice = in_library(toycar, "methods:", "setting: {as_coded: [alone, alone]}\nmethods:")
+    with pytest.raises(MutatorError, match=r"mine\.yaml:9: 'alone' stands here a second time"):
+        load_campaign(twice)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "told"),
     [
@@ -122,6 +141,18 @@ def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
         ),
         ("as_coded: 0.0", "as_built: 0.0", 12, "reading 'as_built'; expected one of as_described, as_coded"),
         (", as_coded: 0.0", "", 12, "no time for reading 'as_coded'"),
+        (
+            "methods:",
+            "setting: {as_described: [alone]}\nmethods:",
+            9,
+            "no setting for reading 'as_coded'",
+        ),
+        (
+            "methods:",
+            "setting: {as_described: [], as_coded: [upside_down]}\nreading: as_coded\nmethods:",
+            9,
+            "change 'upside_down'",
+        ),
     ],
 )
 def test_readings_are_those_of_the_library(

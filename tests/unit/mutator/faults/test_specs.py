@@ -73,6 +73,18 @@ def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
     assert (silent.value, silent.unit) == (None, "-")
 
 
+def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
+    """What a reading says of it overrides the variant; a reading that is not written is the default one."""
+    path = toy.spec(NAME).path
+    text = path.read_text()
+    both = text.index("as_coded:", text.index("both:"))
+    path.write_text(text[:both] + text[both:].replace("as_coded:", "as_coded:\n      hold: to_end", 1))
+    workspace = Workspace.find(root=toy.library.parent)
+    assert {fault.hold for fault in of(faults(workspace), "both")} == {None}
+    assert {fault.hold for fault in of(faults(workspace, reading="as_coded"), "both")} == {Hold.TO_END}
+    assert {fault.hold for fault in of(faults(workspace, reading="as_coded"), "silent")} == {Hold.TO_END}
+
+
 def test_ids_are_contents(toy: Workspace) -> None:
     """The same seed gives the same ids, another seed others, and no two faults share one."""
     again = [f.id for f in faults(toy)]

@@ -99,6 +99,7 @@ def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
+    assert {e.setting for e in coded.experiments} == {("pictures", "coded_detector", "coded_translation")}
 
 
 def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
@@ -121,12 +122,13 @@ def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) ->
     assert {(e.scenario, e.method) for e in smoke} == {(s, m) for s in SCENARIOS for m in Method}
 
 
-def test_the_reference_campaign_takes_all_of_five_types(library: Workspace) -> None:
-    """On the reference plant: every value of five fault types, as coded, in all scenarios and contexts."""
+def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> None:
+    """On the reference plant, seen as coded: every value of every fault type, guided and at random times."""
     plan = make_plan(library, "paper_reference")
-    wanted = ("ghost_vehicle", "jamming", "steer", "path_model", "camera_unavailable")
-    assert kinds(plan, Method.GUIDED) == {kind: n for kind, n in INJECTED.items() if kind[1] in wanted}
-    assert {(e.setting, e.fault.reading) for e in plan.experiments} == {(("reference_plant",), "as_coded")}
+    assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
+    seeing = ("pictures", "coded_detector", "coded_translation")
+    settings = {(e.setting, e.fault.reading) for e in plan.experiments}
+    assert settings == {(("reference_plant", *seeing), "as_coded")}
 
 
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:

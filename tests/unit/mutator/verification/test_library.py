@@ -100,13 +100,16 @@ def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Without lead they aim at H2, at steering, lanes and pictures at H3, else at H1; lost data stay lost."""
+    """Without lead they aim at H2, at steering, lanes and pictures at H3, else at H1; what
+    stays: lost data as described, bad pictures as coded."""
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
         lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")
         assert ("pictures" in fault.changes) == seen
         assert fault.aim == ("H3" if lateral else "H2" if fault.changes == ("no_lead",) else "H1")
         assert (fault.hold is Hold.TO_END) == (fault.fault_type in ("jamming", "camera_unavailable"))
+    for fault in faults["as_coded"]:
+        assert (fault.hold is Hold.TO_END) == (fault.module == "vision_input")
     alone = Counter(f.fault_type for f in faults["as_described"] if "no_lead" in f.changes)
     assert alone == {"ghost_vehicle": 31, "speed": 6, "relative_distance": 50}
 

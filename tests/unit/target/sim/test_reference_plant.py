@@ -15,6 +15,7 @@ from selfdrive.sim.run import main
 from selfdrive.sim.scenario import load_scenario, on_plant, parse_scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.simulator import Simulator
+from selfdrive.sim.truth import GroundTruth
 
 TEXT = "schema: scenario/1\nname: a\ntitle: b\nduration_s: 1\nhost: {speed_mps: 20}\nplant: reference\n"
 
@@ -171,3 +172,20 @@ def test_both_plants_in_one_simulator(s1):
     assert [result.record["plant"] for result in results] == ["reference", "standard", "reference"]
     for name, values in results[0].trace.items():
         assert values.tobytes() == results[2].trace[name].tobytes(), name
+
+
+def test_lines_are_mirrored(s1):
+    """The controller is sent the left line where the right one is, and its own side is never seen."""
+    simulator = Simulator()
+    simulator.reset(s1, 0)
+    simulator.step()
+    model = simulator.manager.model
+    assert (model.left_lane.points[0], model.right_lane.points[0]) == (-1.85, 1.85)
+    assert model.path.points[0] == 0.0
+
+
+def test_pictures_move_to_the_other_side(car):
+    """A car that is left of the middle is shown as far to the right; the rest is as it is."""
+    truth = GroundTruth(*(1.0, 50.0, 20.0, 20.0, 0.0, 0.3, 0.0, 0.0, 0.0, 20.0, 2.5), free_road=False)
+    assert car.pictured(truth) == truth._replace(lateral_offset=-0.3)
+    assert car.shown(truth) == truth._replace(lateral_offset=0.0)
