@@ -19,8 +19,10 @@ from selfdrive.visiond.detector import LaneDetector, LaneLines, RoadLine
 # All files that decide what is seen in a picture of some key. Not visiond.py, which uses what was seen, and
 # not picture_camera.py, which says what picture it is: what these do shows in the key, or comes after.
 SEEING = (
+    "common/array_math.py",
     "common/camera_model.py",
     "common/compiled.py",
+    "common/ordered.py",
     "sim/detection_memory.py",
     "sim/effects/*.py",
     "sim/image_folder.py",

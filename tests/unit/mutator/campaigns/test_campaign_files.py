@@ -147,12 +147,6 @@ def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
             9,
             "no setting for reading 'as_coded'",
         ),
-        (
-            "methods:",
-            "setting: {as_described: [], as_coded: [upside_down]}\nreading: as_coded\nmethods:",
-            9,
-            "change 'upside_down'",
-        ),
     ],
 )
 def test_readings_are_those_of_the_library(
@@ -164,6 +158,15 @@ def test_readings_are_those_of_the_library(
         make_plan(toycar, path)
     assert f"{path}:{line}: {told}" in str(error.value)
     assert any(told in str(problem) for problem in check_library(toycar, "toycar"))
+
+
+def test_a_setting_that_is_none_is_told_by_its_reading(toycar: Workspace) -> None:
+    """Changes are looked up in the manifest when a plan is made, those of the other reading are not."""
+    text = "setting: {as_described: [], as_coded: [upside_down]}\nmethods:"
+    path = in_library(toycar, "methods:", text)
+    make_plan(toycar, path)
+    with pytest.raises(MutatorError, match=r"mine\.yaml:9: change 'upside_down'"):
+        make_plan(toycar, path, Choices(reading="as_coded"))
 
 
 def test_a_study_that_is_not_installed_is_refused(toycar: Workspace, tmp_path: Path) -> None:

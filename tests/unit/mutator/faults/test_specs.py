@@ -79,7 +79,7 @@ def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
     path.write_text(text[:both] + text[both:].replace("as_coded:", "as_coded:\n      hold: to_end", 1))
-    workspace = Workspace.find(root=toy.library.parent)
+    workspace = Workspace(library=toy.library, templates=toy.templates)
     assert {fault.hold for fault in of(faults(workspace), "both")} == {None}
     assert {fault.hold for fault in of(faults(workspace, reading="as_coded"), "both")} == {Hold.TO_END}
     assert {fault.hold for fault in of(faults(workspace, reading="as_coded"), "silent")} == {Hold.TO_END}

@@ -119,7 +119,8 @@ def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
     described, coded = faults["as_described"], faults["as_coded"]
     assert [(f.spec, f.value) for f in described] == [(f.spec, f.value) for f in coded]
     differing = {f.fault_type for f, g in zip(described, coded, strict=True) if f.injections != g.injections}
-    assert differing == {"speed", "steer", "path_model", "jamming"}
+    pictures = {f.fault_type for f in described if f.module == "vision_input"}
+    assert differing == {"speed", "steer", "path_model", "jamming"} | pictures
     for fault, slipped in zip(described, coded, strict=True):
         value = dict(fault.injections[0].params).get("by")
         other = dict(slipped.injections[0].params)
@@ -131,6 +132,9 @@ def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
         if fault.fault_type == "path_model":
             assert {i.model for i in slipped.injections} == {"drift"}
             assert (other["per_step"], other["stays"]) == (value, True)
+        if fault.module == "vision_input":
+            assert (other["amount"], other["scene"]) == (dict(fault.injections[0].params)["amount"], "truth")
+            assert slipped.injections[0].location.variable == "frame"
         if fault.fault_type == "jamming":
             assert slipped.injections[0].location.path == "selfdrive/sim/simulator.py"
 

@@ -12,7 +12,7 @@ from selfdrive.sim.moved_picture import HEADING_STEP, OFFSET_STEP, SHIFT_DISTANC
 from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.road import Road
 from selfdrive.sim.road_renderer import RoadRenderer, first_road_row
-from selfdrive.sim.vision import GROUND, SHIFT, Pictures, build_vision
+from selfdrive.sim.vision import CODED, GROUND, SHIFT, Pictures, build_vision
 
 CALTECH = CameraModel()
 UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0, height=1.22)
@@ -107,6 +107,16 @@ def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture
     away = offset + SHIFT_DISTANCE * np.tan(heading)
     shift = round(away / CALTECH.metres_per_pixel(CALTECH.row(SHIFT_DISTANCE)))
+    columns = np.clip(np.arange(CALTECH.width) - shift, 0, CALTECH.width - 1)
+    assert np.array_equal(picture, renderer.grey(0.0)[:, columns])
+
+
+@pytest.mark.parametrize("offset", [0.5, -0.9, 3.0])
+def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
+    """The whole picture moves by a pixel for 0.03895 m, at most for 1 m; how the car is turned is not seen."""
+    looking, renderer = camera(CALTECH, CODED)
+    picture = looking.look(truth(lateral_offset=offset, heading=0.02)).picture
+    shift = round(min(max(offset, -1.0), 1.0) / 0.03895)
     columns = np.clip(np.arange(CALTECH.width) - shift, 0, CALTECH.width - 1)
     assert np.array_equal(picture, renderer.grey(0.0)[:, columns])
 

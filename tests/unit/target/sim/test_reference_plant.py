@@ -179,7 +179,7 @@ def test_lines_are_mirrored(s1):
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator.step()
-    model = simulator.manager.model
+    model = simulator.manager.visiond.latest
     assert (model.left_lane.points[0], model.right_lane.points[0]) == (-1.85, 1.85)
     assert model.path.points[0] == 0.0
 
