@@ -59,5 +59,6 @@ class PaperDetector:
         row, column = marked.nonzero()
         if row.size:
             found = windows(self._hog.blocks(part))[row, column]
-            marked[row, column] = self._net.score(found.reshape(-1, FEATURES)) > 0.0
+            score = self._net.score(found.reshape(-1, FEATURES))
+            marked[row, column] = score > 0.0
         return marked

@@ -134,7 +134,7 @@ def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
             assert (other["per_step"], other["stays"]) == (value, True)
         if fault.module == "vision_input":
             assert (other["amount"], other["scene"]) == (dict(fault.injections[0].params)["amount"], "truth")
-            assert slipped.injections[0].location.variable == "frame"
+            assert slipped.injections[0].location.anchor.name == "frame"
         if fault.fault_type == "jamming":
             assert slipped.injections[0].location.path == "selfdrive/sim/simulator.py"
 

@@ -113,7 +113,7 @@ def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
 
 @pytest.mark.parametrize("offset", [0.5, -0.9, 3.0])
 def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
-    """The whole picture moves by a pixel for 0.03895 m, at most for 1 m; how the car is turned is not seen."""
+    """The whole picture moves by a pixel for 0.03895 m, at most for 1 m; a turn of the car is not seen."""
     looking, renderer = camera(CALTECH, CODED)
     picture = looking.look(truth(lateral_offset=offset, heading=0.02)).picture
     shift = round(min(max(offset, -1.0), 1.0) / 0.03895)
