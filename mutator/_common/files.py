@@ -7,6 +7,7 @@ import re
 import stat
 import sys
 import tempfile
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -118,6 +119,20 @@ def remove_folder(path: Path) -> None:
         finally:
             os.close(here)
         path.rmdir()
+
+
+class ScratchFolder:
+    """A new temporary folder for runs to write to; it is gone with this object, whatever they left in it."""
+
+    def __init__(self, prefix: str) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix=prefix)).resolve()
+        self._end = weakref.finalize(self, remove_folder, self.path)
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, *error: object) -> None:
+        self._end()
 
 
 def _opened(name: str, parent: int | None = None) -> int:

@@ -76,7 +76,7 @@ about: Ordinary faults, and mutants that misbehave.
 target: toycar
 scenarios: [A]
 faults:
-  - {{spec: sensor/distance/nearer, values: 1}}
+  - {{spec: sensor/distance/longer, values: 1}}
   - {{spec: sensor/lane/shifted, values: 1}}
   - spec: sensor/silence/no_data
 {more}methods: [{method}]
@@ -147,36 +147,50 @@ class Came:
     left: str = ""
 
 
-class Misbehaving:
-    """Campaigns of the toy, and what the misdeeds in them come to."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """A campaign: its engine, its workers, the method that triggers its faults, its misdeeds."""
 
-    def __init__(self, workspace: Workspace, at: Path) -> None:
+    engine: str
+    workers: int
+    method: str
+    names: tuple[str, ...]
+
+
+class Misbehaving:
+    """Campaigns of the toy, one for each seed, and what the misdeeds in them come to."""
+
+    def __init__(self, workspace: Workspace, at: Path, seeds: Sequence[int]) -> None:
         self.workspace, self.at = workspace, at
         self.misdeeds = misdeeds()
+        self.drawn = {seed: self._draw(seed) for seed in seeds}
         self.tree = workspace.manifest("toycar").root
         for misdeed in self.misdeeds.values():
             misdeed.write(workspace)
         self.before = contents(self.tree)
         self.verdicts: dict[tuple[str, str], set[str]] = defaultdict(set)
-        self._right: dict[tuple[str, str], Came] = {}
+        self._right: dict[str, Came] = {}
 
-    def cases(self, seed: int) -> Sequence[Case]:
-        """A campaign with some misdeeds on some engine: a case for each of them."""
+    def _draw(self, seed: int) -> Drawn:
         chance = random.Random(seed)
         engine, workers, method = (chance.choice(list(some)) for some in (ENGINES, WORKERS, METHODS))
         names = chance.sample(sorted(self.misdeeds), chance.randint(1, MOST))
-        came = self._came(names, method, engine, workers)
-        problem = self._problem(came, method)
-        return [self._case(name, method, f"{engine} -n {workers}", came, problem) for name in names]
+        return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
 
-    def _case(self, name: str, method: str, reader: str, came: Came, problem: str) -> Case:
-        misdeed = self.misdeeds[name]
-        status = came.status.get(misdeed.model)
-        self.verdicts[name, reader.partition(" ")[0]].add(str(status))
-        why = problem or self._difference(misdeed, method, came)
-        story = f"{method} on {reader}: {why}\n{came.said[-LAST:]}"
+    def cases(self, seed: int) -> Sequence[Case]:
+        """A campaign with some misdeeds on some engine: a case for each of them."""
+        drawn = self.drawn[seed]
+        came = self._came(drawn, LONGEST_S)
+        problem = self._problem(came, drawn.method)
+        return [self._case(self.misdeeds[name], drawn, came, problem) for name in drawn.names]
+
+    def _case(self, misdeed: Misdeed, drawn: Drawn, came: Came, problem: str) -> Case:
+        status, reader = came.status.get(misdeed.model), f"{drawn.engine} -n {drawn.workers}"
+        self.verdicts[misdeed.name, drawn.engine].add(str(status))
+        why = problem or self._difference(misdeed, drawn.method, came)
+        story = f"{drawn.method} on {reader}: {why}\n{came.said[-LAST:]}"
         end = End.WRONG if why else End.RIGHT
-        return Case(kind=name, damage=str(status), reader=reader, end=end, story=story)
+        return Case(kind=misdeed.name, damage=str(status), reader=reader, end=end, story=story)
 
     def _problem(self, came: Came, method: str) -> str:
         """What is wrong with a campaign, whatever its misdeeds are; empty if nothing is."""
@@ -187,7 +201,7 @@ class Misbehaving:
         wanted = EXIT_HARNESS_ERRORS if Status.HARNESS_ERROR in came.status.values() else EXIT_OK
         if came.code != wanted:
             return f"exit code {came.code}, not {wanted}"
-        right = self._reference("", method).rows
+        right = self._reference(method).rows
         changed = [name for name in right.keys() | came.rows.keys() if right.get(name) != came.rows.get(name)]
         return "".join(f"{came.rows.get(name)}, not {right.get(name)}" for name in changed)
 
@@ -196,34 +210,46 @@ class Misbehaving:
         status, row = came.status.get(misdeed.model), came.bad.get(misdeed.model)
         if status not in misdeed.ends:
             return f"not one of {', '.join(sorted(misdeed.ends))}: {row}"
-        truth = self._reference(misdeed.name, method)
+        truth = self._reference(method)
         if status is Status.HARNESS_ERROR is truth.status[misdeed.model]:
             return ""  # who guards a run has other words for it in another engine
         right = truth.bad[misdeed.model]
         return "" if row == right else f"{row}, not {right} as on the reference engine"
 
-    def _reference(self, name: str, method: str) -> Came:
-        """What an ordinary campaign, or one with a single misdeed, comes to on the reference engine."""
-        if (name, method) not in self._right:
-            came = self._came([name] if name else [], method, REFERENCE, 1)
-            if name:
-                self.verdicts[name, REFERENCE].add(str(came.status.get(self.misdeeds[name].model)))
-            assert came.rows and not came.left, f"on the reference engine: {name}: {came}"
-            self._right[name, method] = came
-        return self._right[name, method]
+    def _reference(self, method: str) -> Came:
+        """What all drawn misdeeds come to in one campaign on the reference engine."""
+        if method not in self._right:
+            drawn = [one for one in self.drawn.values() if one.method == method]
+            names = sorted({name for one in drawn for name in one.names})
+            every = Drawn(engine=REFERENCE, workers=2, method=method, names=tuple(names))
+            came = self._came(every, LONGEST_S + 20 * len(names))
+            assert len(came.bad) == len(names) and not came.left, f"on the reference engine: {came}"
+            for name in names:
+                self.verdicts[name, REFERENCE].add(str(came.status[self.misdeeds[name].model]))
+            self._right[method] = came
+        return self._right[method]
 
-    def _came(self, names: Sequence[str], method: str, engine: str, workers: int) -> Came:
-        specs = "".join(f"  - spec: misdeeds/{self.misdeeds[name].model}/it\n" for name in names)
+    def _came(self, drawn: Drawn, longest_s: float) -> Came:
+        specs = "".join(f"  - spec: misdeeds/{self.misdeeds[name].model}/it\n" for name in drawn.names)
         campaign = self.workspace.library / "campaigns" / "misbehaving.yaml"
-        campaign.write_text(CAMPAIGN.format(more=specs, method=method))
+        campaign.write_text(CAMPAIGN.format(more=specs, method=drawn.method))
         shutil.rmtree(self.at, ignore_errors=True)
         (self.at / "tmp").mkdir(parents=True)
-        words = ("run", "misbehaving", "--engine", engine, "-n", workers, "--out", self.at / "run")
+        words = (
+            "run",
+            "misbehaving",
+            "--engine",
+            drawn.engine,
+            "-n",
+            drawn.workers,
+            "--out",
+            self.at / "run",
+        )
         command = Command(
             self.workspace, self.at, "-m", "mutator", *map(str, words), TMPDIR=str(self.at / "tmp")
         )
         try:
-            said = command.end(longest_s=LONGEST_S, left_s=LEFT_S)
+            said = command.end(longest_s=longest_s, left_s=LEFT_S)
         except (subprocess.TimeoutExpired, AssertionError) as err:
             command.kill()
             return Came(code=-1, said="", left=f"it does not end: {err}")
