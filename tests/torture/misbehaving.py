@@ -87,7 +87,7 @@ triggers:
   random_until_s: 5.5
 seed: 3
 canary: {{spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}}
-limits: {{cpu_s: 2, wall_s: 15, memory_mb: 1024, steps: 200, disk_mb: 20}}
+limits: {{cpu_s: 1, wall_s: 20, memory_mb: 1024, steps: 200, disk_mb: 20}}
 chunk: 2
 """
 

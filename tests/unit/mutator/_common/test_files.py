@@ -9,6 +9,7 @@ import pytest
 
 from mutator._common.files import (
     DiskFull,
+    ScratchFolder,
     check_schema,
     leads_to_no_file,
     raising_disk_full,
@@ -65,6 +66,18 @@ def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
         remove_folder(path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["kept", "link"]
     assert (kept / "x").exists() and kept.stat().st_mode == before
+
+
+def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is gone after its `with` block, or with the object."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with ScratchFolder("x-") as folder:
+        (folder / "y").mkdir()
+    scratch = ScratchFolder("x-")
+    (path,) = tmp_path.iterdir()
+    assert path == scratch.path
+    del scratch
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_leads_to_no_file(tmp_path: Path) -> None:
