@@ -3,14 +3,13 @@
 import csv
 import random
 import re
-import shutil
 import subprocess
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.files import is_half_written
+from mutator._common.files import is_half_written, remove_folder
 from mutator._common.tables import Table
 from mutator.engines.kinds import ENGINES, REFERENCE
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
@@ -233,7 +232,7 @@ class Misbehaving:
         specs = "".join(f"  - spec: misdeeds/{self.misdeeds[name].model}/it\n" for name in drawn.names)
         campaign = self.workspace.library / "campaigns" / "misbehaving.yaml"
         campaign.write_text(CAMPAIGN.format(more=specs, method=drawn.method))
-        shutil.rmtree(self.at, ignore_errors=True)
+        remove_folder(self.at)
         (self.at / "tmp").mkdir(parents=True)
         words = (
             "run",

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.files import remove_folder
 from mutator.workspace import Workspace
 
 from .misbehaving import Misbehaving
@@ -37,6 +38,7 @@ def test_misbehaving(
         tally.drive(wanted, misbehaving.cases)
     finally:
         resource.setrlimit(resource.RLIMIT_AS, limits)
+        remove_folder(tmp_path / "case")  # pytest would fail at it
     print_tally(tally)
     print_tally(misbehaving.table())
     assert not tally.wrong
