@@ -4,16 +4,19 @@ import errno
 import json
 import os
 import re
+import stat
 import sys
 import tempfile
+import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 _NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
 
 
@@ -89,6 +92,82 @@ def make_folder(path: Path) -> None:
             expected="a folder that you may write to",
             remedy="choose another `out`",
         ) from None
+
+
+def remove_folder(path: Path) -> None:
+    """Delete a folder that a run has written to, as far as one may: however deep it is, and locked or not.
+
+    `shutil.rmtree` calls itself for each level, and fails at some hundred of them.
+    """
+    if path.is_symlink():
+        return
+    with suppress(OSError):
+        here = _opened(str(path))
+        way = [("", _emptied(here))]  # each folder on the way down, and the folders that are left in it
+        try:
+            while way:
+                name, left = way[-1]
+                if left:
+                    with suppress(OSError):
+                        below = left.pop()
+                        here = _instead(here, _opened(below, here))
+                        way.append((below, _emptied(here)))
+                    continue
+                way.pop()
+                if way:
+                    here = _instead(here, os.open("..", _FOLDER, dir_fd=here))
+                    with suppress(OSError):
+                        os.rmdir(name, dir_fd=here)
+        finally:
+            os.close(here)
+        path.rmdir()
+
+
+class ScratchFolder:
+    """A new temporary folder for runs to write to; it is gone with this object, whatever they left in it."""
+
+    def __init__(self, prefix: str) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix=prefix)).resolve()
+        self._end = weakref.finalize(self, remove_folder, self.path)
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, *error: object) -> None:
+        self._end()
+
+
+def _opened(name: str, parent: int | None = None) -> int:
+    """A folder, unlocked."""
+    with suppress(OSError):
+        os.chmod(name, stat.S_IRWXU, dir_fd=parent)
+    return os.open(name, _FOLDER, dir_fd=parent)
+
+
+def _instead(old: int, new: int) -> int:
+    os.close(old)
+    return new
+
+
+def _emptied(folder: int) -> list[str]:
+    """Delete all that is in an open folder but for folders: their names."""
+    with os.scandir(folder) as entries:
+        found = [(entry.name, entry.is_dir(follow_symlinks=False)) for entry in entries]
+    for name, is_folder in found:
+        with suppress(OSError):
+            if not is_folder:
+                os.unlink(name, dir_fd=folder)
+    return [name for name, is_folder in found if is_folder]
+
+
+def leads_to_no_file(path: Path) -> bool:
+    """Whether something is there that is neither a file nor a folder: who reads a pipe or a device may wait
+    for ever, or get no end of it."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def write_atomic(path: Path, data: bytes) -> None:

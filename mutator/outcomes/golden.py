@@ -2,8 +2,6 @@
 
 import json
 import sys
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mutator._common.files import leads_to_no_file
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.targets.manifest import Channel, TargetManifest
@@ -18,7 +17,6 @@ from mutator.targets.manifest import Channel, TargetManifest
 Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
 
 
-_UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
 _LARGEST = sys.float_info.max
 
 
@@ -46,14 +44,21 @@ def trace_digest(manifest: TargetManifest, out: Path) -> str:
 def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[str] | None = None) -> Trace:
     """Channels (default: all) and time of the trace in the output folder `out`."""
     path = out / manifest.trace_file
+    if leads_to_no_file(path):
+        raise BadOutput("not a readable trace (no file)", where=path, expected="an .npz file")
     try:
-        with np.load(path, allow_pickle=False) as file:
+        loaded = np.load(path, allow_pickle=False)
+        if not isinstance(loaded, np.lib.npyio.NpzFile):
+            raise BadOutput("an array alone", where=path, expected="an .npz file")
+        with loaded as file:
             names = file.files if channels is None else [manifest.time_channel, *channels]
             trace = {name: np.asarray(file[name]) for name in names}
-    except _UNREADABLE as err:
-        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
     except KeyError as err:
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
+    except MutatorError:
+        raise
+    except Exception as err:  # a run may write anything, and numpy fails at it in any way
+        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
     shapes = {values.shape for values in trace.values()}
     if any(len(shape) != 1 for shape in shapes) or len(shapes) > 1:
         raise BadOutput("channels of different lengths", where=path, expected="one value per step")
@@ -65,6 +70,8 @@ def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[str] | No
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     """What the target itself said about a run in `out`: hazards, alerts, and more."""
     path = out / manifest.record_file
+    if leads_to_no_file(path):
+        raise BadOutput("not a readable record (no file)", where=path, expected="a JSON object")
     try:
         data = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as err:

@@ -7,7 +7,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import DiskFull, json_bytes, raising_disk_full, read_json, write_atomic
+from mutator._common.files import (
+    DiskFull,
+    json_bytes,
+    raising_disk_full,
+    read_json,
+    remove_folder,
+    write_atomic,
+)
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
@@ -187,7 +194,7 @@ class _Checks:
         runs: dict[tuple[str, Any], CheckRun] = {}
         work = self.folder.work / "checks"
         for scratch in (work, self._kept):
-            shutil.rmtree(scratch, ignore_errors=True)
+            remove_folder(scratch)
         work.mkdir(parents=True)
         base = prepare_base(self.manifest, self.folder.base)
         engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
@@ -203,7 +210,7 @@ class _Checks:
                 notify(Progress(stage="checks", detail=name[0], done=len(runs), total=len(jobs)))
         finally:
             pool.shutdown(cancel_futures=True)
-            shutil.rmtree(work, ignore_errors=True)
+            remove_folder(work)
         return runs
 
     def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
@@ -245,7 +252,7 @@ class _Checks:
                 execution.out.rename(place)
             return run
         finally:
-            shutil.rmtree(scratch, ignore_errors=True)
+            remove_folder(scratch)
 
     def _look(self, execution: Execution) -> CheckRun:
         if execution.status is not Status.OK:

@@ -136,10 +136,10 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
 
 
 def text(thing: object) -> str:
-    """What it is as a text; classes of the target may fail to say so."""
+    """What it is as a text; classes of the target may fail to say so, in any way."""
     try:
         return str(thing)
-    except Exception as why:
+    except BaseException as why:
         return f"its text cannot be told ({type(why).__name__})"
 
 

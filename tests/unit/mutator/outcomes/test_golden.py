@@ -1,6 +1,8 @@
 """Comparison with golden, and reading what a target wrote."""
 
 import json
+import os
+import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -112,6 +114,25 @@ def test_bad_traces_are_told(tmp_path: Path) -> None:
         np.savez(path, t=np.zeros(values.shape), gas=values)
         with pytest.raises(BadOutput):
             load_trace(MANIFEST, tmp_path, ["gas"])
+
+
+def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
+    """An array alone, a member whose head is no Python, and a pipe are BadOutput."""
+    path = tmp_path / "trace.npz"
+    with path.open("wb") as file:
+        np.save(file, T)
+    with pytest.raises(BadOutput, match="an array alone"):
+        load_trace(MANIFEST, tmp_path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("t.npy", b"\x93NUMPY\x01\0\x08\0{'a': (\n")
+    with pytest.raises(BadOutput, match="not a readable trace"):
+        load_trace(MANIFEST, tmp_path)
+    path.unlink()
+    os.mkfifo(path)
+    os.mkfifo(tmp_path / "record.json")
+    for load in (load_trace, load_record):
+        with pytest.raises(BadOutput, match="no file"):
+            load(MANIFEST, tmp_path)
 
 
 def test_record_is_read(tmp_path: Path) -> None:
