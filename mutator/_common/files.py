@@ -14,7 +14,7 @@ from typing import Any
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
+_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
 class DiskFull(MutatorError):
@@ -33,8 +33,15 @@ def is_disk_full(err: BaseException | None) -> bool:
 
 
 def is_no_file(err: OSError) -> bool:
-    """Whether there is no file in a place, but nothing, a folder, or a link that leads nowhere."""
+    """Whether there is no file in a place, but nothing, a folder, a dangling link, a pipe or a socket."""
     return err.errno in _NO_FILE
+
+
+def no_pipe(path: Path) -> Path:
+    """The path; OSError (`is_no_file`) where there is a pipe: nobody waits for what it may say."""
+    if path.is_fifo():
+        raise OSError(errno.ENXIO, os.strerror(errno.ENXIO), str(path))
+    return path
 
 
 def disk_full(where: str | Path | None) -> DiskFull:
@@ -130,7 +137,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object of `schema` (`name/version`) or an older version of it."""
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(no_pipe(path).read_bytes())
     except OSError as err:
         if not is_no_file(err):
             raise

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import DiskFull, json_bytes, raising_disk_full, read_json, write_atomic
+from mutator._common.files import DiskFull, json_bytes, no_pipe, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
@@ -320,7 +320,7 @@ def _digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty when they are not there."""
     try:
         return digest(
-            [digest((out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
+            [digest(no_pipe(out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
         )
     except OSError:
         return ""

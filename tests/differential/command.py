@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mutator.workspace import Workspace
 
+LINGER_S = 5.0  # what is left of a command has so long to end after it
 DERIVED = ("results.csv", "results.parquet")
 Bytes = dict[str, bytes]
 
@@ -81,7 +82,7 @@ class Command:
     def end(self) -> str:
         """Wait for its end and for the end of everything it started; returns what it printed."""
         printed = self.process.communicate(timeout=600)[0]
-        deadline = time.monotonic() + 10.0
+        deadline = time.monotonic() + LINGER_S
         while left := list(self.others()):
             assert time.monotonic() < deadline, left
             time.sleep(0.05)

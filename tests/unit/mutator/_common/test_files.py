@@ -10,6 +10,7 @@ import pytest
 from mutator._common.files import (
     DiskFull,
     check_schema,
+    no_pipe,
     raising_disk_full,
     read_json,
     write_atomic,
@@ -33,6 +34,15 @@ def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(MutatorError, match=r"a\.json"):
         read_json(path, "a/1")
+
+
+def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
+    """A pipe in the place of a file is no file; a file is read as ever."""
+    os.mkfifo(tmp_path / "a.json")
+    with pytest.raises(MutatorError, match=r"a\.json: no file"):
+        read_json(tmp_path / "a.json", "a/1")
+    (tmp_path / "b").write_bytes(b"x")
+    assert no_pipe(tmp_path / "b").read_bytes() == b"x"
 
 
 def test_newer_schema_is_refused() -> None:
