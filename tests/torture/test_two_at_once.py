@@ -24,7 +24,7 @@ from .worlds import LAST, judged
 pytestmark = pytest.mark.slow
 
 TRIES = 60
-WORDS = ("small", "--limit", "4", "--engine", "fork")
+WORDS = ("small", "--limit", "2", "--engine", "fork")
 BUSY = ("in use", "run under way")
 
 
