@@ -105,7 +105,7 @@ class _Checks:
         copy = self._kept
         try:
             with raising_disk_full(copy):
-                preflight_cache.copy(preflight_cache.entry(self.digest), copy, FILE)
+                preflight_cache.fetch(preflight_cache.entry(self.digest), copy, FILE)
             found = read_json(copy / FILE, SCHEMA)
             results = self._passed(found, copy)
         except DiskFull:

@@ -58,7 +58,12 @@ class Edits:
         told = Told(code=code, said=out + err, result=result)
         end, why = judged(told, Told(code=0, said="", result=self.right.result[-1]), [""])
         names = {"templates": ("fault model", "template"), "target": ("source", "hazards")}
-        said = [what.split("/")[-1], kind, *(one for one, of in names.items() if kind in of)]
+        said = [
+            what.split("/")[-1],
+            f"'{Path(what).stem}'",
+            kind,
+            *(one for one, of in names.items() if kind in of),
+        ]
         if end is End.REFUSED and not any(one in told.said for one in said):
             end, why = End.WRONG, f"says nothing of any of {said}"
         again = run(self.place)
