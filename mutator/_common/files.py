@@ -17,7 +17,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
-_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
+_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
 class DiskFull(MutatorError):
@@ -38,8 +38,16 @@ def is_disk_full(err: BaseException | None) -> bool:
 
 
 def is_no_file(err: OSError) -> bool:
-    """Whether there is no file in a place, but nothing, a folder, or a link that leads nowhere."""
+    """Whether there is no file in a place, but nothing, a folder, a dangling link, a pipe or a socket."""
     return err.errno in _NO_FILE
+
+
+def no_pipe(path: Path) -> Path:
+    """The path; OSError (`is_no_file`) where there is a pipe, a socket or a device: who reads one may wait
+    for ever, or get no end of it."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.ENXIO, os.strerror(errno.ENXIO), str(path))
+    return path
 
 
 def disk_full(where: str | Path | None) -> DiskFull:
@@ -160,16 +168,6 @@ def _emptied(folder: int) -> list[str]:
     return [name for name, is_folder in found if is_folder]
 
 
-def leads_to_no_file(path: Path) -> bool:
-    """Whether something is there that is neither a file nor a folder: who reads a pipe or a device may wait
-    for ever, or get no end of it."""
-    try:
-        mode = path.stat().st_mode
-    except OSError:
-        return False
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
-
-
 def write_atomic(path: Path, data: bytes) -> None:
     """Write the whole file or leave the old one; DiskFull if there is no room, MutatorError for a folder."""
     if path.is_dir():
@@ -211,7 +209,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object of `schema` (`name/version`) or an older version of it."""
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(no_pipe(path).read_bytes())
     except OSError as err:
         if not is_no_file(err):
             raise

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import disk_full, raising_disk_full, remove_folder, write_atomic
+from mutator._common.files import disk_full, no_pipe, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
@@ -231,7 +231,7 @@ class ForkEngine:
             if execution.status is not Status.OK:
                 raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in (self._manifest.trace_file, self._manifest.record_file):
-                if (execution.out / name).read_bytes() != (golden / name).read_bytes():
+                if no_pipe(execution.out / name).read_bytes() != (golden / name).read_bytes():
                     raise Refused(f"its {name} is another one when it is driven step by step")
             report = read_report(folder / "report.json")
             assert report is not None

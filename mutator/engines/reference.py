@@ -20,6 +20,7 @@ from mutator.engines.processes import (
     LOST,
     PATIENCE_S,
     Ended,
+    check_limits,
     end,
     environment,
     inactive,
@@ -59,6 +60,7 @@ class ReferenceEngine:
         *,
         independent: bool = False,
     ) -> None:
+        check_limits(limits)
         self.manifest = manifest
         self.base = base.resolve()
         self._base_tree = BaseTree(self.base)

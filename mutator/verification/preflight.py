@@ -10,6 +10,7 @@ from typing import Any
 from mutator._common.files import (
     DiskFull,
     json_bytes,
+    no_pipe,
     raising_disk_full,
     read_json,
     remove_folder,
@@ -112,7 +113,7 @@ class _Checks:
         copy = self._kept
         try:
             with raising_disk_full(copy):
-                preflight_cache.copy(preflight_cache.entry(self.digest), copy, FILE)
+                preflight_cache.fetch(preflight_cache.entry(self.digest), copy, FILE)
             found = read_json(copy / FILE, SCHEMA)
             results = self._passed(found, copy)
         except DiskFull:
@@ -327,7 +328,7 @@ def _digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty when they are not there."""
     try:
         return digest(
-            [digest((out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
+            [digest(no_pipe(out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
         )
     except OSError:
         return ""

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mutator.workspace import Workspace
 
+LINGER_S = 5.0  # what is left of a command has so long to end after it
 DERIVED = ("results.csv", "results.parquet")
 Bytes = dict[str, bytes]
 
@@ -80,10 +81,10 @@ class Command:
         registered = {path.name for path in (self.out / "workers").glob("[0-9]*")}
         return sorted(pid for pid, _ in self.others() if str(pid) in registered)
 
-    def end(self, *, longest_s: float = 600.0, left_s: float = 10.0) -> str:
+    def end(self, *, longest_s: float = 600.0) -> str:
         """Wait for its end and for the end of everything it started; returns what it printed."""
         printed = self.process.communicate(timeout=longest_s)[0]
-        deadline = time.monotonic() + left_s
+        deadline = time.monotonic() + LINGER_S
         while left := list(self.others()):
             assert time.monotonic() < deadline, left
             time.sleep(0.05)

@@ -26,7 +26,6 @@ METHODS = ("guided", "random")
 WORKERS = (1, 2)
 MOST = 3  # misdeeds of one campaign
 LONGEST_S = 240  # of a command, on a busy machine
-LEFT_S = 5.0  # within which all that it started has ended
 MODULES = (
     *(
         "atexit",
@@ -248,7 +247,7 @@ class Misbehaving:
             self.workspace, self.at, "-m", "mutator", *map(str, words), TMPDIR=str(self.at / "tmp")
         )
         try:
-            said = command.end(longest_s=longest_s, left_s=LEFT_S)
+            said = command.end(longest_s=longest_s)
         except (subprocess.TimeoutExpired, AssertionError) as err:
             command.kill()
             return Came(code=-1, said="", left=f"it does not end: {err}")

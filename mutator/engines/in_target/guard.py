@@ -19,6 +19,7 @@ from contextlib import suppress
 from typing import Any
 
 WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # why a process was stopped
+HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _MINDED = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}

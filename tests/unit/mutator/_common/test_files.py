@@ -11,7 +11,8 @@ from mutator._common.files import (
     DiskFull,
     ScratchFolder,
     check_schema,
-    leads_to_no_file,
+    is_no_file,
+    no_pipe,
     raising_disk_full,
     read_json,
     remove_folder,
@@ -36,6 +37,15 @@ def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(MutatorError, match=r"a\.json"):
         read_json(path, "a/1")
+
+
+def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
+    """A pipe in the place of a file is no file; a file is read as ever."""
+    os.mkfifo(tmp_path / "a.json")
+    with pytest.raises(MutatorError, match=r"a\.json: no file"):
+        read_json(tmp_path / "a.json", "a/1")
+    (tmp_path / "b").write_bytes(b"x")
+    assert no_pipe(tmp_path / "b").read_bytes() == b"x"
 
 
 def test_newer_schema_is_refused() -> None:
@@ -80,13 +90,15 @@ def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_leads_to_no_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
     """A pipe or device, and a link to one, is no file; a folder is told by who opens it."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to(tmp_path / "pipe")
-    (tmp_path / "file").touch()
-    found = [leads_to_no_file(tmp_path / name) for name in ("pipe", "link", "/dev/zero", "file", "none", "")]
-    assert found == [True, True, True, False, False, False]
+    with pytest.raises(OSError, match="No such device") as refused:
+        no_pipe(tmp_path / name)
+    assert is_no_file(refused.value)
+    assert no_pipe(tmp_path) == tmp_path and no_pipe(tmp_path / "none") == tmp_path / "none"
 
 
 def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

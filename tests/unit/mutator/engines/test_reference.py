@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import pytest
 from mutator._common.files import DiskFull
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -405,3 +407,19 @@ def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
     """Neither its own package's, nor the standard library's, nor what Python itself had loaded."""
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
+
+
+@pytest.mark.parametrize(("limit", "name"), [("AS", "memory_mb"), ("CPU", "cpu_s"), ("FSIZE", "disk_mb")])
+def test_a_limit_of_this_process_that_is_lower(
+    manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
+) -> None:
+    """No engine is made where runs may not have what their limits say: they would end here, not elsewhere."""
+    number, unlimited = getattr(resource, f"RLIMIT_{limit}"), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (1, 1) if which == number else unlimited)
+
+    def refuse(which: int, limits: tuple[int, int]) -> None:
+        raise ValueError("not allowed to raise maximum limit")
+
+    monkeypatch.setattr(resource, "setrlimit", refuse)
+    with pytest.raises(MutatorError, match=rf"a limit of 1 here \(`ulimit -.`\).*{name}.*raise it"):
+        ReferenceEngine(manifest, tmp_path, tmp_path, LIMITS)
