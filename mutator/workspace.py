@@ -231,9 +231,13 @@ class Workspace:
             check_is_text(Path(name))
             return Path(name)
         known = self._files(folder)
-        if str(name) in known:
-            check_is_text(known[str(name)])
-            return known[str(name)]
+        if (path := known.get(str(name))) is not None:
+            check_is_text(path)
+            if path.is_fifo() or path.is_socket():
+                raise MutatorError(
+                    "a pipe or socket", where=path, expected="a YAML file", remedy="put the file back"
+                )
+            return path
         raise MutatorError(
             f"no {what} '{name}'",
             where=self.library / folder,

@@ -4,17 +4,20 @@ import errno
 import json
 import os
 import re
+import stat
 import sys
 import tempfile
+import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
 class DiskFull(MutatorError):
@@ -35,8 +38,16 @@ def is_disk_full(err: BaseException | None) -> bool:
 
 
 def is_no_file(err: OSError) -> bool:
-    """Whether there is no file in a place, but nothing, a folder, or a link that leads nowhere."""
+    """Whether there is no file in a place, but nothing, a folder, a dangling link, a pipe or a socket."""
     return err.errno in _NO_FILE
+
+
+def no_pipe(path: Path) -> Path:
+    """The path; OSError (`is_no_file`) where there is a pipe, a socket or a device: who reads one may wait
+    for ever, or get no end of it."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.ENXIO, os.strerror(errno.ENXIO), str(path))
+    return path
 
 
 def disk_full(where: str | Path | None) -> DiskFull:
@@ -91,6 +102,72 @@ def make_folder(path: Path) -> None:
         ) from None
 
 
+def remove_folder(path: Path) -> None:
+    """Delete a folder that a run has written to, as far as one may: however deep it is, and locked or not.
+
+    `shutil.rmtree` calls itself for each level, and fails at some hundred of them.
+    """
+    if path.is_symlink():
+        return
+    with suppress(OSError):
+        here = _opened(str(path))
+        way = [("", _emptied(here))]  # each folder on the way down, and the folders that are left in it
+        try:
+            while way:
+                name, left = way[-1]
+                if left:
+                    with suppress(OSError):
+                        below = left.pop()
+                        here = _instead(here, _opened(below, here))
+                        way.append((below, _emptied(here)))
+                    continue
+                way.pop()
+                if way:
+                    here = _instead(here, os.open("..", _FOLDER, dir_fd=here))
+                    with suppress(OSError):
+                        os.rmdir(name, dir_fd=here)
+        finally:
+            os.close(here)
+        path.rmdir()
+
+
+class ScratchFolder:
+    """A new temporary folder for runs to write to; it is gone with this object, whatever they left in it."""
+
+    def __init__(self, prefix: str) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix=prefix)).resolve()
+        self._end = weakref.finalize(self, remove_folder, self.path)
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, *error: object) -> None:
+        self._end()
+
+
+def _opened(name: str, parent: int | None = None) -> int:
+    """A folder, unlocked."""
+    with suppress(OSError):
+        os.chmod(name, stat.S_IRWXU, dir_fd=parent)
+    return os.open(name, _FOLDER, dir_fd=parent)
+
+
+def _instead(old: int, new: int) -> int:
+    os.close(old)
+    return new
+
+
+def _emptied(folder: int) -> list[str]:
+    """Delete all that is in an open folder but for folders: their names."""
+    with os.scandir(folder) as entries:
+        found = [(entry.name, entry.is_dir(follow_symlinks=False)) for entry in entries]
+    for name, is_folder in found:
+        with suppress(OSError):
+            if not is_folder:
+                os.unlink(name, dir_fd=folder)
+    return [name for name, is_folder in found if is_folder]
+
+
 def write_atomic(path: Path, data: bytes) -> None:
     """Write the whole file or leave the old one; DiskFull if there is no room, MutatorError for a folder."""
     if path.is_dir():
@@ -132,7 +209,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object of `schema` (`name/version`) or an older version of it."""
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(no_pipe(path).read_bytes())
     except OSError as err:
         if not is_no_file(err):
             raise

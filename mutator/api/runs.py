@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.arguments import check_type
+from mutator._common.files import ScratchFolder
 from mutator._common.tables import Table
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
@@ -303,8 +303,8 @@ class RunExperiment(ExperimentResult):
         when target, templates or scenario have changed since.
         """
         run, folder = self.run, self.run.folder
-        temporary = None if keep else TemporaryDirectory(prefix="mutator-rerun-")
-        out = Path(temporary.name) / self.id if temporary else None
+        temporary = None if keep else ScratchFolder("mutator-rerun-")
+        out = temporary.path / self.id if temporary else None
         single, same = rerun(run.workspace, folder.path, self.id, out=out)
         manifest = run._bench.manifest
         trial = trial_of(single, manifest, same_as_record=same if self.record else None, temporary=temporary)

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
@@ -27,7 +27,7 @@ class Trial(ExperimentResult):
     single: Single
     manifest: TargetManifest
     same_as_record: bool | None = None
-    _temporary: TemporaryDirectory[str] | None = field(default=None)
+    _temporary: ScratchFolder | None = field(default=None)
 
     @property
     def patch(self) -> str:
@@ -113,8 +113,8 @@ def try_fault(
         trigger=bench.trigger(trigger, armed_after_s),
         seed=seed,
     )
-    temporary = TemporaryDirectory(prefix="mutator-try-") if out is None else None
-    folder = Path(temporary.name if temporary else out or "") / experiment.id
+    temporary = ScratchFolder("mutator-try-") if out is None else None
+    folder = (temporary.path if temporary else Path(out or "")) / experiment.id
     single = run_single(bench.workspace, bench.manifest, experiment, folder)
     return trial_of(single, bench.manifest, temporary=temporary)
 
@@ -124,7 +124,7 @@ def trial_of(
     manifest: TargetManifest,
     *,
     same_as_record: bool | None = None,
-    temporary: TemporaryDirectory[str] | None = None,
+    temporary: ScratchFolder | None = None,
 ) -> Trial:
     """The trial of a single run."""
     return Trial(

@@ -16,6 +16,7 @@ from typer.main import get_command
 
 from mutator._common.files import disk_full, is_disk_full
 from mutator._common.interrupts import terminable
+from mutator._common.shortages import shortage
 from mutator._common.version import VERSION
 from mutator.cli import (
     audits,
@@ -31,7 +32,7 @@ from mutator.cli import (
     reviews,
     run_folders,
 )
-from mutator.cli.console import Terminal, show_error
+from mutator.cli.console import Terminal, lead_nowhere, remarking, show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import (
     EXIT_CHECK_FAILED,
@@ -135,16 +136,29 @@ for module in (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
+    _open_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # like standard error: what cannot be shown is told
     try:
         code = _answer(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()  # now, for at the interpreter's end a closed pipe would be an error
-    except BrokenPipeError:
-        # Who read the output has seen enough; what is still buffered goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # who read the output has seen enough
+        lead_nowhere(sys.stdout)
         return EXIT_OK
     return code
+
+
+def _open_streams() -> None:
+    """Have closed standard streams lead nowhere: else a file that is opened gets the number of one, and the
+    words that were meant for it."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            file = os.open(os.devnull, os.O_RDWR)
+            if file != number:
+                os.dup2(file, number)
+                os.close(file)
+            os.set_inheritable(number, True)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
 
 
 def _answer(words: Sequence[str]) -> int:
@@ -183,6 +197,8 @@ def _known(error: Exception) -> MutatorError | None:
     where = getattr(error, "filename", None)
     if is_disk_full(error):
         return disk_full(where)
+    if short := shortage(error):
+        return short
     if isinstance(error, UnicodeEncodeError) and isinstance(error.object, str):
         return _no_text(error.object[error.start : error.end])
     if isinstance(error, OSError) and error.errno in THE_MACHINE_SAYS_NO:
@@ -225,13 +241,14 @@ def _usage(error: typer.TyperException) -> int:
 
 
 def _defect() -> int:
-    traceback.print_exc()
+    _say(traceback.format_exc().rstrip())
     _say("this is a defect of mutator, not of your input; please report it with the lines above")
     return EXIT_HARNESS_ERRORS
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr)
+    with remarking():
+        print(text, file=sys.stderr)
 
 
 if __name__ == "__main__":

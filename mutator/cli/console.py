@@ -6,6 +6,7 @@ Rich is imported when the first line is printed, so `--help` and shell completio
 import codecs
 import json
 import math
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common.hashing import plain
 from mutator._common.tables import Table
@@ -57,11 +58,13 @@ class Terminal:
 
     def note(self, text: str) -> None:
         """A remark beside the result: to standard error, so that a pipe gets the result alone."""
-        self.err.print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
+        with remarking():
+            self.err.print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
 
     def complain(self, text: str) -> None:
         """What went wrong, to standard error."""
-        self.err.print(f"error: {text}", style="bold red", markup=False, highlight=False, soft_wrap=True)
+        with remarking():
+            self.err.print(f"error: {text}", style="bold red", markup=False, highlight=False, soft_wrap=True)
 
     def emit(self, data: Any) -> None:
         """The result as one JSON document; numbers JSON does not know (infinity, nan) become null."""
@@ -209,6 +212,22 @@ def short_path(where: str | Path | None) -> str:
         return str(path.relative_to(Path.cwd()) if path.is_absolute() and path != Path.cwd() else path)
     except ValueError:
         return str(where)
+
+
+@contextmanager
+def remarking() -> Iterator[None]:
+    """Within it, standard error is written to. That nobody can read it is no reason to stop a command."""
+    try:
+        yield
+    except OSError:
+        lead_nowhere(sys.stderr)
+
+
+def lead_nowhere(stream: TextIO) -> None:
+    """Drop what is still buffered in a standard stream, and all that will be written to it."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 def _console(*, stderr: bool) -> "Console":

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from mutator._common.files import no_pipe
 from mutator._common.text import counted, shown
 from mutator.config import problems
 from mutator.errors import MutatorError
@@ -104,7 +105,7 @@ def _read_text(path: Path) -> str:
             raise MutatorError(
                 f"{path.stat().st_size} bytes long", where=path, expected=f"at most {MAX_BYTES} bytes"
             )
-        return path.read_text(encoding="utf-8")
+        return no_pipe(path).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise MutatorError(
             f"not UTF-8 (byte {error.object[error.start]:#04x} at offset {error.start})",

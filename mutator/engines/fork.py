@@ -7,13 +7,12 @@ its own. `warm` forks before the first step of every run.
 
 import marshal
 import os
-import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import disk_full, raising_disk_full, write_atomic
+from mutator._common.files import disk_full, no_pipe, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
@@ -26,6 +25,7 @@ from mutator.engines.processes import (
     is_full,
     judge,
     read_report,
+    steady,
     tail,
     was_active,
 )
@@ -73,7 +73,7 @@ class ForkEngine:
             try:
                 yield job, self.execute(job, folder)
             finally:
-                shutil.rmtree(folder, ignore_errors=True)
+                remove_folder(folder)
 
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job; its scratch folder `folder` is new, and left to the caller."""
@@ -81,8 +81,8 @@ class ForkEngine:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)
         except (NotSwappable, Refused) as why:
-            shutil.rmtree(folder, ignore_errors=True)
-            return replace(self.reference.execute(job, folder), why=str(why))
+            remove_folder(folder)
+            return replace(self.reference.execute(job, folder), why=steady(str(why), folder))
         except Lost as why:
             self.close()
             return _lost(str(why), folder)
@@ -169,7 +169,7 @@ class ForkEngine:
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
         """What came of a child; Refused where the reference engine is to say it."""
-        report = read_report(folder / "report.json")
+        report = read_report(folder / "report.json", threads=int)
         if report is not None:
             self._check(job, report)
         status, detail = judge(self._limits, ended, report)
@@ -192,7 +192,7 @@ class ForkEngine:
     def _check(self, job: Job, report: dict[str, Any]) -> None:
         """Refused unless the child was the job's mutant and left the server as it was."""
         if report["ended"] == "swap refused":
-            raise Refused(report["why"])
+            raise Refused(str(report.get("why")))
         if report["outside"]:
             raise Refused(f"the package was also imported from {', '.join(report['outside'])}")
         if report["threads"] != 1:
@@ -231,7 +231,7 @@ class ForkEngine:
             if execution.status is not Status.OK:
                 raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in (self._manifest.trace_file, self._manifest.record_file):
-                if (execution.out / name).read_bytes() != (golden / name).read_bytes():
+                if no_pipe(execution.out / name).read_bytes() != (golden / name).read_bytes():
                     raise Refused(f"its {name} is another one when it is driven step by step")
             report = read_report(folder / "report.json")
             assert report is not None
@@ -247,7 +247,7 @@ class ForkEngine:
         except NotSwappable as why:
             raise Refused(f"its observation cannot be put into it: {why}") from None
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            remove_folder(folder)
 
 
 _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator._common.files import remove_folder
 from mutator._common.hashing import digest
 from mutator.engines.processes import end, environment, raised_in
 from mutator.targets.manifest import TargetManifest
@@ -198,7 +199,7 @@ class Pool:
         for waiting in (self.first, *self._waiting):
             waiting.close()
         end(self._process)
-        shutil.rmtree(self.home, ignore_errors=True)
+        remove_folder(self.home)
 
 
 def _why(failed: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import resource
 import signal
 import subprocess
 from dataclasses import dataclass
@@ -10,15 +11,17 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from mutator._common.files import is_disk_full
+from mutator._common.files import is_disk_full, no_pipe
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
+from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 
 LOST = "lost"  # nobody is left to say how it ended
 PATIENCE_S = 60.0  # beyond the wall limit of a run, until who guards it must have said how it ended
 _END_S = 10.0
 _REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
+_NAMES = ("outside", "modules", "libraries")  # in a report: texts
 _LOG_TAIL = 4000
 _LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
 _TRIAL = 1 << 20  # nor one where so much cannot be written
@@ -35,6 +38,27 @@ class Ended:
     cpu_s: float
     wall_s: float
     stopped: str
+
+
+def check_limits(limits: Limits) -> None:
+    """MutatorError where this process may not give a run what its campaign allows it: such a run would end
+    here, but not elsewhere."""
+    wanted = (
+        (resource.RLIMIT_AS, "memory_mb", limits.memory_mb << 20, "ulimit -v"),
+        (resource.RLIMIT_CPU, "cpu_s", limits.cpu_s + guard.HARD_CPU_EXTRA_S, "ulimit -t"),
+        (resource.RLIMIT_FSIZE, "disk_mb", limits.disk_mb << 20, "ulimit -f"),
+    )
+    for number, name, least, command in wanted:
+        soft, hard = resource.getrlimit(number)
+        if hard != resource.RLIM_INFINITY and hard < least:
+            try:
+                resource.setrlimit(number, (soft, least))  # as root's runs would
+            except ValueError:
+                raise MutatorError(
+                    f"a limit of {hard} here (`{command}`), and runs may take {least} ({name})",
+                    expected="a limit that is no lower than that of the runs",
+                    remedy=f"raise it, or lower {name} in the limits of the campaign",
+                ) from None
 
 
 def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
@@ -78,7 +102,8 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
     error = report["error"]
     if error is None:
         return None
-    stacks = tuple(tuple((str(path), int(line)) for path, line in stack) for stack in error["stacks"])
+    own, *others = (tuple((str(path), int(line)) for path, line in stack) for stack in error["stacks"])
+    stacks = (own, *others)
     return Raised(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
 
 
@@ -105,18 +130,22 @@ def end(guarding: subprocess.Popen[bytes]) -> None:
 
 
 def tail(path: Path) -> str:
+    """The end of what a run printed; nothing if it took its log away."""
+    if not path.is_file():
+        return ""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - _LOG_TAIL))
         return file.read().decode("utf-8", "replace")
 
 
-def read_report(path: Path) -> dict[str, Any] | None:
+def read_report(path: Path, **more: type) -> dict[str, Any] | None:
     """The child's report; None when it did not come to write one, or only a part of it, or when what is there
-    is none: a run may write what it likes, and leave."""
+    is none: a run may write what it likes, and leave. `more` are what an engine's own reports have."""
     try:
-        report: dict[str, Any] = json.loads(path.read_bytes())
+        report: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
         raised_in(report)
-        sound = all(isinstance(report[key], kind) for key, kind in _REPORT.items())
+        sound = all(isinstance(report[key], kind) for key, kind in (_REPORT | more).items())
+        sound = sound and all(isinstance(name, str) for key in _NAMES for name in report.get(key, ()))
     except (OSError, LookupError, TypeError, ValueError, RecursionError):
         return None
     return report if sound else None

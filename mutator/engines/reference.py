@@ -8,18 +8,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import disk_full, is_disk_full, raising_disk_full
+from mutator._common.files import disk_full, raising_disk_full, remove_folder
 from mutator._common.hashing import digest
 from mutator.engines import bytecode
-from mutator.engines.jobs import Execution, Job, Setting
+from mutator.engines.base_tree import BaseTree
+from mutator.engines.jobs import Execution, Job, Raised, Setting
 from mutator.engines.processes import (
     LOST,
     PATIENCE_S,
     Ended,
+    check_limits,
     end,
     environment,
     inactive,
@@ -59,8 +60,10 @@ class ReferenceEngine:
         *,
         independent: bool = False,
     ) -> None:
+        check_limits(limits)
         self.manifest = manifest
         self.base = base.resolve()
+        self._base_tree = BaseTree(self.base)
         self.work = work.resolve()
         self.limits = limits
         self._pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
@@ -73,7 +76,7 @@ class ReferenceEngine:
             try:
                 yield job, self.execute(job, folder)
             finally:
-                shutil.rmtree(folder, ignore_errors=True)
+                remove_folder(folder)
 
     def close(self) -> None:
         """Nothing is kept."""
@@ -82,8 +85,11 @@ class ReferenceEngine:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
         with raising_disk_full(self.work):
             ended = self._run(self._prepare(job, folder), folder, job.hash_seed)
+            if self._base_tree.was_changed():  # by this run, or by another one at the same time
+                remove_folder(folder)
+                ended = self._run(self._prepare(job, folder, linked=False), folder, job.hash_seed)
         log = tail(folder / "log")
-        report = read_report(folder / "report.json")
+        report = read_report(folder / "report.json", files=dict, modules=list)
         status, detail = self._judge(job, ended, report)
         if status is not Status.OK and is_full(self.work, report):
             raise disk_full(self.work)
@@ -95,16 +101,16 @@ class ReferenceEngine:
             probe=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
-            raised=raised and replace(raised, message=steady(raised.message, folder)),
+            raised=raised and _steady(raised, folder),
             active=was_active(folder),
             log=log,
             modules=tuple(report["modules"]) if report else (),
         )
 
-    def _prepare(self, job: Job, folder: Path) -> Path:
+    def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
         """Write tree and request of a job; returns the request's file."""
         tree, out = folder / "tree", folder / "out"
-        shutil.copytree(self.base, tree, copy_function=_link_or_copy)
+        self._base_tree.lay_out(tree, linked=linked)
         bytecode.put(job.files, tree)
         out.mkdir()
         inactive(folder).touch()
@@ -173,19 +179,12 @@ class ReferenceEngine:
 
     def _judge(self, job: Job, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
         if report is not None and (problem := self._wrong_tree(job, report)):
-            self._restore_base()
             return Status.HARNESS_ERROR, problem
         status, detail = judge(self.limits, ended, report)
         if report is None or (status is not Status.OK and report["probe"] is None):
             return status, detail
         problem = job.problem_of(report["probe"])
         return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
-
-    def _restore_base(self) -> None:
-        """Make the pristine tree pristine again, should a run have written through its links."""
-        for path, data in self.manifest.tree.files.items():
-            if digest((self.base / path).read_bytes()) != self._pristine[path]:
-                bytecode.put({path: data}, self.base)
 
     def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
         """What is wrong with the tree that ran; empty if it was the job's."""
@@ -197,6 +196,12 @@ class ReferenceEngine:
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
         return ""
+
+
+def _steady(raised: Raised, folder: Path) -> Raised:
+    """The exception in texts that can be kept: a run may give classes and files any name."""
+    stacks = tuple(tuple((steady(path, folder), line) for path, line in stack) for stack in raised.stacks)
+    return Raised(kind=steady(raised.kind, folder), message=steady(raised.message, folder), stacks=stacks)
 
 
 def make_reference(setting: Setting) -> ReferenceEngine:
@@ -213,14 +218,3 @@ def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
             bytecode.write_compiled(manifest.tree.files, half)
             half.rename(dest)
     return dest
-
-
-def _link_or_copy(source: str, dest: str) -> None:
-    """One file of the pristine tree in a run's own. A link, since copies cost as much as a tenth of a run;
-    a run that writes through it is found out, as is every other that it could have touched."""
-    try:
-        os.link(source, dest)
-    except OSError as err:
-        if is_disk_full(err):
-            raise
-        shutil.copyfile(source, dest)

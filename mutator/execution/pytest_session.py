@@ -14,6 +14,7 @@ import pytest
 
 from mutator._common.files import DiskFull, raising_disk_full
 from mutator._common.locks import living_workers, register_worker
+from mutator._common.shortages import Shortage, shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
@@ -45,9 +46,10 @@ class WorkItem(pytest.Item):
                 worker, work = self.worker.get(), self.work
                 errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
         except Exception as err:
-            problem = str(err) if isinstance(err, MutatorError) else _defect(err, self.name)
+            known = err if isinstance(err, MutatorError) else shortage(err)
+            problem = str(known) if known else _defect(err, self.name)
             self.user_properties.append((_PROBLEM, problem))
-            if isinstance(err, DiskFull):
+            if isinstance(known, DiskFull | Shortage):
                 self.session.shouldstop = problem
             raise
         if errors:
@@ -191,6 +193,9 @@ class Controller:
             self.begun.interrupted = True
         for pid in living_workers(self.begun.folder.path):
             os.kill(pid, signal.SIGTERM)
+
+    def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+        self._note(str(shortage(excinfo.value) or ""))
 
     @pytest.hookimpl(trylast=True)  # after xdist has seen its workers end
     def pytest_sessionfinish(self, session: pytest.Session) -> None:

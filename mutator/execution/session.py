@@ -15,7 +15,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import DiskFull, is_half_written
+from mutator._common.files import DiskFull, is_half_written, remove_folder
 from mutator._common.interrupts import terminable
 from mutator._common.locks import owned, wait_for_workers
 from mutator.campaigns.chunks import Pending, pending
@@ -204,7 +204,7 @@ def open_session(
                 shutil.rmtree(out, ignore_errors=True)
             raise
         digests.close_segments(folder.path)
-        shutil.rmtree(folder.work, ignore_errors=True)
+        remove_folder(folder.work)
         # not everywhere: there may be thousands of patches
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))
         for path in chain(*written):
@@ -220,4 +220,4 @@ def open_session(
                 notify=notify,
             )
         finally:
-            shutil.rmtree(folder.work, ignore_errors=True)
+            remove_folder(folder.work)

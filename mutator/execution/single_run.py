@@ -1,12 +1,11 @@
 """One experiment outside a campaign, with everything kept: what `try`, `show` and `rerun --trace` need."""
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.files import make_folder, raising_disk_full
+from mutator._common.files import make_folder, raising_disk_full, remove_folder
 from mutator.campaigns.provenance import check_sources, sources
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
@@ -102,13 +101,13 @@ def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
 def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
     """An engine whose scratch is in `out`, and gone afterwards."""
     work = out / "work"
-    shutil.rmtree(work, ignore_errors=True)
+    remove_folder(work)
     try:
         with raising_disk_full(work):
             work.mkdir()
         yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
     finally:
-        shutil.rmtree(work, ignore_errors=True)
+        remove_folder(work)
 
 
 def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, place: Path) -> Path:
@@ -126,7 +125,7 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
             where=job.scenario,
             remedy="mend the target or the scenario first",
         )
-    shutil.rmtree(place, ignore_errors=True)
+    remove_folder(place)
     execution.out.rename(place)
     return place
 
@@ -135,8 +134,8 @@ def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
     """The runs with their output moved to `out`/faulty and their diff beside it."""
     for finished in runs:
         place = out / "faulty"
-        shutil.rmtree(place, ignore_errors=True)
-        if finished.out is not None:
+        remove_folder(place)
+        if finished.out is not None and finished.out.is_dir():  # a run may delete it
             finished.out.rename(place)
         else:
             place.mkdir()

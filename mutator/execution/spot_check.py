@@ -1,10 +1,9 @@
 """Experiments of a run, drawn by lot and driven again on the reference engine: are their records the same?"""
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from random import SystemRandom
-from tempfile import TemporaryDirectory
 
+from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import manifest_of, run_single
 from mutator.model import Status
@@ -26,7 +25,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
     """Drive these experiments; what is not the same as in their records. Nothing is written to the folder."""
     manifest, records = manifest_of(workspace, folder), folder.records()
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
-    with TemporaryDirectory(prefix="mutator-verify-") as scratch:
+    with ScratchFolder("mutator-verify-") as scratch:
         for name in ids:
             experiment = experiments[name]
             golden = folder.golden(experiment.scenario, experiment.changes)
@@ -34,7 +33,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
                 workspace,
                 manifest,
                 experiment,
-                Path(scratch) / name,
+                scratch / name,
                 limits=folder.limits,
                 golden=golden if golden.is_dir() else None,
             )

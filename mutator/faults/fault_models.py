@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from mutator._common import hashing
+from mutator._common.files import no_pipe
 from mutator._common.text import suggestion
 from mutator.config import units
 from mutator.config.locations import PROBE_NAME
@@ -203,7 +204,7 @@ def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return no_pipe(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise MutatorError(
             f"cannot be read ({error})", where=path, remedy="put the template beside its YAML, as UTF-8"

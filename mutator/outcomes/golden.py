@@ -2,24 +2,25 @@
 
 import json
 import sys
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
+from mutator._common.shortages import shortage
 from mutator.errors import MutatorError
 from mutator.targets.manifest import Channel, TargetManifest
 
 Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
 
 
-_UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
 _LARGEST = sys.float_info.max
+_TRIAL = 64 << 20  # bytes
 
 
 class BadOutput(MutatorError):
@@ -38,8 +39,9 @@ class Difference:
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
     """Digest of the trace file's bytes."""
     try:
-        return digest((out / manifest.trace_file).read_bytes())
-    except OSError:
+        return digest(no_pipe(out / manifest.trace_file).read_bytes())
+    except OSError as err:
+        _check_is_of_output(err)
         raise BadOutput("the run left no trace", where=out / manifest.trace_file) from None
 
 
@@ -47,13 +49,19 @@ def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[str] | No
     """Channels (default: all) and time of the trace in the output folder `out`."""
     path = out / manifest.trace_file
     try:
-        with np.load(path, allow_pickle=False) as file:
+        loaded = np.load(no_pipe(path), allow_pickle=False)
+        if not isinstance(loaded, np.lib.npyio.NpzFile):
+            raise BadOutput("an array alone", where=path, expected="an .npz file")
+        with loaded as file:
             names = file.files if channels is None else [manifest.time_channel, *channels]
             trace = {name: np.asarray(file[name]) for name in names}
-    except _UNREADABLE as err:
-        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
     except KeyError as err:
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
+    except MutatorError:
+        raise
+    except Exception as err:  # a run may write anything, and numpy fails at it in any way
+        _check_is_of_output(err)
+        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
     shapes = {values.shape for values in trace.values()}
     if any(len(shape) != 1 for shape in shapes) or len(shapes) > 1:
         raise BadOutput("channels of different lengths", where=path, expected="one value per step")
@@ -66,8 +74,9 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     """What the target itself said about a run in `out`: hazards, alerts, and more."""
     path = out / manifest.record_file
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(no_pipe(path).read_bytes())
     except (OSError, ValueError, RecursionError) as err:
+        _check_is_of_output(err)
         raise BadOutput(
             f"not a readable record ({_why(err)})", where=path, expected="a JSON object"
         ) from None
@@ -75,6 +84,16 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
         expected = "{hazards: {NAME: time or null}, alerts: [{name: NAME, t: time}]}"
         raise BadOutput("no hazards and alerts with their times", where=path, expected=expected)
     return data
+
+
+def _check_is_of_output(err: Exception) -> None:
+    """Shortage where an output could not be read for want of memory or files here: not the run's doing."""
+    if short := shortage(err):
+        if isinstance(err, MemoryError):
+            with suppress(MemoryError):
+                bytes(_TRIAL)
+                return  # there is plenty: a trace that says that it is larger than memory
+        raise short from err
 
 
 def _why(err: Exception) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mutator._common.files import no_pipe
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes import results
@@ -70,7 +71,7 @@ class Results:
 
     def _read(self, path: Path) -> bytes:
         try:
-            return path.read_bytes()
+            return no_pipe(path).read_bytes()
         except FileNotFoundError:
             raise MutatorError(
                 f"no results here (no {path.name})",

@@ -7,9 +7,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from mutator._common.files import make_folder
+from mutator._common.files import ScratchFolder, make_folder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.figures.run_plot import marks_of
@@ -41,8 +40,7 @@ def film_experiment(
     Says whether the new record equals the campaign's (true if there is none yet). MutatorError for a target
     that cannot be filmed, a faulty run that left no film, and with what the target's command complains of.
     """
-    with TemporaryDirectory(prefix="mutator-film-") as name:
-        folder = Path(name).resolve()
+    with ScratchFolder("mutator-film-") as folder:
         single, same = rerun(workspace, run, experiment_id, out=folder, film=True)
         if not (single.faulty / FILM).is_dir():
             raise MutatorError(

@@ -7,7 +7,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import DiskFull, json_bytes, raising_disk_full, read_json, write_atomic
+from mutator._common.files import (
+    DiskFull,
+    json_bytes,
+    no_pipe,
+    raising_disk_full,
+    read_json,
+    remove_folder,
+    write_atomic,
+)
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
@@ -105,7 +113,7 @@ class _Checks:
         copy = self._kept
         try:
             with raising_disk_full(copy):
-                preflight_cache.copy(preflight_cache.entry(self.digest), copy, FILE)
+                preflight_cache.fetch(preflight_cache.entry(self.digest), copy, FILE)
             found = read_json(copy / FILE, SCHEMA)
             results = self._passed(found, copy)
         except DiskFull:
@@ -187,7 +195,7 @@ class _Checks:
         runs: dict[tuple[str, Any], CheckRun] = {}
         work = self.folder.work / "checks"
         for scratch in (work, self._kept):
-            shutil.rmtree(scratch, ignore_errors=True)
+            remove_folder(scratch)
         work.mkdir(parents=True)
         base = prepare_base(self.manifest, self.folder.base)
         engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
@@ -203,7 +211,7 @@ class _Checks:
                 notify(Progress(stage="checks", detail=name[0], done=len(runs), total=len(jobs)))
         finally:
             pool.shutdown(cancel_futures=True)
-            shutil.rmtree(work, ignore_errors=True)
+            remove_folder(work)
         return runs
 
     def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
@@ -245,7 +253,7 @@ class _Checks:
                 execution.out.rename(place)
             return run
         finally:
-            shutil.rmtree(scratch, ignore_errors=True)
+            remove_folder(scratch)
 
     def _look(self, execution: Execution) -> CheckRun:
         if execution.status is not Status.OK:
@@ -320,7 +328,7 @@ def _digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty when they are not there."""
     try:
         return digest(
-            [digest((out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
+            [digest(no_pipe(out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
         )
     except OSError:
         return ""

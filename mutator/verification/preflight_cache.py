@@ -10,13 +10,23 @@ import tempfile
 from pathlib import Path
 
 from mutator._common import caches
+from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
+
+_SUM = "sum"  # the file with the digest of all others of an entry
 
 
 def entry(key: str) -> Path:
     """Where the checks with this digest are kept. Each machine that shares the home has entries of its own:
     what its digest says of it may not be all that changes last digits."""
     return caches.of_checks() / digest([key, platform.node()])
+
+
+def fetch(place: Path, to: Path, file: str) -> None:
+    """Copy the entry at `place`. OSError where there is none, or none that is as it was written."""
+    copy(place, to, file)
+    if no_pipe(place / _SUM).read_bytes() != _sum(to, file):
+        raise OSError(f"{place}: not as it was written")
 
 
 def copy(source: Path, to: Path, file: str) -> None:
@@ -34,7 +44,15 @@ def store(place: Path, run: Path, file: str) -> None:
         with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:
             made = Path(scratch) / "entry"
             copy(run, made, file)
+            (made / _SUM).write_bytes(_sum(made, file))
             shutil.rmtree(place, ignore_errors=True)  # it was not there, or was damaged
             made.rename(place)
     except OSError:
         return
+
+
+def _sum(folder: Path, file: str) -> bytes:
+    """Digest of the names and contents of golden runs and results."""
+    files = [folder / file, *(path for path in (folder / "golden").rglob("*") if path.is_file())]
+    found = sorted((path.relative_to(folder).as_posix(), digest(path.read_bytes())) for path in files)
+    return digest(found).encode()

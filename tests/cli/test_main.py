@@ -188,3 +188,23 @@ def test_a_closed_pipe_is_no_error(words: str) -> None:
 def test_main_returns_the_code_of_a_verb(root: Path) -> None:
     """`main` returns instead of exiting, so that a program may call it."""
     assert main(["list", "targets"]) == 0
+
+
+@pytest.mark.parametrize(
+    "streams",
+    [
+        "os.close(0); os.close(1); os.close(2)",
+        "read, write = os.pipe(); os.close(read); os.dup2(write, 2)",
+        "os.dup2(os.open('/dev/full', os.O_RDWR), 2)",
+    ],
+)
+def test_remarks_that_nobody_can_read(root: Path, tmp_path: Path, streams: str) -> None:
+    """A command whose standard error is closed, full or not read does its work all the same, and says how
+    it ended."""
+    words = ["plan", "small", "--out", str(tmp_path / "run"), "--root", str(root)]
+    begin = f"import os, sys; {streams}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    for code in (0, 2):
+        done = subprocess.run([sys.executable, "-c", begin, "-m", "mutator", *words], check=False)
+        assert done.returncode == code
+        assert (tmp_path / "run" / "plan.csv").is_file()
+        words[1] = "unknown"

@@ -1,14 +1,17 @@
 """A campaign command in a process of its own, to be struck by signals and looked at from outside."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from mutator.workspace import Workspace
 
+LINGER_S = 5.0  # what is left of a command has so long to end after it
 DERIVED = ("results.csv", "results.parquet")
 Bytes = dict[str, bytes]
 
@@ -78,11 +81,21 @@ class Command:
         registered = {path.name for path in (self.out / "workers").glob("[0-9]*")}
         return sorted(pid for pid, _ in self.others() if str(pid) in registered)
 
-    def end(self) -> str:
+    def end(self, *, longest_s: float = 600.0) -> str:
         """Wait for its end and for the end of everything it started; returns what it printed."""
-        printed = self.process.communicate(timeout=600)[0]
-        deadline = time.monotonic() + 10.0
+        printed = self.process.communicate(timeout=longest_s)[0]
+        deadline = time.monotonic() + LINGER_S
         while left := list(self.others()):
             assert time.monotonic() < deadline, left
             time.sleep(0.05)
         return printed
+
+    def kill(self) -> None:
+        """End it and everything it started, come what may."""
+        self.process.kill()
+        self.process.wait()
+        while left := list(self.others()):
+            for pid, _ in left:
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            time.sleep(0.05)

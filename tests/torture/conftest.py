@@ -15,6 +15,6 @@ def seeds(request: pytest.FixtureRequest) -> Callable[[int], Sequence[int]]:
 
 
 @pytest.fixture
-def print_tally(record_property: Callable[[str, object], None]) -> Callable[[Tally], None]:
-    """Has a tally printed at the end of the session, also by workers of pytest-xdist."""
+def print_tally(record_property: Callable[[str, object], None]) -> Callable[[Tally | str], None]:
+    """Has a tally, or a text, printed at the end of the session, also by workers of pytest-xdist."""
     return lambda tally: record_property("tally", str(tally))

@@ -1,9 +1,11 @@
 """What can become of a file on a disk: each damage is a function of the file, its neighbours and chance."""
 
 import json
+import os
 import random
 import re
 import shutil
+import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -118,6 +120,18 @@ def become_a_link(path: Path, others: Sequence[Path], chance: Chance) -> None:
     path.symlink_to(chance.choice([path.with_name("nowhere"), path, path.parent, *others]))
 
 
+def become_a_pipe(path: Path, others: Sequence[Path], chance: Chance) -> None:
+    """Or a socket: who reads of it must not wait for what nobody will say."""
+    path.unlink()
+    if chance.random() < 0.7:
+        os.mkfifo(path)
+        return
+    here = os.open(path.parent, os.O_RDONLY)
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(f"/proc/self/fd/{here}/{path.name}")  # the whole path may be longer than a socket's may be
+    os.close(here)
+
+
 def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
     """A value of a JSON text, or of one of its lines, becomes a strange one, goes, or gets a companion."""
     data = path.read_bytes()
@@ -157,7 +171,7 @@ DAMAGES: dict[str, Damage] = {
     **{one.__name__: _bytes(one) for one in (zero_a_page, append_rubbish)},
     **{one.__name__: _lines(one) for one in (drop_a_line, double_a_line, swap_two_lines)},
     **{one.__name__: one for one in (delete, swap_with_another, copy_another_over_it, copy_it_beside)},
-    **{one.__name__: one for one in (become_a_folder, become_a_link, change_json)},
+    **{one.__name__: one for one in (become_a_folder, become_a_link, become_a_pipe, change_json)},
 }
 
 

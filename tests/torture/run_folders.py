@@ -44,14 +44,7 @@ def forged(home: Path, at: Path) -> World:
 
 def half(home: Path, at: Path) -> World:
     """A run of the toy that was killed, with most of its experiments done."""
-    words, out = (*SMALL, *REFERENCE), home / "run"
-    command = Command(_workspace(), out, "-m", "mutator", "run", *words, "-n", "2", "--out", str(out))
-    command.wait_for_records(4)
-    os.killpg(command.process.pid, signal.SIGKILL)
-    command.end()
-    done("export", out, "--format", "csv")
-    name = next(iter(RunFolder.open(out).records()))
-    return World(home=home, place=_place(home, at, words, name), readers=UNFINISHED)
+    return _killed(home, at, (*SMALL, *REFERENCE), 4)
 
 
 def shards(home: Path, at: Path) -> World:
@@ -71,8 +64,13 @@ def shipped(home: Path, at: Path) -> World:
     return World(home=home, place=place, readers={name: READERS[name] for name in QUICK})
 
 
+def shipped_half(home: Path, at: Path) -> World:
+    """A run on the controller that ships, killed with half of its experiments done."""
+    return _killed(home, at, (*SHIPPED, *REFERENCE), 2)
+
+
 BUILDERS: dict[str, Callable[[Path, Path], World]] = {
-    one.__name__: one for one in (finished, forged, half, shards, shipped)
+    one.__name__: one for one in (finished, forged, half, shards, shipped, shipped_half)
 }
 
 
@@ -85,6 +83,18 @@ def done(*words: object) -> None:
 def hazardous(run: Path) -> str:
     """The first experiment of a run that reached a hazard."""
     return next(name for name, record in RunFolder.open(run).records().items() if record.hazards)
+
+
+def _killed(home: Path, at: Path, words: tuple[str, ...], records: int) -> World:
+    """A run that is killed as soon as so many experiments have a record."""
+    out = home / "run"
+    command = Command(_workspace(), out, "-m", "mutator", "run", *words, "-n", "2", "--out", str(out))
+    command.wait_for_records(records)
+    os.killpg(command.process.pid, signal.SIGKILL)
+    command.end()
+    done("export", out, "--format", "csv")
+    name = next(iter(RunFolder.open(out).records()))
+    return World(home=home, place=_place(home, at, words, name), readers=UNFINISHED)
 
 
 def _place(home: Path, at: Path, words: tuple[str, ...], experiment: str) -> Place:

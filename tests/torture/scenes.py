@@ -9,7 +9,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -20,10 +20,12 @@ from mutator.workspace import Workspace
 from ..differential.command import Command
 from .damages import Chance
 from .readers import HOW, Place, Told, run
-from .run_folders import REFERENCE, SMALL, done
+from .run_folders import REFERENCE, SHIPPED, SMALL, done
 from .tally import Case
 from .worlds import LAST, judged
 
+CLONE = Path(__file__).parents[2]
+SHIPPED_RUN = "run of the shipped controller"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP)
 KILLS = 3  # of one command, at most
 
@@ -72,6 +74,11 @@ class Scene:
 
     def undisturbed(self) -> Told:
         """What the command comes to when nobody kills it."""
+        if (
+            self.home is None and not self.fresh_cache
+        ):  # the time of those that follow, whose checks are known
+            self._begin()
+            self._command().end()
         self._begin()
         began = time.monotonic()
         command = self._command()
@@ -99,13 +106,21 @@ class Scene:
 
 
 def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
-    """A run without and with its checks, a report, a repair of a damaged run, a merge."""
+    """A run without and with its checks, one of the shipped controller, a report, a repair of a damaged run,
+    a merge."""
     words, shards = (*SMALL, "--engine", "fork"), (at / "shard1", at / "shard2")
     place, scene = Place(folder=at, campaign=words), partial(Scene, workspace=workspace, at=at)
     running, again = ("run", *words, "-n", "2", "--out", place.run), partial(run, place)
     driving = partial(scene, words=running, told=again, victims=tuple(VICTIMS))
     yield driving(name="run")
     yield driving(name="run with checks", fresh_cache=True)
+    longer = (*SHIPPED, "--engine", "fork")
+    yield driving(
+        name=SHIPPED_RUN,
+        workspace=Workspace.find(root=CLONE),
+        words=("run", *longer, "-n", "2", "--out", place.run),
+        told=partial(run, replace(place, campaign=longer)),
+    )
     whole = homes / "finished"
     done("run", *words, "--out", whole / "run")
     yield scene(name="report", words=("report", place.run), told=partial(_written, place), home=whole)

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 HOSTILE = Path(__file__).parents[1] / "toy" / "templates"
 TRIES = 600
-SOON_S = 5.0  # of CPU beyond what a verb takes of files that are in order
+SOON_S = 1.0  # of CPU beyond what a verb takes of files that are in order
 LONGEST_S = 60  # on a busy machine
 VERBS: dict[str, tuple[str, ...]] = {
     "check": ("check",),

@@ -9,7 +9,7 @@ import pytest
 
 from mutator.workspace import Workspace
 
-from .scenes import scenes
+from .scenes import CLONE, SHIPPED_RUN, scenes
 from .tally import Tally
 
 pytestmark = pytest.mark.slow
@@ -17,6 +17,7 @@ pytestmark = pytest.mark.slow
 TRIES = {
     "run": 45,
     "run with checks": 20,
+    SHIPPED_RUN: 6,
     "report": 20,
     "repair": 20,
     "merge": 20,
@@ -34,7 +35,7 @@ def test_kills(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Kills, then the end of the command."""
-    monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
+    monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name == SHIPPED_RUN else toy.library.parent))
     monkeypatch.chdir(tmp_path)
     scene = next(one for one in scenes(toy, tmp_path / "homes", tmp_path / "case") if one.name == name)
     right, wanted = scene.undisturbed(), seeds(TRIES[name])

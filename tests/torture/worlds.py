@@ -128,12 +128,16 @@ def _first(told: object, right: object) -> str:
     return f"{one!s:.500}, not {other!s:.500}"
 
 
+class TooLong(Exception):
+    """Something takes longer than it may. No TimeoutError: that is an OSError, which readers expect."""
+
+
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """TimeoutError where what is within takes longer."""
+    """TooLong where what is within takes longer."""
 
     def end(number: int, frame: FrameType | None) -> None:
-        raise TimeoutError(f"took more than {seconds} s")
+        raise TooLong(f"took more than {seconds} s")
 
     before = signal.signal(signal.SIGALRM, end)
     signal.setitimer(signal.ITIMER_REAL, seconds)

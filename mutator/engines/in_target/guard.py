@@ -19,8 +19,10 @@ from contextlib import suppress
 from typing import Any
 
 WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # why a process was stopped
+HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+_MINDED = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}
 _LOOK_S = 0.2  # how often a limit of space is looked at
 _LOOK_SHARE = 20  # of the time, one part in so many may be spent on that
 _BLOCK = 512  # bytes, the unit of st_blocks
@@ -49,6 +51,7 @@ def fork(caller: int, *, wall_s: float = math.inf, space: Space | None = None) -
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
     if not pid:
         os.setsid()
+        _mind_signals()
         die_with_parent(parent)
         return None
     try:
@@ -65,6 +68,14 @@ def fork(caller: int, *, wall_s: float = math.inf, space: Space | None = None) -
         "wall_s": time.monotonic() - began,
         "stopped": stopped,
     }
+
+
+def _mind_signals() -> None:
+    """As in an interpreter that nobody started deaf to signals, as shells do in the background."""
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    for number in _MINDED:
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 
 def die_with_parent(parent: int) -> None:

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
 _LONGEST = 2000  # characters of an exception's text
 _MOST_ERRORS = 50  # of which an exception came
 
@@ -80,7 +79,7 @@ def run(job: dict[str, Any]) -> None:
 
 def limit_resources(job: dict[str, Any]) -> None:
     memory, disk = job["memory_mb"] << 20, job["disk_mb"] << 20
-    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + _HARD_CPU_EXTRA_S))
+    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + guard.HARD_CPU_EXTRA_S))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_FSIZE, (disk, disk))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -136,10 +135,10 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
 
 
 def text(thing: object) -> str:
-    """What it is as a text; classes of the target may fail to say so."""
+    """What it is as a text; classes of the target may fail to say so, in any way."""
     try:
         return str(thing)
-    except Exception as why:
+    except BaseException as why:
         return f"its text cannot be told ({type(why).__name__})"
 
 

@@ -44,6 +44,8 @@ def library(name: str, made_of: Callable[[], bytes]) -> Library | None:
     if _folder is None:
         return None
     path = _folder / file_name(name, made_of())
+    if path.is_fifo():  # nobody waits for what a pipe may say
+        return None
     try:
         data = path.read_bytes()
         digest = sha256(data[:-CHECK]).digest()

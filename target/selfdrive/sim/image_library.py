@@ -184,6 +184,8 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
 
 def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes] | None:
     """The frames in that file and their digests; None where there is no such file, or not a whole one."""
+    if path.is_fifo():  # nobody waits for what a pipe may say
+        return None
     header = _header(shape)
     end = len(header) + _size(shape)
     try:

@@ -9,9 +9,13 @@ import pytest
 
 from mutator._common.files import (
     DiskFull,
+    ScratchFolder,
     check_schema,
+    is_no_file,
+    no_pipe,
     raising_disk_full,
     read_json,
+    remove_folder,
     write_atomic,
     write_json,
 )
@@ -35,11 +39,66 @@ def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
         read_json(path, "a/1")
 
 
+def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
+    """A pipe in the place of a file is no file; a file is read as ever."""
+    os.mkfifo(tmp_path / "a.json")
+    with pytest.raises(MutatorError, match=r"a\.json: no file"):
+        read_json(tmp_path / "a.json", "a/1")
+    (tmp_path / "b").write_bytes(b"x")
+    assert no_pipe(tmp_path / "b").read_bytes() == b"x"
+
+
 def test_newer_schema_is_refused() -> None:
     """A newer version is told as such, with what to do; an older one is read."""
     check_schema("run/1", "run/2", Path("run.json"))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' .*newer mutator.*update mutator"):
         check_schema("run/3", "run/2", Path("run.json"))
+
+
+def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
+    """Deep, locked and strange folders go; what they link to stays, as does a link in place of the folder."""
+    kept, folder = tmp_path / "kept", tmp_path / "folder"
+    kept.mkdir()
+    (kept / "x").touch()
+    before = kept.stat().st_mode
+    (folder / "locked" / "inside").mkdir(parents=True)
+    (folder / "link").symlink_to(kept)
+    os.mkfifo(folder / "pipe")
+    (folder / "locked").chmod(0)
+    here = Path.cwd()
+    os.chdir(folder)
+    for _ in range(1200):
+        Path("deep").mkdir()
+        os.chdir("deep")
+    os.chdir(here)
+    (tmp_path / "link").symlink_to(kept)
+    for path in (folder, tmp_path / "link", tmp_path / "none"):
+        remove_folder(path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["kept", "link"]
+    assert (kept / "x").exists() and kept.stat().st_mode == before
+
+
+def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is gone after its `with` block, or with the object."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with ScratchFolder("x-") as folder:
+        (folder / "y").mkdir()
+    scratch = ScratchFolder("x-")
+    (path,) = tmp_path.iterdir()
+    assert path == scratch.path
+    del scratch
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    """A pipe or device, and a link to one, is no file; a folder is told by who opens it."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    with pytest.raises(OSError, match="No such device") as refused:
+        no_pipe(tmp_path / name)
+    assert is_no_file(refused.value)
+    assert no_pipe(tmp_path) == tmp_path and no_pipe(tmp_path / "none") == tmp_path / "none"
 
 
 def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

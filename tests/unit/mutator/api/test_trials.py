@@ -61,6 +61,17 @@ def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
     assert not folder.exists()
 
 
+def test_a_trial_that_deletes_its_output(toycar: Workspace) -> None:
+    """A faulty run without an output folder is a result like any other."""
+    driver = toycar.library.parent / "tree" / "toycar" / "driver.py"
+    lost = "        if gap > 500.0:\n            import os, shutil\n            shutil.rmtree(os.getcwd())\n"
+    old = "        wanted ="
+    driver.write_text(driver.read_text().replace(old, f"{lost}{old}", 1))
+    trial = mutator.try_fault("sensor/distance/longer", "A", 1.0, value=900.0, workspace=toycar)
+    assert trial.status is Status.CRASHED
+    assert list((trial.folder / "faulty").iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("fault", "scenario", "trigger", "said"),
     [

@@ -36,6 +36,21 @@ def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
     assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
 
 
+def test_the_reason_is_printable(fork: Fork, edit: Edit) -> None:
+    """What is kept of why a run was left to the reference engine is text, whatever the target said."""
+    edit(
+        "tree/toycar/sensing.py",
+        "        self.publish((gap",
+        "        if gap > 45.0:\n            raise ValueError('\\udcff' * 1000)\n        self.publish((gap",
+    )
+    execution = fork.run(fork.job(at_time(5.9)))
+    assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
+    assert (
+        execution.why.startswith(r"ended as crashed: ValueError: \udcff\udcff")
+        and execution.why.isprintable()
+    )
+
+
 @pytest.mark.slow
 def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> None:
     """A stepwise golden run with other bytes than the command's disqualifies the engine for it."""

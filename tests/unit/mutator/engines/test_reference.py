@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import pytest
 from mutator._common.files import DiskFull
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -185,6 +187,68 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
     assert run().status is Status.OK, "the next run has its own tree again"
 
 
+def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp_path: Path) -> None:
+    """A run that writes to the bytecode in its tree does no harm to the runs after it."""
+    body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
+    assert run(entry(body)).status is Status.OK
+    (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
+    assert kept.stat().st_size > 20
+    assert run().status is Status.OK
+
+
+def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
+    """A log or report that a run takes away, or makes a folder or pipe of, is none; nobody waits for it."""
+    head = "import os\nos.unlink('../log')\n"
+    for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
+        execution = run(entry(head + body))
+        assert (execution.status, execution.log) == (Status.OK, "")
+    for body in ("os.mkfifo", "os.mkdir", "os.symlink('/dev/zero', '../report.json') or str"):
+        execution = run(entry(f"import os\n{body}('../report.json')\nos._exit(0)"))
+        assert (execution.status, execution.detail) == (Status.CRASHED, "left with status 0 without a report")
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"files": 5, "modules": []},
+        {"files": {}, "modules": [5]},
+        {"files": {}, "modules": [], "outside": [5]},
+        {"files": {}, "modules": [], "error": {"kind": "x", "message": "", "stacks": []}},
+        {},
+    ],
+)
+def test_half_a_report_is_none(run: Run, more: dict[str, object]) -> None:
+    """What a run puts into the place of its report counts only if it is one."""
+    report = {"ended": "ok", "error": None, "disk_full": False, "outside": [], "probe": None, **more}
+    body = f"import json, os\nopen('../report.json', 'w').write(json.dumps({report!r}))\nos._exit(0)"
+    execution = run(entry(body))
+    assert (execution.status, execution.detail) == (Status.CRASHED, "left with status 0 without a report")
+
+
+def test_names_that_are_no_text(run: Run) -> None:
+    """Whatever a target calls its classes and files: the names that are kept of them are printable."""
+    body = (
+        "import os\nname = os.path.join(os.path.dirname(__file__), '\\udcff\\n')\n"
+        "exec(compile('raise type(\"a\\\\n\", (Exception,), {})', name, 'exec'))"
+    )
+    raised = run(entry(body)).raised
+    assert raised is not None
+    assert (raised.kind, raised.place) == (r"a\n", r"toycar/\udcff\n:1")
+
+
+def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
+    """A run minds signals that whoever started it was deaf to, as programs in the background are."""
+    body = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)"
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
+    try:
+        assert run(entry(body)).detail == "KeyboardInterrupt (toycar/go.py:2)"
+        assert run(entry(body.replace("SIGINT", "SIGALRM"))).detail == "killed by SIGALRM"
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
     """A source file that belongs to no tree of this job makes a harness error; a cache of data does not."""
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
@@ -343,3 +407,19 @@ def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
     """Neither its own package's, nor the standard library's, nor what Python itself had loaded."""
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
+
+
+@pytest.mark.parametrize(("limit", "name"), [("AS", "memory_mb"), ("CPU", "cpu_s"), ("FSIZE", "disk_mb")])
+def test_a_limit_of_this_process_that_is_lower(
+    manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
+) -> None:
+    """No engine is made where runs may not have what their limits say: they would end here, not elsewhere."""
+    number, unlimited = getattr(resource, f"RLIMIT_{limit}"), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (1, 1) if which == number else unlimited)
+
+    def refuse(which: int, limits: tuple[int, int]) -> None:
+        raise ValueError("not allowed to raise maximum limit")
+
+    monkeypatch.setattr(resource, "setrlimit", refuse)
+    with pytest.raises(MutatorError, match=rf"a limit of 1 here \(`ulimit -.`\).*{name}.*raise it"):
+        ReferenceEngine(manifest, tmp_path, tmp_path, LIMITS)

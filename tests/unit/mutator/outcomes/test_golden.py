@@ -1,6 +1,9 @@
 """Comparison with golden, and reading what a target wrote."""
 
+import errno
 import json
+import os
+import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.outcomes.golden import BadOutput, alerts_of, compare, hazards_of, load_record, load_trace
+from mutator._common.shortages import Shortage
+from mutator.outcomes.golden import (
+    BadOutput,
+    alerts_of,
+    compare,
+    hazards_of,
+    load_record,
+    load_trace,
+    trace_digest,
+)
 from mutator.store.run_folder import golden_key
 from mutator.targets.manifest import Channel
 
@@ -114,6 +126,25 @@ def test_bad_traces_are_told(tmp_path: Path) -> None:
             load_trace(MANIFEST, tmp_path, ["gas"])
 
 
+def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
+    """An array alone, a member whose head is no Python, and a pipe are BadOutput."""
+    path = tmp_path / "trace.npz"
+    with path.open("wb") as file:
+        np.save(file, T)
+    with pytest.raises(BadOutput, match="an array alone"):
+        load_trace(MANIFEST, tmp_path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("t.npy", b"\x93NUMPY\x01\0\x08\0{'a': (\n")
+    with pytest.raises(BadOutput, match="not a readable trace"):
+        load_trace(MANIFEST, tmp_path)
+    path.unlink()
+    os.mkfifo(path)
+    os.mkfifo(tmp_path / "record.json")
+    for load in (load_trace, load_record):
+        with pytest.raises(BadOutput, match="No such device"):
+            load(MANIFEST, tmp_path)
+
+
 def test_record_is_read(tmp_path: Path) -> None:
     """Hazards that occurred and counted alerts, every raise of them, are found in a target's record."""
     said = {
@@ -144,3 +175,23 @@ def test_bad_record_is_told(tmp_path: Path, text: str) -> None:
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
         load_record(MANIFEST, tmp_path)
+
+
+def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trace that cannot be opened for want of open files says nothing of the run that wrote it."""
+
+    def full(*given: Any, **more: Any) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(np, "load", full)
+    with pytest.raises(Shortage, match="too many open files"):
+        load_trace(MANIFEST, tmp_path)
+
+
+def test_a_trace_that_is_a_pipe(tmp_path: Path) -> None:
+    """A run that leaves a pipe in the place of its outputs left none; nobody waits for what it may say."""
+    for name in (MANIFEST.trace_file, MANIFEST.record_file):
+        os.mkfifo(tmp_path / name)
+    for read in (load_trace, load_record, trace_digest):
+        with pytest.raises(BadOutput):
+            read(MANIFEST, tmp_path)

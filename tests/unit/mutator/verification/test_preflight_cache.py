@@ -1,5 +1,6 @@
 """Checks are made once for the same sources, whatever the run folder, and not believed when damaged."""
 
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -74,6 +75,27 @@ def test_a_damaged_entry_is_not_believed(
         (cache / damaged).unlink()
     else:
         (cache / damaged).write_bytes(content)
+    toy, _ = checked
+    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    with pytest.raises(Driven):
+        run_checks(toy, folder)
+
+
+@pytest.mark.usefixtures("nothing_is_driven")
+@pytest.mark.parametrize("how", ["another word in a result", "another file", "a pipe"])
+def test_nothing_in_an_entry_may_be_another(
+    checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
+) -> None:
+    """An entry is used as it was written or not at all: its results and golden runs are part of a seal."""
+    if how == "another file":
+        shutil.copy(cache / "golden" / "A" / "log.npz", cache / "golden" / "A" / "log2.npz")
+    elif how == "a pipe":
+        (cache / "sum").unlink()
+        os.mkfifo(cache / "sum")
+    else:
+        text = (cache / "checks.json").read_text()
+        assert "the same bytes twice" in text
+        (cache / "checks.json").write_text(text.replace("the same bytes twice", "the same bytes thrice"))
     toy, _ = checked
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(Driven):

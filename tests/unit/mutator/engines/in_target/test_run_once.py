@@ -46,6 +46,14 @@ def unspeakable():
     raise Mute
 
 
+def interrupting():
+    class Loud(Exception):
+        def __str__(self):
+            raise KeyboardInterrupt
+
+    raise Loud
+
+
 def stop():
     raise StepLimit("more than 3 steps")
 
@@ -96,6 +104,7 @@ def described() -> Callable[..., dict[str, Any]]:
         ("wrap", (), "ValueError", "wrapped", [[("a.py", 10)], [("a.py", 3), ("a.py", 8)]]),
         ("again", (50,), "KeyError", "'deep'", [[("a.py", 3), ("a.py", 21)]]),
         ("unspeakable", (), "Mute", "its text cannot be told (RuntimeError)", [[("a.py", 29)]]),
+        ("interrupting", (), "Loud", "its text cannot be told (KeyboardInterrupt)", [[("a.py", 37)]]),
     ],
 )
 def test_exceptions_are_described(

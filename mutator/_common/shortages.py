@@ -1,0 +1,44 @@
+"""Errors of a machine that has no more memory, files or processes to give: a user can mend them."""
+
+import errno
+import os
+
+from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
+
+_FILES = (errno.EMFILE, errno.ENFILE)
+_PROCESSES = "can't start new thread"
+_LOADING = ("failed to map segment", "cannot allocate memory")  # what a library says that does not fit in
+_AGAIN = "give the same command again; finished experiments are kept and not repeated"
+
+
+class Shortage(MutatorError):
+    """The machine, or a limit of this process, gave no more. What finished is kept."""
+
+    exit_code = EXIT_HARNESS_ERRORS
+
+
+def shortage(err: BaseException | None) -> Shortage | None:
+    """What an error says of a shortage, or the error that it came of; None: nothing."""
+    while err is not None:
+        number = getattr(err, "errno", None)
+        loading = isinstance(err, ImportError) and any(words in str(err) for words in _LOADING)
+        if isinstance(err, MemoryError) or number == errno.ENOMEM or loading:
+            return Shortage(
+                "no memory left",
+                expected="more memory, or a higher limit (`ulimit -v`)",
+                remedy=f"end other programs, raise the limit, or use fewer workers; then {_AGAIN}",
+            )
+        if number in _FILES or (isinstance(err, ImportError) and os.strerror(errno.EMFILE) in str(err)):
+            return Shortage(
+                "too many open files",
+                expected="a higher limit (`ulimit -n`)",
+                remedy=f"raise it, say to 1024, then {_AGAIN}",
+            )
+        if number == errno.EAGAIN or _PROCESSES in str(err):
+            return Shortage(
+                "no more processes or threads",
+                expected="fewer of them on this machine, or a higher limit (`ulimit -u`)",
+                remedy=f"end other programs, raise the limit, or use fewer workers; then {_AGAIN}",
+            )
+        err = err.__cause__ or err.__context__
+    return None

@@ -1,0 +1,71 @@
+"""The pristine tree that runs have their files from, as links: copies cost as much as a tenth of a run."""
+
+import os
+import shutil
+from pathlib import Path
+
+from mutator._common.files import is_disk_full
+
+_Stamp = tuple[int, int, int, int]
+
+
+class BaseTree:
+    """The tree in the folder `folder`, made by `prepare_base`.
+
+    A run may write through its links. Then the tree is made pristine again, and each run that took place
+    meanwhile is to be driven again, on a tree without links.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._files = {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+        self._stamps = self._look()
+
+    def lay_out(self, tree: Path, *, linked: bool) -> None:
+        """Make the new folder `tree`, with the files of this one."""
+        if linked:
+            shutil.copytree(self._folder, tree, copy_function=_link_or_copy)
+            return
+        for path, data in self._files.items():
+            place = tree / path.relative_to(self._folder)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+
+    def was_changed(self) -> bool:
+        """Whether a file was written to, or mended by another process, since this was last asked; it is
+        pristine now."""
+        if (stamps := self._look()) == self._stamps:
+            return False
+        for path in self._files:
+            if stamps[path] != self._stamps[path] and not self._is_pristine(path):
+                self._mend(path)
+        self._stamps = self._look()
+        return True
+
+    def _is_pristine(self, path: Path) -> bool:
+        try:
+            return path.read_bytes() == self._files[path] and path.stat().st_mode == self._stamps[path][0]
+        except OSError:
+            return False
+
+    def _mend(self, path: Path) -> None:
+        """Another file in its place, at once: others may be linking it just now."""
+        whole = self._folder.with_name(f"{self._folder.name}-mended.{os.getpid()}")
+        whole.write_bytes(self._files[path])
+        whole.chmod(self._stamps[path][0])
+        whole.replace(path)
+
+    def _look(self) -> dict[Path, _Stamp]:
+        """What changes when a file is written to."""
+        states = {path: path.stat() for path in self._files}
+        return {path: (s.st_mode, s.st_mtime_ns, s.st_size, s.st_ino) for path, s in states.items()}
+
+
+def _link_or_copy(source: str, dest: str) -> None:
+    """One file of the pristine tree in a run's own."""
+    try:
+        os.link(source, dest)
+    except OSError as err:
+        if is_disk_full(err):
+            raise
+        shutil.copyfile(source, dest)
