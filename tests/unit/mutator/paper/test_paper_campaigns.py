@@ -99,7 +99,7 @@ def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
-    assert {e.setting for e in coded.experiments} == {("pictures", "coded_detector", "coded_translation")}
+    assert {e.setting for e in coded.experiments} == {("pictures", "coded_detector")}
 
 
 def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
