@@ -43,7 +43,7 @@ class Piece:
 
 def insertion(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
     """The edit that inserts `code` (4 spaces an indentation level) at `site`, each line tagged."""
-    lines = _lines(file, site.indent, code, tag)
+    lines = _lines(file, site, code, tag)
     index, rank = (site.last, Rank.AFTER) if site.after else (site.first, Rank.BEFORE)
     return Edit(index=index, rank=rank, lines=lines)
 
@@ -58,7 +58,7 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
             expected="an anchor before_call, before_assign or before_return",
             remedy="anchor at the statement that is to be left out",
         )
-    lines = _lines(file, site.indent, code, tag, site.reindent)
+    lines = _lines(file, site, code, tag, site.reindent)
     return Edit(
         index=site.first,
         rank=Rank.GUARD,
@@ -87,9 +87,9 @@ def _unit(file: ParsedFile, indent: bytes) -> bytes:
 
 
 def _lines(
-    file: ParsedFile, indent: bytes, code: Sequence[str], tag: str, guarded: int = 0
+    file: ParsedFile, site: Site, code: Sequence[str], tag: str, guarded: int = 0
 ) -> tuple[bytes, ...]:
-    unit = _unit(file, indent)
+    unit = _unit(file, site.indent)
     result = []
     for line in code:
         body = line.lstrip(" ")
@@ -100,10 +100,11 @@ def _lines(
             raise MutatorError(
                 f"{body!r} cannot be written in {file.encoding}",
                 where=file.where,
+                line=site.first + 1,
                 expected="names that the file's encoding has",
                 remedy="use other names",
             ) from None
-        result.append(indent + unit * levels + text + file.newline)
+        result.append(site.indent + unit * levels + text + file.newline)
     return tuple(result)
 
 

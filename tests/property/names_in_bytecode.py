@@ -31,7 +31,9 @@ def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int,
     stack, counts = [code], Counter[tuple[str, int]]()
     while stack:
         one = stack.pop()
-        stack += [const for const in one.co_consts if isinstance(const, types.CodeType)]
+        # not those of `co_consts`: what is never reached may be left there, or not
+        steps = dis.get_instructions(one)
+        stack += [step.argval for step in steps if isinstance(step.argval, types.CodeType)]
         if one is not code and one.co_firstlineno in lines.injected:
             continue
         key = (one.co_qualname, lines.original[one.co_firstlineno] if one is not code else 0)

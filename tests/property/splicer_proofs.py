@@ -257,7 +257,8 @@ def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
     try:
         mutant = _spliced(file, [_Placed(spot, edit)])
     except Wrong as error:
-        _expect("before global declaration" in str(error) or "before nonlocal" in str(error), str(error))
+        late = re.search(r"(before|prior to) (global|nonlocal) declaration", str(error))
+        _expect(late is not None, str(error))
         figures.variables["refused: the mutant does not compile"] += 1
         return b""
     figures.variables[model] += 1
