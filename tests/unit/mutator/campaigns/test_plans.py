@@ -311,9 +311,9 @@ def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp
     ("campaign", "reading", "promised"),
     [
         ("quickstart", "as_described", "c3e2fa1f50b8700d8fc1156e3272f0f38b86eb0efc9f0f1e5d2ffa7d54fd9cb1"),
-        ("quickstart", "as_coded", "73ce60ef41b9c752913d1544a96d39f3885319be2a38b3b8314dd035d373e18f"),
+        ("quickstart", "as_coded", "4d2ee45ca8a123e8aa48810363a5beee96256cc09b701663e9bdcd44f23ce925"),
         ("paper_smoke", "as_described", "57c3e4b4ed636eac636c9bf6a61aa3141f93c4fbccdd803a5fc3ee6b1a7730ff"),
-        ("paper_smoke", "as_coded", "04e5658f198741a4341b22e79abe3e3093ee5e519487eae02cbb57909da8c030"),
+        ("paper_smoke", "as_coded", "edf3f22b413030b7e82168a7a54847625c135f5f51abfd63a0307099bece2946"),
     ],
 )
 def test_published_plans_keep_their_digests(
