@@ -1,6 +1,6 @@
 """The splicer on thousands of sources: whatever it does not refuse is spliced right.
 
-`pytest -m slow -s tests/property/test_splicer_at_large.py` tries all, and prints the figures.
+`pytest -m slow -n 2 -rP tests/property/test_splicer_at_large.py` tries all, and prints the figures.
 """
 
 import random
@@ -44,20 +44,27 @@ def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: 
     return figures
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(20_000, marks=pytest.mark.slow)])
-def test_generated_modules(count: int) -> None:
+PARTS = 8  # of what takes long, for as many workers
+
+
+@pytest.mark.parametrize(
+    ("first", "count"),
+    [(0, 30), *(pytest.param(2500 * part, 2500, marks=pytest.mark.slow) for part in range(PARTS))],
+)
+def test_generated_modules(first: int, count: int) -> None:
     """At every anchor of generated modules a mutant is right by `ast`, and does what the original does."""
-    figures = proved(((seed, ModuleWriter(seed).module()) for seed in range(count)), behaviour)
+    seeds = range(first, first + count)
+    figures = proved(((seed, ModuleWriter(seed).module()) for seed in seeds), behaviour)
     assert not figures.wrong
     assert figures.modules["spliced"] > 0.8 * count
     assert all(figures.anchors[kind] > count / 2 for kind in KINDS)
 
 
-@pytest.mark.parametrize("share", [0.004, pytest.param(1.0, marks=pytest.mark.slow)])
-def test_the_standard_library(share: float) -> None:
+@pytest.mark.parametrize("part", [None, *(pytest.param(n, marks=pytest.mark.slow) for n in range(PARTS))])
+def test_the_standard_library(part: int | None) -> None:
     """At every anchor of the installed standard library and its tests a mutant is right by `ast`."""
     paths = sorted(path for path in LIBRARY.rglob("*.py") if "site-packages" not in path.parts)
-    chosen = random.Random(4).sample(paths, round(share * len(paths)))
+    chosen = random.Random(4).sample(paths, 7) if part is None else paths[part::PARTS]
     figures = proved(((path, path.read_bytes()) for path in chosen), None)
     assert not figures.wrong
     assert figures.modules["spliced"] > 0.95 * len(chosen)
