@@ -148,9 +148,13 @@ def angle_off(degrees):
     return disturb
 
 
-@pytest.mark.parametrize(("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.375, 18.3), (0.34, None)])
+# Of the original 0.86 deg is published, and times; errors between are those that take the time (13.0 s also
+# the torque, 0.952) they took there.
+@pytest.mark.parametrize(
+    ("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.576, 13.0), (0.366, 18.3), (0.34, None)]
+)
 def test_steering_angle_off(s1, degrees, leaves):
-    """From 0.86 deg, at 11.9 s, to 0.375 deg, at 18.3 s, an error drives the car out of its lane."""
+    """An error drives the car out of its lane, the later the smaller it is, and below some size never."""
     record = faulty(s1, angle_off(degrees))
     assert record["alerts"] == []
     if leaves is None:
