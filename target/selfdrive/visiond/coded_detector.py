@@ -9,7 +9,7 @@ from math import pi, sqrt
 
 import cv2
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -76,8 +76,8 @@ class CodedDetector:
         looked_at = np.flatnonzero(edges.sum(axis=(1, 2)) >= LEAST_EDGES)
         if not looked_at.size:
             return np.empty((0, 2), np.intp)
-        found = windows(self._hog.blocks(part)).reshape(-1, FEATURES)[looked_at]
-        marked = looked_at[self._net.score(found) > self._threshold]
+        found = windows(self._hog.blocks(part))[np.divmod(looked_at, WINDOWS[1])]
+        marked = looked_at[self._net.score(found.reshape(-1, FEATURES)) > self._threshold]
         which, row, column = edges[marked].nonzero()
         down, across = np.divmod(marked[which], WINDOWS[1])
         return np.column_stack((FIRST_ROW + STRIDE * down + row, FIRST_COLUMN + STRIDE * across + column))
@@ -90,11 +90,11 @@ def edges_in_windows(part: np.ndarray) -> np.ndarray:
     power = gradient * gradient
     crest = np.zeros_like(power)
     above, here, below = power[:-2], power[1:-1], power[2:]
-    np.copyto(crest[1:-1], here, where=(above <= here) & (here > below))
+    np.multiply(here, (above <= here) & (here > below), out=crest[1:-1])
     down, across = (size // STRIDE for size in part.shape)
     tiles = power.reshape(down, STRIDE, across, STRIDE).sum(axis=(1, 3))
     sums = tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]
-    limits = STEEP / WINDOW**2 * sums
+    limits = np.floor(STEEP / WINDOW**2 * sums).astype(np.int32)
     of_windows = np.lib.stride_tricks.sliding_window_view(crest, (WINDOW, WINDOW))[::STRIDE, ::STRIDE]
     return (of_windows > limits[:, :, np.newaxis, np.newaxis]).reshape(-1, WINDOW, WINDOW)
 
@@ -102,7 +102,8 @@ def edges_in_windows(part: np.ndarray) -> np.ndarray:
 def _columns_of_lines(points: np.ndarray) -> tuple[float, float]:
     """In which columns the clusters of `points` (row, column) next to the middle cross the row where lines
     are read, left and right of it."""
-    pixels, counts = np.unique(points, axis=0, return_counts=True)
+    places, counts = np.unique(points[:, 0] * WIDTH + points[:, 1], return_counts=True)
+    pixels = np.column_stack(np.divmod(places, WIDTH))
     labels = _linked(pixels, _radius(points))
     size = np.bincount(labels, counts)
     mean = np.bincount(labels, counts * pixels[:, 1]) / size
@@ -125,9 +126,10 @@ def _radius(points: np.ndarray) -> float:
 
 def _linked(pixels: np.ndarray, radius: float) -> np.ndarray:
     """Cluster of each pixel: those are together that pixels lead to, none further away than the radius."""
-    pairs = cKDTree(pixels).query_pairs(radius, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(pixels),) * 2)
-    return connected_components(links, directed=False)[1]
+    one, other = cKDTree(pixels).query_pairs(radius, output_type="ndarray").T
+    order, ends = np.argsort(one), np.bincount(one, minlength=len(pixels)).cumsum()
+    links = np.ones(len(one)), other[order], np.concatenate(([0], ends))
+    return connected_components(csr_array(links, shape=(len(pixels),) * 2), directed=False)[1]
 
 
 def _crossing(pixels: np.ndarray, counts: np.ndarray) -> float:

@@ -10,6 +10,7 @@ from selfdrive.common.array_math import each
 WEIGHTS = Path(__file__).with_name("lane_net.npz")
 HIDDEN = 10
 FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # in 1: of what a window shows, and of what it counts
+AT_ONCE = 32  # windows: memory for more is got anew from the system each time, which takes longer than sums
 
 
 class LaneNet:
@@ -20,7 +21,7 @@ class LaneNet:
     ) -> None:
         self._hidden, self._hidden_bias = hidden, hidden_bias
         self._out, self._out_bias = out, out_bias
-        self._whole = np.rint(hidden * float(WEIGHT_STEPS))
+        self._whole = np.rint(hidden * float(WEIGHT_STEPS)).astype(float)
 
     @classmethod
     def load(cls, path: Path = WEIGHTS) -> "LaneNet":
@@ -39,11 +40,14 @@ class LaneNet:
         )
 
     def score(self, features: np.ndarray) -> np.ndarray:
-        """Log odds that there is a mark, for `features` (..., windows, features) in float32.
+        """Log odds that there is a mark, for `features` (windows, features) in float32.
 
         Features and weights are rounded to whole numbers of steps, so that a double holds each sum exactly:
         then it does not matter in which order a processor adds.
         """
-        steps = np.rint(features * np.float32(FEATURE_STEPS)).astype(float) @ self._whole
+        steps = np.empty((len(features), self._whole.shape[1]))
+        for k in range(0, len(features), AT_ONCE):
+            some = np.rint(features[k : k + AT_ONCE] * np.float32(FEATURE_STEPS)).astype(float)
+            np.matmul(some, self._whole, out=steps[k : k + AT_ONCE])
         hidden = each(tanh, steps / (FEATURE_STEPS * WEIGHT_STEPS) + self._hidden_bias)
         return (hidden * self._out).sum(axis=-1) + self._out_bias

@@ -20,10 +20,12 @@ CROP = 264 / 480  # of the picture's rows: where in the canvas the picture begin
 STREAKS = 100  # of each pass for each level
 STREAK_GAINS = tuple(0.10 + 0.01 * k for k in range(1, 11))  # a pass for each
 STREAK_LENGTH, STREAK_LEAN = 32, radians(15.0)  # px; off the vertical
+MARGIN = STREAK_LENGTH  # px around the picture, so that no streak in it ends outside what is drawn
 DROPLETS = 15_000  # pixels for each level
 DROPLET_BLUR = 7.0  # px
 FLAKES = 250  # blocks in a layer
-FLAKE_SIZE = 2  # px
+FLAKE_REACH = 3  # px that a block of two by two reaches further when blurred
+FLAKE = 2 + 2 * FLAKE_REACH  # px
 BLOB_RADII = 5, 50  # px
 BLOB_BLUR = 7.0  # px
 COVERED = 150  # grey level of the blurred mask below which the mask is seen, not the road
@@ -51,21 +53,25 @@ class _AsCoded(Effect):
 class CodedRain(_AsCoded):
     """Ten passes of streaks, each brighter than the last, on a blurred and darker picture."""
 
+    def _prepare(self, random: np.random.Generator) -> None:
+        self._streak, self._way = _streak()
+
     def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
         rows, columns = picture.shape
         wet = cv2.convertScaleAbs(gaussian(picture, 0.5 + level / 10.0), alpha=0.75 - level / 100.0)
-        way = np.rint(STREAK_LENGTH * np.array([-sin(STREAK_LEAN), cos(STREAK_LEAN)])).astype(np.int32)
         size = np.array([CANVAS * columns, CANVAS * rows])
         first = np.array([0, round(CROP * rows)])
-        layer = np.empty_like(picture)
+        layer = np.empty((rows + 2 * MARGIN, columns + 2 * MARGIN), np.uint8)
+        inside = layer[MARGIN:-MARGIN, MARGIN:-MARGIN]
+        pixels = self._streak[:, 1] * layer.shape[1] + self._streak[:, 0]
         for gain in STREAK_GAINS:
             start = (random.random((STREAKS * level, 2), np.float32) * size).astype(np.int32) - first
-            end = start + way
+            end = start + self._way
             there = (end[:, 0] < columns) & (start[:, 0] >= 0) & (end[:, 1] >= 0) & (start[:, 1] < rows)
+            column, row = start[there].T + MARGIN
             layer.fill(0)
-            streaks = np.stack([start[there], end[there]], axis=1)
-            cv2.polylines(layer, [*streaks], False, round(WHITE * gain))
-            cv2.add(wet, layer, dst=wet)
+            layer.reshape(-1)[(row * layer.shape[1] + column)[:, np.newaxis] + pixels] = round(WHITE * gain)
+            cv2.add(wet, inside, dst=wet)
         return wet
 
 
@@ -81,17 +87,17 @@ class CodedSnow(_AsCoded):
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._smear = motion_kernel(5, 75.0)
+        self._flakes = np.stack([_flake(0.5 + number / 10.0) for number in range(1, self.MOST + 1)])
 
     def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
-        rows, columns = picture.shape
-        snow, layer = np.zeros_like(picture), np.empty_like(picture)
-        for number in range(1, level + 1):
-            layer.fill(0)
-            places = random.integers(0, (rows - FLAKE_SIZE) * columns - FLAKE_SIZE, FLAKES)
-            for shift in (0, 1, columns, columns + 1):
-                layer.reshape(-1)[places + shift] = WHITE
-            cv2.add(snow, gaussian(layer, 0.5 + number / 10.0), dst=snow)
-        return cv2.add(hazed(picture, level, random), cv2.filter2D(snow, -1, self._smear))
+        rows, columns = (size + 2 * FLAKE_REACH for size in picture.shape)
+        light = np.zeros((rows, columns), np.uint16)
+        places = random.integers(0, (rows - FLAKE) * columns, (level, FLAKES, 1))
+        pixels = (columns * np.arange(FLAKE)[:, np.newaxis] + np.arange(FLAKE)).ravel()
+        shades = np.broadcast_to(self._flakes[:level, np.newaxis], (level, FLAKES, FLAKE * FLAKE))
+        np.add.at(light.reshape(-1), (places + pixels).ravel(), shades.ravel())
+        flakes = cv2.convertScaleAbs(light[FLAKE_REACH:-FLAKE_REACH, FLAKE_REACH:-FLAKE_REACH])
+        return cv2.add(hazed(picture, level, random), cv2.filter2D(flakes, -1, self._smear))
 
 
 class CodedOcclusion(_AsCoded):
@@ -110,13 +116,32 @@ class CodedOcclusion(_AsCoded):
 
 
 def hazed(picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
-    """The picture behind the fog of that level."""
+    """The picture behind the fog of that level, which is blurred at half its size."""
+    rows, columns = picture.shape
     droplets = np.zeros_like(picture)
     droplets.reshape(-1)[random.integers(0, picture.size, DROPLETS * level)] = WHITE
-    return cv2.addWeighted(picture, 0.9 - 0.05 * level, gaussian(droplets, DROPLET_BLUR), 1.0, 0.0)
+    half = cv2.resize(droplets, (columns // 2, rows // 2), interpolation=cv2.INTER_AREA)
+    fog = cv2.resize(gaussian(half, DROPLET_BLUR / 2.0), (columns, rows))
+    return cv2.addWeighted(picture, 0.9 - 0.05 * level, fog, 1.0, 0.0)
 
 
 def gaussian(picture: np.ndarray, sigma: float) -> np.ndarray:
     """Blurred by a Gaussian that is cut at two sigma."""
     size = 2 * ceil(2.0 * sigma) + 1
     return cv2.GaussianBlur(picture, (size, size), sigma)
+
+
+def _streak() -> tuple[np.ndarray, np.ndarray]:
+    """Pixels (n, 2) of a streak, column and row from where it begins, and where it ends."""
+    way = np.rint(STREAK_LENGTH * np.array([-sin(STREAK_LEAN), cos(STREAK_LEAN)])).astype(np.int32)
+    canvas = np.zeros((2 * MARGIN, 2 * MARGIN), np.uint8)
+    cv2.line(canvas, (MARGIN, 0), (MARGIN + int(way[0]), int(way[1])), 1)
+    row, column = canvas.nonzero()
+    return np.column_stack((column - MARGIN, row)), way
+
+
+def _flake(sigma: float) -> np.ndarray:
+    """Grey levels (FLAKE x FLAKE, flat, uint16) of a blurred white block."""
+    block = np.zeros((FLAKE, FLAKE), np.uint8)
+    block[FLAKE_REACH:-FLAKE_REACH, FLAKE_REACH:-FLAKE_REACH] = WHITE
+    return gaussian(block, sigma).astype(np.uint16).ravel()
