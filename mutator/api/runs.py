@@ -26,6 +26,7 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes import results as results_table
 from mutator.outcomes import rows as tables
+from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs, own_alerts
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
 from mutator.report import building, series
@@ -182,6 +183,14 @@ class Run:
         counts = tables.counts_by(self._rows, tables.by_fault_type)
         heads, rows = tables.count_table(counts, "fault type", hazards)
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
+
+    def fault_free(self) -> tuple[FaultFreeRun, ...]:
+        """What the golden runs do by themselves: alerts, hazards, and how far each plotted channel goes."""
+        return fault_free_runs(self.folder, self._bench.manifest)
+
+    def alerts_note(self) -> str:
+        """Which alerts the fault-free runs raise, too, as a sentence; empty if none."""
+        return own_alerts(self.fault_free())
 
     def experiment(self, id: str) -> "RunExperiment":
         """The planned experiment whose id is `id` or starts so; MutatorError for none or several."""

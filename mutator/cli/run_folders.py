@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,6 +30,9 @@ def show_counts(terminal: Terminal, run: "Run") -> None:
     """The table of results by fault type, and how the experiments ended."""
     counts = run.counts()
     terminal.table(counts.heads, counts.rows, right=tuple(counts.right), total=True)
+    with suppress(MutatorError):  # without a library nobody knows which alerts count
+        if note := run.alerts_note():
+            terminal.say(note)
     terminal.say(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 

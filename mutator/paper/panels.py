@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from mutator._common.files import write_atomic
+from mutator.outcomes.fault_free import own_alerts
 from mutator.paper import observations, observations_page
 from mutator.paper.published import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
@@ -83,4 +84,5 @@ def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
 def _coverage(run: ReportedRun, kinds: int, missing: list[str]) -> str:
     text = f"From {len(run.frame)} of {run.folder.planned} experiments, which have {kinds - len(missing)} "
     text += f"of the paper's {kinds} fault types."
-    return text + (f" Missing: {', '.join(missing)}." if missing else "")
+    text += f" Missing: {', '.join(missing)}." if missing else ""
+    return " ".join(filter(None, (text, own_alerts(run.fault_free()))))

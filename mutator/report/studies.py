@@ -9,6 +9,7 @@ from mutator.campaigns.studies import find_study
 from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
 from mutator.model import Status
+from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
 from mutator.outcomes.golden import load_trace
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
@@ -60,6 +61,15 @@ class ReportedRun:
     def done(self) -> int:
         """Experiments of the plan that ran."""
         return sum(row.status is not Status.HARNESS_ERROR for row in self.rows)
+
+    def fault_free(self) -> tuple[FaultFreeRun, ...]:
+        """What the golden runs do by themselves; nothing where they cannot be read."""
+        if self.workspace is None:
+            return ()
+        try:
+            return fault_free_runs(self.folder, self.workspace.manifest(self.folder.head["target"]))
+        except (MutatorError, KeyError):
+            return ()
 
     def ends(self) -> dict[str, float] | None:
         """When the golden runs of each scenario end, s of simulation; None if they cannot be read."""

@@ -1,10 +1,12 @@
 """Counts and statistics of a run as tables; the statistics are files of their own, too."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from mutator._common.files import write_atomic
 from mutator._common.tables import Table
+from mutator.outcomes.fault_free import fault_free_table, own_alerts
 from mutator.outcomes.rows import (
     by_fault_type,
     by_method,
@@ -25,6 +27,7 @@ NOTES = (
     "*Manifested*: an actuator output then differed from the fault-free run. *Hazard, no alert*: no counted "
     "alert at all."
 )
+FAULT_FREE = "The golden runs: first times of alerts and hazards, and how far each plotted channel goes."
 _GROUPS = (
     ("By fault type", "fault type", by_fault_type),
     ("By scenario", "scenario", by_scenario),
@@ -34,8 +37,16 @@ _HTML = """\
 <h2>Tables</h2>
 {% for title, table in counts %}
 <h3>{{ title }}</h3>
+{% if note %}
+<p>{{ note }}</p>
+{% endif %}
 {{ table.as_html("counts") }}
 {% endfor %}
+{% if fault_free %}
+<h3>Fault-free runs</h3>
+<p>{{ about }}</p>
+{{ fault_free.as_html() }}
+{% endif %}
 {% for sheet in sheets %}
 <h3>{{ sheet.title }}</h3>
 <p>{{ sheet.note }}</p>
@@ -46,14 +57,18 @@ _HTML = """\
 
 def tables_panel(run: ReportedRun) -> Panel:
     """Counts by fault type, scenario and method, then what statistics say of them."""
-    counts = list(_counts(run))
-    sheets = _sheets(run)
+    runs = run.fault_free()
+    note = own_alerts(runs)
+    counts, sheets = _counts(run), [_noted(sheet, note) for sheet in _sheets(run)]
     write_sheets(sheets, run.out)
     parts = [NOTES]
     for title, table in counts:
-        parts += [f"## {title}", table.as_markdown()]
+        parts += filter(None, (f"## {title}", note, table.as_markdown()))
+    fault_free = fault_free_table(runs) if runs else None
+    if fault_free:
+        parts += ["## Fault-free runs", FAULT_FREE, fault_free.as_markdown()]
     parts += [sheet.markdown().rstrip() for sheet in sheets]
-    html = rendered(_HTML, counts=counts, sheets=sheets)
+    html = rendered(_HTML, counts=counts, note=note, fault_free=fault_free, about=FAULT_FREE, sheets=sheets)
     return Panel(anchor="tables", link="Tables", markdown="\n\n".join(parts), html=html)
 
 
@@ -71,6 +86,14 @@ def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     published = run.study.published(run) if run.study else None
     alerts = {name: record.alerts for name, record in run.folder.records().items()}
     return run_sheets(run.frame, published, alerts, run.ends())
+
+
+def _noted(sheet: Sheet, note: str) -> Sheet:
+    """The sheet; where it counts alerts, with a note on those of the fault-free runs."""
+    words = (sheet.title, *sheet.heads, *(line[0] for line in sheet.lines))
+    if not note or not any("alert" in str(word).lower() for word in words):
+        return sheet
+    return replace(sheet, note=f"{sheet.note} {note}")
 
 
 def write_sheets(sheets: Sequence[Sheet], out: Path) -> None:

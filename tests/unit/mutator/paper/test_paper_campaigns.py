@@ -126,9 +126,9 @@ def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> Non
     """On the reference plant, seen as coded: every value of every fault type, guided and at random times."""
     plan = make_plan(library, "paper_reference")
     assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
-    seeing = ("pictures", "coded_detector", "coded_translation")
+    setting = ("pictures", "reference_plant", "coded_detector", "coded_translation")
     settings = {(e.setting, e.fault.reading) for e in plan.experiments}
-    assert settings == {(("reference_plant", *seeing), "as_coded")}
+    assert settings == {(setting, "as_coded")}
 
 
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from markupsafe import escape
 
 from mutator.report.panels.tables import tables_panel
 from mutator.report.studies import ReportedRun
@@ -57,3 +58,17 @@ def test_files_are_the_same_each_time(run: RunFolder) -> None:
         files = (run.path / "report" / "tables").iterdir()
         contents.append({file.name: file.read_bytes() for file in files})
     assert contents[0] == contents[1]
+
+
+def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolder) -> None:
+    """One that the fault-free run raises is named wherever alerts are counted, with how it drove."""
+    golden = run.path / "golden" / "S1"
+    np.savez(golden / "trace.npz", t=np.arange(3000) / 100, lateral_offset=np.linspace(-0.25, 0.5, 3000))
+    record = {"hazards": {"H1": None}, "alerts": [{"name": "steer_saturated", "t": 12.29}]}
+    (golden / "record.json").write_text(json.dumps(record))
+    panel = tables_panel(ReportedRun.open(run, HERE))
+    note = "Not every alert is a fault's doing: fault-free runs raise steer_saturated in S1."
+    assert panel.html.count(str(escape(note))) == panel.markdown.count(note) >= 6
+    assert "| S1 | steer_saturated at 12.29 s | none | -0.25 to 0.5 |" in panel.markdown
+    assert note in (run.path / "report" / "tables" / "summary_guided.md").read_text()
+    assert note not in (run.path / "report" / "tables" / "hazard_orders.md").read_text()

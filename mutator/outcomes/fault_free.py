@@ -1,0 +1,80 @@
+"""What a run folder's fault-free runs do by themselves: hazards, alerts, how far each channel goes."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mutator._common.tables import Table
+from mutator.outcomes.golden import alerts_of, hazards_of, load_record, load_trace
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.targets.manifest import TargetManifest
+
+Events = tuple[tuple[str, float], ...]  # (name, s of simulation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultFreeRun:
+    """One of them. `ranges` are the least and the largest value of each plotted channel that it recorded."""
+
+    scenario: str
+    changes: tuple[str, ...]
+    hazards: Events
+    alerts: Events
+    ranges: tuple[tuple[str, float, float], ...]
+
+
+def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
+    """Those of a run folder, by name. MutatorError where one cannot be read."""
+    found = []
+    for scenario, changes in sorted(folder.head["goldens"]):
+        place = folder.golden(scenario, tuple(changes))
+        record, trace = load_record(manifest, place), load_trace(manifest, place)
+        plotted = [channel.name for channel in manifest.plotted if channel.name in trace]
+        found.append(
+            FaultFreeRun(
+                scenario=scenario,
+                changes=tuple(changes),
+                hazards=tuple(hazards_of(record, manifest.hazards)),
+                alerts=tuple(alerts_of(record, manifest.alerts)),
+                ranges=tuple((name, *_range(trace[name])) for name in plotted),
+            )
+        )
+    return tuple(found)
+
+
+def fault_free_table(runs: Sequence[FaultFreeRun]) -> Table:
+    """A line for each run: its alerts and hazards with their first times, and the range of each channel."""
+    channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
+    rows = []
+    for run in runs:
+        ranges = {name: f"{least:.4g} to {largest:.4g}" for name, least, largest in run.ranges}
+        key = golden_key(run.scenario, run.changes)
+        rows.append(
+            [key, _told(run.alerts), _told(run.hazards), *(ranges.get(name, "") for name in channels)]
+        )
+    return Table(heads=["fault-free run", "alerts", "hazards", *channels], rows=rows)
+
+
+def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
+    """Which alerts the fault-free runs raise, as a sentence for whatever counts alerts; empty if none."""
+    scenarios: dict[str, dict[str, None]] = {}
+    for run in runs:
+        for name, _ in run.alerts:
+            scenarios.setdefault(name, {})[run.scenario] = None
+    if not scenarios:
+        return ""
+    told = "; ".join(f"{name} in {', '.join(scenarios[name])}" for name in sorted(scenarios))
+    return f"Not every alert is a fault's doing: fault-free runs raise {told}."
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
+
+
+def _told(events: Events) -> str:
+    first: dict[str, float] = {}
+    for name, t in events:
+        first[name] = min(t, first.get(name, t))
+    return ", ".join(f"{name} at {t:.2f} s" for name, t in first.items()) or "none"

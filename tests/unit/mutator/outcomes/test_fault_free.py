@@ -1,0 +1,73 @@
+"""What the fault-free runs of a run folder do by themselves."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.outcomes.fault_free import fault_free_runs, fault_free_table, own_alerts
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import Channel
+
+MANIFEST: Any = SimpleNamespace(
+    trace_file="trace.npz",
+    record_file="record.json",
+    time_channel="t",
+    hazards=("H1",),
+    alerts=("fcw", "late"),
+    plotted=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
+)
+
+
+def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
+    """A run folder whose golden runs, by scenario and change, have these records."""
+    goldens = [[scenario, [change] if change else []] for scenario, change in runs]
+    (path / "run.json").write_text(json.dumps({"schema": "run/1", "goldens": goldens}))
+    made = RunFolder.unverified(path)
+    for (scenario, changes), record in zip(goldens, runs.values(), strict=True):
+        place = made.golden(scenario, tuple(changes))
+        place.mkdir(parents=True)
+        (place / "record.json").write_text(json.dumps(record))
+        np.savez(place / "trace.npz", t=np.arange(3.0), v=np.array([2.0, np.nan, -1.0]))
+    return made
+
+
+def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
+    """First times of what counts, and how far a channel goes; what was not recorded is left out."""
+    raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
+    runs = fault_free_runs(
+        folder(
+            tmp_path,
+            {("B", ""): {"hazards": {"H1": 7.0}, "alerts": raised}, ("A", "rain"): {"hazards": {}}},
+        ),
+        MANIFEST,
+    )
+    assert [(run.scenario, run.changes) for run in runs] == [("A", ("rain",)), ("B", ())]
+    assert runs[1].ranges == (("v", -1.0, 2.0),)
+    table = fault_free_table(runs)
+    assert list(table.heads) == ["fault-free run", "alerts", "hazards", "v"]
+    assert list(table.rows[0]) == ["A+rain", "none", "none", "-1 to 2"]
+    assert list(table.rows[1]) == ["B", "fcw at 3.50 s", "H1 at 7.00 s", "-1 to 2"]
+
+
+def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
+    """Whatever was changed in a scenario; nothing is said of runs without alerts."""
+    fcw = {"hazards": {}, "alerts": [{"name": "fcw", "t": 3.5}]}
+    late = {"hazards": {}, "alerts": [{"name": "late", "t": 3.5}]}
+    runs = fault_free_runs(
+        folder(tmp_path, {("A", ""): fcw, ("A", "rain"): fcw, ("B", ""): fcw, ("C", ""): late}), MANIFEST
+    )
+    assert own_alerts(runs).endswith("fault-free runs raise fcw in A, B; late in C.")
+    assert own_alerts(()) == ""
+
+
+def test_a_golden_run_that_is_gone_is_an_error(tmp_path: Path) -> None:
+    """With its place."""
+    made = folder(tmp_path, {("A", ""): {"hazards": {}}})
+    (made.golden("A") / "record.json").unlink()
+    with pytest.raises(MutatorError, match="golden"):
+        fault_free_runs(made, MANIFEST)
