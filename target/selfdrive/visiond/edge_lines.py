@@ -18,6 +18,7 @@ TRIES = 8  # clusters on each side that are looked at, from the nearest
 REACHES = 0.3, 0.2  # m: how far from a line edges belong to it, each time it is fitted
 LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and as many out of it
 MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
+SHARP = 0.05  # m, standard deviation of the edges on one side of a strip of paint
 SURE_PIXELS = 80.0  # edge pixels of a line about which there is no doubt
 SURE_SPREAD = 0.25  # m: root mean square distance of a line's edges from it that halves its probability
 
@@ -126,11 +127,27 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     """Whether the picture gets brighter left of the middle of the line, and darker right of it.
 
     `away` (m, right positive) is how far each edge is from the middle. A shadow's edge does only one of the
-    two, a dark seam does them the other way round.
+    two, a dark seam does them the other way round. A seam beside the paint adds edges of its own, and its
+    far edge is left out: what is left must then be as sharp as paint's.
     """
     brighter, darker = away[rising], away[~rising]
-    if min(brighter.size, darker.size) < LEAST_SHARE * away.size:
+    least = LEAST_SHARE * away.size
+    if min(brighter.size, darker.size) < least:
         return False
+    if _is_paint(brighter, darker):
+        return True
+    pairs = (
+        (brighter, darker[darker > np.median(brighter)]),  # a seam left of the paint
+        (brighter[brighter < np.median(darker)], darker),  # right of it
+    )
+    return any(
+        min(up.size, down.size) >= least and max(up.std(), down.std()) <= SHARP and _is_paint(up, down)
+        for up, down in pairs
+    )
+
+
+def _is_paint(brighter: np.ndarray, darker: np.ndarray) -> bool:
+    """Whether what lies between both kinds of edges is as wide as paint."""
     width = float(darker.sum()) / darker.size - float(brighter.sum()) / brighter.size
     return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
 

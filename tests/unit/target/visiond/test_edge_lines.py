@@ -55,6 +55,19 @@ def test_paint_behind_such_a_step_is_found():
     assert left.y == pytest.approx(1.84, abs=0.03)
 
 
+@pytest.mark.parametrize("width", [0.02, 0.04, 0.08])
+@pytest.mark.parametrize("gap", [0.0, 0.03, 0.06])
+def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
+    """On either side of it, and a joint alone is still none."""
+    paint, half = 1.84, 0.06
+    beyond = (paint + half + gap + width, paint + half + gap, 25)
+    before = (paint - half - gap, paint - half - gap - width, 25)
+    for joint in (beyond, before):
+        left, _ = seen(joint, (paint + half, paint - half, 160))
+        assert left.y == pytest.approx(paint, abs=0.1)
+        assert seen(joint) == (None, None)
+
+
 def test_less_contrast_and_other_light_change_no_edge():
     """Haze that takes half the contrast and adds light leaves the same edges."""
     part = np.full((64, 96), 80, np.uint8)
