@@ -27,7 +27,11 @@ class _OnLens(Effect):
 
 
 class PaperOcclusion(_OnLens):
-    """Dark, blurred, round blobs in random places, as many as the amount says, of 5 to 50 pixels' radius."""
+    """Dark, blurred, round blobs in random places below the horizon, as many as the amount says, of 5 to 50
+    pixels' radius.
+
+    On the sky, where the text does not rule them out, they would hide nothing that counts.
+    """
 
     UNIT, LEAST, MOST, WHOLE = "blobs", 1, 10, True
 
@@ -38,7 +42,8 @@ class PaperOcclusion(_OnLens):
         blobs = random.uniform(size=(self.MOST, 3))[: int(self.amount)]
         for column, row, size in blobs:
             radius = BLOB_RADII[0] + size * (BLOB_RADII[1] - BLOB_RADII[0])
-            centre = round(column * (columns - 1)), round(row * (rows - 1))
+            top = self.camera.horizon
+            centre = round(column * (columns - 1)), round(top + row * (rows - 1 - top))
             cv2.circle(share, centre, round(radius), 1.0, cv2.FILLED)
         self._cover(cv2.GaussianBlur(share, (0, 0), BLOB_BLUR), BLOB_LEVEL)
 

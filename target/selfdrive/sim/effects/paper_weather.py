@@ -1,10 +1,12 @@
 """Rain, fog and snow as the paper makes them, by `thickness` from 1 to 10.
 
 Numbers are from the paper's table of effects and its text. Where it gives a range, its mild end belongs to
-thickness 1 and its strong end to 10. What it leaves open (number of snow blocks, shape of a streak, motion)
-is settled here: streaks and flakes lie in layers, the farther ones smaller and slower, that fall across the
-screen, faster the faster the car drives, and enter again at the other side. So no picture ever holds more
-or fewer of them, and the same drop is followed from picture to picture.
+thickness 1 and its strong end to 10. What it leaves open is settled by what a level stands for, which
+`visibility` says: a streak is as long as a drop falls while the shutter is open, and there are as many flakes
+as a snowfall has that look as large as the text's blocks. Streaks and flakes lie in layers, the farther ones
+shorter and slower, that fall across the screen, faster the faster the car drives, and enter again at the
+other side. So no picture ever holds more or fewer of them, and the same drop is followed from picture to
+picture.
 """
 
 from math import cos, radians, sin
@@ -16,11 +18,14 @@ from selfdrive.common.array_math import each
 from selfdrive.sim.effects.canvas import Tile, seamless, splat, strokes
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 
-PER_THICKNESS = 1000  # streaks, and blocks of snow: 10,000 at thickness 10
-STREAK_LENGTHS = 8.0, 12.0, 18.0, 26.0, 36.0  # px, far to near
-STREAK_WIDTHS = 1, 1, 2, 2, 3  # px
+STREAKS = 1000  # for each thickness: 10,000 at thickness 10
+REACH = 2.2  # m: up to which distance a drop makes a streak
+# Shares of the drops within reach that are nearer than those of a layer, far to near
+NEARER = 0.9, 0.7, 0.5, 0.3, 0.1
+FALL, EXPOSURE = 6.0, 0.004  # m/s, s: of a drop of 1.6 mm (Atlas and others, 1973); under a dark sky
 STREAK_LEAN = radians(8.0)
-RAIN_SPEED = 30.0, 1.2  # lengths of a streak: in a second, and for each metre driven
+RAIN_SPEED = 1.0 / EXPOSURE, 5.0  # lengths of a streak: in a second, and for each metre driven
+BLOCKS = 100  # of snow for each thickness
 FLAKE_SPEEDS = 1.0, 1.5, 2.0, 3.0, 4.0
 SNOW_SPEED = 40.0, 4.0  # px: in a second, and for each metre driven, times the above
 FOG_SPEED = 6.0, 2.0  # px, likewise
@@ -32,9 +37,9 @@ class _PaperWeather(Effect):
     def _between(self, mild: float, strong: float) -> float:
         return mild + self.thickness * (strong - mild)
 
-    def _count(self, layer: int, layers: int) -> int:
-        """How many of this thickness lie in that layer; over all layers the sum is exact."""
-        total = round(PER_THICKNESS * self.amount)
+    def _count(self, each: int, layer: int, layers: int) -> int:
+        """How many, `each` for one of thickness, lie in that layer; over all layers the sum is exact."""
+        total = round(each * self.amount)
         return (total - layer + layers - 1) // layers
 
 
@@ -43,18 +48,21 @@ class PaperRain(_PaperWeather):
 
     def _prepare(self, random: np.random.Generator) -> None:
         alpha = self._between(0.1, 0.2)
+        self._lengths = [
+            self.camera.fy * FALL * EXPOSURE / (REACH * share ** (1.0 / 3.0)) for share in NEARER
+        ]
         self._tiles = []
-        for layer, (length, width) in enumerate(zip(STREAK_LENGTHS, STREAK_WIDTHS, strict=True)):
-            levels = self._streaks(random, layer, length, width)
+        for layer, length in enumerate(self._lengths):
+            levels = self._streaks(random, layer, length)
             smeared = smeared_round(levels, motion_kernel(2, 45.0))
             self._tiles.append(Tile(to_levels(alpha * smeared)))
 
-    def _streaks(self, random: np.random.Generator, layer: int, length: float, width: int) -> np.ndarray:
+    def _streaks(self, random: np.random.Generator, layer: int, length: float) -> np.ndarray:
         """White streaks in random places. A falling drop wobbles: brightness varies along its streak."""
         rows, columns = self.camera.rows, self.camera.width
-        most = PER_THICKNESS * int(self.MOST)
+        most = STREAKS * int(self.MOST)
         # As many numbers for any thickness: more rain holds all streaks of less.
-        count = self._count(layer, len(STREAK_LENGTHS))
+        count = self._count(STREAKS, layer, len(NEARER))
         column, row, phase, wobble = random.uniform(size=(4, most))[:, :count]
         start = np.stack([columns * column, rows * row])
         end = start + length * np.array([[-sin(STREAK_LEAN)], [cos(STREAK_LEAN)]])
@@ -63,16 +71,15 @@ class PaperRain(_PaperWeather):
         phase, wobble = np.repeat(phase, points), np.repeat(wobble, points)
         light = 1.0 + 0.35 * each(sin, 2 * np.pi * (phase + (1.0 + 2.0 * wobble) * share))
         light *= np.sqrt(each(sin, np.pi * share)) * WHITE
-        side = np.arange(width)
         levels = np.zeros((rows, columns), dtype=np.float32)
-        splat(levels, (across[:, None] + side).ravel(), np.repeat(down, width), np.repeat(light, width))
+        splat(levels, across, down, light)
         return levels
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
         sigma, alpha = self._between(0.5, 1.5), self._between(0.75, 0.65)
         wet = cv2.convertScaleAbs(cv2.GaussianBlur(picture, (0, 0), sigma), alpha=alpha)
         lengths = RAIN_SPEED[0] * scene.t + RAIN_SPEED[1] * scene.position
-        for tile, length in zip(self._tiles, STREAK_LENGTHS, strict=True):
+        for tile, length in zip(self._tiles, self._lengths, strict=True):
             way = length * lengths
             wet = cv2.add(wet, tile.moved(-sin(STREAK_LEAN) * way, cos(STREAK_LEAN) * way))
         return wet
@@ -91,7 +98,7 @@ class PaperFog(_PaperWeather):
 
 
 class PaperSnow(_PaperWeather):
-    """The fog's haze, and before it 1,000 falling white blocks of 2 x 2 pixels for each thickness."""
+    """The fog's haze, and before it 100 falling white blocks of 2 x 2 pixels for each thickness."""
 
     def _prepare(self, random: np.random.Generator) -> None:
         rows, columns = self.camera.rows, self.camera.width
@@ -104,8 +111,9 @@ class PaperSnow(_PaperWeather):
 
     def _blocks(self, random: np.random.Generator, layer: int) -> np.ndarray:
         rows, columns = self.camera.rows, self.camera.width
-        most = PER_THICKNESS * int(self.MOST)
-        places = random.integers(0, rows * columns, size=most)[: self._count(layer, len(FLAKE_SPEEDS))]
+        most = BLOCKS * int(self.MOST)
+        count = self._count(BLOCKS, layer, len(FLAKE_SPEEDS))
+        places = random.integers(0, rows * columns, size=most)[:count]
         white = np.zeros(rows * columns, dtype=np.float32)
         white[places] = WHITE
         white = white.reshape(rows, columns)

@@ -36,23 +36,23 @@ class _Precipitation(Effect):
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._cover = Cover(self.camera)
-        limits = [least for least, _ in self.REACHES] + [self._largest()]
+        limits = [least for least, _ in self.REACHES] + [self.largest()]
         boxes = [
             self._box(random, least, most, reach)
             for (least, reach), most in zip(self.REACHES, limits[1:], strict=True)
         ]
         self._particles = Particles(random, self.camera, boxes)
-        self._veil = np.rint(255.0 * clearness(self._extinction(), self.camera)).astype(np.uint8)
+        self._veil = np.rint(255.0 * clearness(self.extinction(), self.camera)).astype(np.uint8)
 
     def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Box:
         """A box of all particles with diameters (mm) from `least` to `most`."""
-        density = self._density(least, most)
+        density = self.density(least, most)
         across = self.camera.width / self.camera.fx * self.camera.rows / self.camera.fy
         reach = min(reach, (self.IN_BOX / (density * across)) ** (1.0 / 3.0))
         melted = self._diameters(random, least, most, round(density * across * reach**3))
-        return Box(reach, *self._flown(melted))
+        return Box(reach, *self.flown(melted))
 
-    def _density(self, least: float, most: float) -> float:
+    def density(self, least: float, most: float) -> float:
         """Particles per m^3 with diameters (mm) from `least` to `most`."""
         number, slope = self._spectrum()
         return number / slope * (exp(-slope * least) - exp(-slope * most))
@@ -75,15 +75,15 @@ class _Precipitation(Effect):
         """N0 (per m^3 and mm) and slope (1/mm) of the numbers N0 * exp(-slope * diameter)."""
 
     @abstractmethod
-    def _largest(self) -> float:
+    def largest(self) -> float:
         """Largest diameter (mm)."""
 
     @abstractmethod
-    def _flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Seen diameters (m) and speeds of fall (m/s)."""
 
     @abstractmethod
-    def _extinction(self) -> float:
+    def extinction(self) -> float:
         """Extinction coefficient (1/m) of the air full of particles."""
 
 
@@ -98,9 +98,9 @@ class Rain(_Precipitation):
     IN_BOX = 900
 
     def _prepare(self, random: np.random.Generator) -> None:
-        limits = self.REACHES[0][0], self._largest()
+        limits = self.REACHES[0][0], self.largest()
         diameters = 0.001 * self._diameters(random, *limits, ON_GLASS)
-        self._glass = Windscreen(random, self.camera, self._density(*limits), diameters)
+        self._glass = Windscreen(random, self.camera, self.density(*limits), diameters)
         super()._prepare(random)
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
@@ -109,13 +109,13 @@ class Rain(_Precipitation):
     def _spectrum(self) -> tuple[float, float]:
         return 8000.0, 4.1 * self.amount**-0.21
 
-    def _largest(self) -> float:
+    def largest(self) -> float:
         return 6.0  # mm: larger ones break up
 
-    def _flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return 0.001 * melted, 9.65 - 10.3 * each(exp, -0.6 * melted)
 
-    def _extinction(self) -> float:
+    def extinction(self) -> float:
         # Attenuation of light by rain, as Halder and others (2019) use it for rendering.
         return 0.312e-3 * self.amount**0.67
 
@@ -134,13 +134,13 @@ class Snow(_Precipitation):
     def _spectrum(self) -> tuple[float, float]:
         return 3800.0 * self.amount**-0.87, 2.55 * self.amount**-0.48
 
-    def _largest(self) -> float:
+    def largest(self) -> float:
         return 5.0  # mm of water
 
-    def _flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return 0.001 * melted * np.sqrt(melted / 0.17), 1.6 * each(_to_the_0_3, 0.1 * melted)
 
-    def _extinction(self) -> float:
+    def extinction(self) -> float:
         # Attenuation of light by dry snow, 5.5 dB/km at 1 mm/h (ITU-R P.1814).
         return 5.5e-3 * self.amount**1.38 * log(10.0) / 10.0
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from selfdrive.sim.effects import Brightness, Contrast, PaperFog, PaperOcclusion, PaperRain, PaperSnow
-from selfdrive.sim.effects.paper_weather import PER_THICKNESS, motion_kernel
+from selfdrive.sim.effects.paper_weather import BLOCKS, STREAKS, motion_kernel
 
 
 def black(camera):
@@ -11,17 +11,18 @@ def black(camera):
 
 
 @pytest.mark.parametrize("thickness", [1, 3, 10, 2.5])
-@pytest.mark.parametrize(("effect", "layers"), [(PaperRain, 5), (PaperSnow, 5)])
-def test_thickness_counts(effect, layers, thickness, camera):
-    """1,000 streaks or blocks for each thickness, whatever the layers: 10,000 at 10."""
+@pytest.mark.parametrize(("effect", "each"), [(PaperRain, 1000), (PaperSnow, 100)])
+def test_thickness_counts(effect, each, thickness, camera):
+    """1,000 streaks, 100 blocks for each thickness, whatever the layers: 10,000 streaks at 10."""
     made = effect(thickness, 0, camera)
-    assert sum(made._count(layer, layers) for layer in range(layers)) == PER_THICKNESS * thickness
+    assert {PaperRain: STREAKS, PaperSnow: BLOCKS}[effect] == each
+    assert sum(made._count(each, layer, 5) for layer in range(5)) == each * thickness
 
 
 def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
     """As many separate streaks are seen as were asked for, but for those that touch."""
     cv2 = pytest.importorskip("cv2")
-    monkeypatch.setattr("selfdrive.sim.effects.paper_weather.PER_THICKNESS", 100)
+    monkeypatch.setattr("selfdrive.sim.effects.paper_weather.STREAKS", 100)
     picture = PaperRain(1, 0, camera).apply(black(camera), moment())
     found, _ = cv2.connectedComponents((picture > 0).astype(np.uint8))
     assert 80 <= found - 1 <= 110
@@ -97,6 +98,14 @@ def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
     assert blobs * np.pi * 5.0**2 * 0.2 < area < blobs * np.pi * 51.0**2
     fewer = PaperOcclusion(1, 4, camera).apply(white, moment())
     assert (200 - 200 * share <= fewer + 2).all()
+
+
+def test_blobs_lie_on_the_road(camera, moment):
+    """No blob's middle is above the horizon: what it hides counts."""
+    white = np.full((camera.rows, camera.width), 200, np.uint8)
+    for seed in range(20):
+        seen = PaperOcclusion(10, seed, camera).apply(white, moment())
+        assert (seen[: int(camera.horizon) - 70] == 200).all() and (seen < 100).any()
 
 
 def test_motion_smear_has_the_papers_length_and_angle():

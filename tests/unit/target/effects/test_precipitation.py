@@ -31,13 +31,13 @@ def test_rain_has_marshall_and_palmers_spectrum(camera):
 
 def test_drops_fall_at_their_terminal_speed(camera):
     """A drop of 2 mm falls at 6.5 m/s, one of 5 mm at 9.1 m/s (measured by Gunn and Kinzer, 1949)."""
-    _, speeds = Rain(10.0, 0, camera)._flown(np.array([2.0, 5.0]))
+    _, speeds = Rain(10.0, 0, camera).flown(np.array([2.0, 5.0]))
     assert speeds == pytest.approx([6.5, 9.1], rel=0.02)
 
 
 def test_flakes_are_slow_and_large(camera):
     """A flake of 1 mm of water falls at about 0.8 m/s and is seen 2 to 3 mm wide."""
-    sizes, speeds = Snow(1.0, 0, camera)._flown(np.array([1.0]))
+    sizes, speeds = Snow(1.0, 0, camera).flown(np.array([1.0]))
     assert 0.7 < speeds[0] < 1.1 and 0.002 < sizes[0] < 0.003
 
 

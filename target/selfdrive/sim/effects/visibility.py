@@ -1,0 +1,86 @@
+"""What a level of the paper's rain, fog, snow and occlusion stands for, in units of the weather.
+
+The text counts streaks, blocks and blobs and gives contrasts; it does not say how bad a weather that is. This
+is settled here, once, from the numbers of drops and flakes before the camera:
+
+* rain: a streak is a drop of 1 mm and more within `REACH`, at the rate at which so many of them are there
+  (J. Marshall and W. Palmer, 1948);
+* snow: a block of two pixels is a flake that looks as large or larger, likewise (K. Gunn and J. Marshall,
+  1958; E. Holroyd, 1971);
+* fog: a contrast is what is left of it in the middle of the measured road, after H. Koschmieder (1924), where
+  5 % is left at the meteorological range;
+* the range in rain and snow follows from their extinction (S. Halder and others, 2019; ITU-R P.1814).
+"""
+
+from collections.abc import Callable
+from math import log
+from typing import NamedTuple
+
+import numpy as np
+
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.common.ordered import total
+from selfdrive.sim.effects.paper_weather import BLOCKS, REACH, STREAKS
+from selfdrive.sim.effects.precipitation import Rain, Snow
+from selfdrive.sim.effects.severity import FAR, NEAR
+
+LEFT = 0.05  # of the contrast, at the meteorological range
+DROP = 1.0  # mm: smaller ones make no streak
+BLOCK = 2.0  # px: smaller flakes make no block
+SIZES, HALVINGS = 200, 40
+
+
+class Weather(NamedTuple):
+    """What is outside."""
+
+    rate: float  # mm of water an hour; 0 without any
+    range: float  # m: the meteorological range
+
+
+def rain(thickness: float, camera: CameraModel) -> Weather:
+    """The rain that has so many drops near the camera."""
+
+    def drops(rate: float) -> float:
+        fall = Rain(rate, 0, camera)
+        return fall.density(DROP, fall.largest()) * _volume(REACH, camera)
+
+    rate = _where(drops, STREAKS * thickness, Rain.LEAST, Rain.MOST)
+    return Weather(rate, _range(Rain(rate, 0, camera).extinction()))
+
+
+def snow(thickness: float, camera: CameraModel) -> Weather:
+    """The snowfall that has so many flakes that look as large as a block."""
+
+    def flakes(rate: float) -> float:
+        fall = Snow(rate, 0, camera)
+        ends = np.linspace(0.0, fall.largest(), SIZES + 1)
+        seen, _ = fall.flown(0.5 * (ends[:-1] + ends[1:]))  # m
+        reach = [camera.fy * size / BLOCK for size in seen.tolist()]
+        sizes = zip(ends[:-1].tolist(), ends[1:].tolist(), reach, strict=True)
+        return total([fall.density(least, most) * _volume(far, camera) for least, most, far in sizes])
+
+    rate = _where(flakes, BLOCKS * thickness, Snow.LEAST, Snow.MOST)
+    return Weather(rate, _range(Snow(rate, 0, camera).extinction()))
+
+
+def fog(contrast: float) -> Weather:
+    """The fog that leaves this share of the contrast of what lies in the middle of the measured road."""
+    return Weather(0.0, _range(-log(contrast) / (0.5 * (NEAR + FAR))))
+
+
+def _volume(reach: float, camera: CameraModel) -> float:
+    """What a camera sees up to there (m^3)."""
+    across = camera.width / camera.fx * camera.rows / camera.fy
+    return across * reach**3 / 3.0
+
+
+def _range(extinction: float) -> float:
+    return -log(LEFT) / extinction
+
+
+def _where(count: Callable[[float], float], wanted: float, least: float, most: float) -> float:
+    """The rate at which a count that grows with it is as large as wanted, or the nearest one."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (least + most)
+        least, most = (middle, most) if count(middle) < wanted else (least, middle)
+    return 0.5 * (least + most)

@@ -1,0 +1,50 @@
+"""What a level of the paper's effects stands for."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.effects import Rain, Snow
+from selfdrive.sim.effects.visibility import BLOCK, DROP, REACH, fog, rain, snow
+
+
+def test_so_many_drops_are_near_the_camera(camera):
+    """10,000 of 1 mm and more within reach at level 10: Marshall's and Palmer's number in what it sees."""
+    weather = rain(10, camera)
+    fall = Rain(weather.rate, 0, camera)
+    pyramid = REACH**3 / 3 * camera.width / camera.fx * camera.rows / camera.fy
+    assert fall.density(DROP, fall.largest()) * pyramid == pytest.approx(10_000, rel=1e-6)
+    assert 2 < rain(1, camera).rate < 5 and 50 < weather.rate < 100
+
+
+def test_so_many_flakes_look_as_large_as_a_block(camera):
+    """All of a size are seen so large up to one distance, and there are 1,000 of them at level 10."""
+    weather = snow(10, camera)
+    fall = Snow(weather.rate, 0, camera)
+    count, step = 0.0, 0.01
+    for k in range(round(fall.largest() / step)):
+        size, _ = fall.flown(np.array([step * (k + 0.5)]))
+        reach = camera.fy * size.item() / BLOCK
+        near = reach**3 / 3 * camera.width / camera.fx * camera.rows / camera.fy
+        count += fall.density(step * k, step * (k + 1)) * near
+    assert count == pytest.approx(1_000, rel=0.01)
+
+
+def test_worse_weather_is_seen_less_far(camera):
+    """From level to level it rains and snows more, and the range is less."""
+    for kind in (rain, snow):
+        weather = [kind(level, camera) for level in range(1, 11)]
+        assert all(a.rate < b.rate and a.range > b.range for a, b in pairwise(weather))
+
+
+def test_fog_of_a_contrast():
+    """At the meteorological range 5 % is left, in the middle of the measured road that many."""
+    assert fog(0.05).range == pytest.approx(17.5)
+    assert fog(0.9).range > fog(0.4).range > 50.0
+
+
+def test_a_rate_out_of_reach_is_the_nearest():
+    """A camera that sees the whole world around has more flakes before it than any snowfall lacks."""
+    wide = CameraModel(fx=30.0, fy=30.0)
+    assert snow(0.0001, wide).rate == pytest.approx(Snow.LEAST)
