@@ -27,6 +27,7 @@ from mutator.cli.options import (
 )
 from mutator.cli.progress import duration
 from mutator.cli.run_folders import show_counts
+from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
@@ -175,7 +176,18 @@ def run(
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
     assert made.summary is not None  # it has just run
-    _print_end(terminal, out, made, made.summary)
+    try:
+        _print_end(terminal, out, made, made.summary)
+    except MutatorError:  # nobody holds the folder any more: `clean` may have come
+        from mutator.store.cleaning import is_deleted
+
+        if not is_deleted(out):
+            raise
+        raise MutatorError(
+            "deleted by another command while its report was written",
+            where=out,
+            remedy="run the campaign again",
+        ) from None
     if made.summary.exit_code:
         raise typer.Exit(made.summary.exit_code)
 

@@ -1,6 +1,7 @@
 """Deletes what a run wrote into its folder, and nothing else."""
 
 import os
+import time
 from collections.abc import Iterable
 from contextlib import suppress
 from fnmatch import fnmatchcase
@@ -14,6 +15,7 @@ from mutator.store.run_head import HEAD, SCHEMA
 
 _FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}
 _SHOWN = 3
+_TRIES, _PAUSE_S = 50, 0.1
 
 
 def clean(path: Path) -> None:
@@ -29,6 +31,24 @@ def clear(path: Path) -> None:
     last what it had half written, which says that it was at work. What others put there stays."""
     ours, _ = _sorted_out(path)
     _delete(path, sorted(ours, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
+
+
+def is_deleted(path: Path) -> bool:
+    """Whether another command has deleted the run folder, once it has ended; what was written into it
+    meanwhile goes, too."""
+    for _ in range(_TRIES):
+        try:
+            with owned(path, patience_s=0.0):
+                if RunFolder.exists(path):
+                    return False
+                clear(path)
+        except FileNotFoundError:
+            return True
+        except MutatorError:  # it is still at work
+            time.sleep(_PAUSE_S)
+        else:
+            return True
+    return False
 
 
 def _delete(path: Path, files: Iterable[Path]) -> None:

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 
 TRIES = 60
 WORDS = ("small", "--limit", "2", "--engine", "fork")
-BUSY = ("in use", "run under way")
+BUSY = ("in use", "run under way", "deleted by another command")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
