@@ -257,6 +257,10 @@ class Run:
         no run writes."""
         cleaning.clean(self.path)
 
+    def is_deleted(self) -> bool:
+        """Whether another command has deleted the folder, once it has ended."""
+        return cleaning.is_deleted(self.path)
+
     def _workspace_if_any(self) -> Workspace | None:
         try:
             return self.workspace

@@ -179,9 +179,7 @@ def run(
     try:
         _print_end(terminal, out, made, made.summary)
     except MutatorError:  # nobody holds the folder any more: `clean` may have come
-        from mutator.store.cleaning import is_deleted
-
-        if not is_deleted(out):
+        if not made.is_deleted():
             raise
         raise MutatorError(
             "deleted by another command while its report was written",

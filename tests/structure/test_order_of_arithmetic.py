@@ -16,6 +16,7 @@ NO_RESULT = (  # draws, compares or trains; and symbols, which CasADi works out 
     "selfdrive/sim/effects/page.py",
     "selfdrive/sim/effects/severity.py",
     "selfdrive/visiond/evaluate.py",
+    "selfdrive/visiond/under_effects.py",
     "selfdrive/visiond/train*.py",
     "selfdrive/controls/lib/lateral_mpc.py",
     "selfdrive/controls/lib/mpc_solver.py",
@@ -45,7 +46,7 @@ EXACT = {  # whole numbers, and sums that a double holds exactly: no order can m
     ("sim/recorder.py", "sum((1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in shown))"),
     (
         "visiond/lane_net.py",
-        "np.rint(features * np.float32(FEATURE_STEPS)).astype(float) @ self._whole",
+        "np.matmul(some, self._whole, out=steps[k:k + AT_ONCE])",
     ),
 }
 

@@ -10,6 +10,7 @@ DOUBLE = (9, 8)  # the same for two lines with a gap between, 0.3 m wide togethe
 EDGE = DOUBLE[1]
 SIDE = 5  # columns of road compared with, on each side
 ALONG = 3  # rows averaged
+SPECK = np.ones((5, 1), np.uint8)  # what is bright in fewer rows is a flake or a drop, not a mark
 NEIGHBOURHOOD = (51, 9)  # columns and rows in which texture is measured
 DARK = 12.0  # grey levels added to the road's brightness, so that noise in the dark is no contrast
 LEAST = 0.006  # contrast below which nothing is a mark, on the cleanest road
@@ -28,6 +29,7 @@ class Points(NamedTuple):
 
 def mark_points(road: np.ndarray) -> Points:
     """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
+    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
     side = _mean(road, SIDE)
     single = _inner(_mean(road, SINGLE[0]))
     sides = _sides(side, SINGLE[1])

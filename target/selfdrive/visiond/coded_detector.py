@@ -127,7 +127,7 @@ def _radius(points: np.ndarray) -> float:
 def _linked(pixels: np.ndarray, radius: float) -> np.ndarray:
     """Cluster of each pixel: those are together that pixels lead to, none further away than the radius."""
     one, other = cKDTree(pixels).query_pairs(radius, output_type="ndarray").T
-    order, ends = np.argsort(one), np.bincount(one, minlength=len(pixels)).cumsum()
+    order, ends = np.argsort(one, kind="stable"), np.bincount(one, minlength=len(pixels)).cumsum()
     links = np.ones(len(one)), other[order], np.concatenate(([0], ends))
     return connected_components(csr_array(links, shape=(len(pixels),) * 2), directed=False)[1]
 

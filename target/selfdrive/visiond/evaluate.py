@@ -23,6 +23,8 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.messages import CameraView
 from selfdrive.sim.image_folder import CALIBRATION, camera_of
 from selfdrive.visiond.detector import LaneDetector, LaneLines
+from selfdrive.visiond.paper_detector import PaperDetector
+from selfdrive.visiond.robust_detector import RobustDetector
 
 EXIT_INPUT = 2
 WIDTH, ROWS, HORIZON = 640, 480, 200  # of the canonical frame
@@ -127,7 +129,23 @@ def read_frames(folder: Path, truth: Path) -> list[Frame]:
 
 def evaluate(detector: str, frames: list[Frame]) -> list[Finding]:
     """What `detector` makes of each frame, seen for the first time."""
-    return [_look(_detector(detector, frame.model), frame) for frame in frames]
+    return [look(build(detector, frame.model), frame, frame.grey) for frame in frames]
+
+
+def look(detector: LaneDetector, frame: Frame, picture: np.ndarray) -> Finding:
+    """What the detector makes of a picture (rows x columns, uint8) of what the frame shows."""
+    view = CameraView(left_lane_y=0.0, right_lane_y=0.0, path_y=0.0, bend=(), lead_d_rel=0.0, picture=picture)
+    lines = detector.detect(view)
+    errors = []
+    for line, true in ((lines.left, frame.left), (lines.right, frame.right)):
+        a, b = frame.model.line_in_picture(line.y, line.slope)
+        errors.append(a * ROW + b - true if line.prob > 0.0 else None)
+    return Finding(frame=frame, lines=lines, left=errors[0], right=errors[1])
+
+
+def build(name: str, model: CameraModel) -> LaneDetector:
+    """A new detector of that name for pictures of a camera."""
+    return PaperDetector(model) if name == PAPER else RobustDetector(model)
 
 
 def report(detector: str, findings: list[Finding]) -> str:
@@ -191,28 +209,6 @@ def _source_of(model: CameraModel) -> Source:
         pitch=model.pitch,
     )
     return Source(vanishing_row=model.horizon, rows=model.rows, model=seen)
-
-
-def _look(detector: LaneDetector, frame: Frame) -> Finding:
-    view = CameraView(
-        left_lane_y=0.0, right_lane_y=0.0, path_y=0.0, bend=(), lead_d_rel=0.0, picture=frame.grey
-    )
-    lines = detector.detect(view)
-    errors = []
-    for line, true in ((lines.left, frame.left), (lines.right, frame.right)):
-        a, b = frame.model.line_in_picture(line.y, line.slope)
-        errors.append(a * ROW + b - true if line.prob > 0.0 else None)
-    return Finding(frame=frame, lines=lines, left=errors[0], right=errors[1])
-
-
-def _detector(name: str, model: CameraModel) -> LaneDetector:
-    if name == PAPER:
-        from selfdrive.visiond.paper_detector import PaperDetector
-
-        return PaperDetector(model)
-    from selfdrive.visiond.robust_detector import RobustDetector
-
-    return RobustDetector(model)
 
 
 def _read_truth(path: Path) -> dict:

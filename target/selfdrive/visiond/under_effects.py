@@ -1,0 +1,145 @@
+"""How well detectors find real lanes in bad weather.
+
+`python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes what `selfdrive.visiond.evaluate` takes. Each
+frame is put behind each level of each effect, once for each seed, and looked at by new detectors, which thus
+have no history. What is counted are pictures in which a detector misses a line. They are not independent of
+each other: a frame shows the same road each time. `--strips` writes all levels of a frame side by side, to be
+looked at.
+"""
+
+import argparse
+import csv
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from selfdrive.common.errors import ConfigError, writing
+from selfdrive.sim.effects.effect import Effect, Moment
+from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.visiond.evaluate import EXIT_INPUT, PAPER, ROBUST, Frame, build, look, read_frames
+
+SEEDS = 20
+MOMENT = Moment(2.0, 50.0, 26.82)
+DETECTORS = PAPER, ROBUST
+IN_A_ROW = 5  # panels of a strip
+PANEL = 320, 240  # px
+HEADS = "effect", "level", "amount", "unit", "pictures", *(f"missed_{name}" for name in DETECTORS)
+
+
+class Row(NamedTuple):
+    """One level of an effect: in how many pictures each detector missed a line."""
+
+    kind: type[Effect]
+    level: int
+    amount: float
+    pictures: int
+    missed: tuple[int, ...]
+
+
+def measure(frames: Sequence[Frame], kinds: Sequence[type[Effect]], seeds: int) -> Iterator[Row]:
+    """The rows of these effects, level by level."""
+    for kind in kinds:
+        for level, amount in enumerate(LEVELS[kind], 1):
+            missed, pictures = np.zeros(len(DETECTORS), int), 0
+            for frame in frames:
+                for picture in _pictures(frame, kind, amount, seeds):
+                    found = [look(build(name, frame.model), frame, picture).good for name in DETECTORS]
+                    missed += np.logical_not(found)
+                    pictures += 1
+            yield Row(kind, level, amount, pictures, tuple(missed.tolist()))
+
+
+def _pictures(frame: Frame, kind: type[Effect], amount: float, seeds: int) -> Iterator[np.ndarray]:
+    """The frame behind an effect, for each seed; once where chance has no part in it."""
+    seen = kind(amount, 1, frame.model).apply(frame.grey, MOMENT)
+    yield seen
+    for seed in range(2, seeds + 1):
+        other = kind(amount, seed, frame.model).apply(frame.grey, MOMENT)
+        if seed == 2 and np.array_equal(seen, other):
+            return
+        yield other
+
+
+def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
+    """The frame behind all levels of an effect, with their amounts (grey)."""
+    panels = []
+    for level, amount in enumerate(LEVELS[kind], 1):
+        seen = kind(amount, 1, frame.model).apply(frame.grey, MOMENT)
+        panel = cv2.resize(seen, PANEL, interpolation=cv2.INTER_AREA)
+        text = f"level {level}: {amount:g} {kind.UNIT}"
+        cv2.putText(panel, text, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, 255, 1, cv2.LINE_AA)
+        panels.append(panel)
+    panels += [np.zeros_like(panels[0])] * (-len(panels) % IN_A_ROW)
+    rows = [np.hstack(panels[k : k + IN_A_ROW]) for k in range(0, len(panels), IN_A_ROW)]
+    return np.vstack(rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = _parse(arguments)
+    cv2.setNumThreads(1)
+    kinds = [kind for kind in LEVELS if not options.effect or kind.__name__ in options.effect]
+    try:
+        frames = read_frames(options.frames, options.truth)
+        if options.strips:
+            _write_strips(options.strips, frames, kinds)
+        else:
+            rows = list(_told(measure(frames, kinds, options.seeds)))
+            if options.csv:
+                _write_csv(options.csv, rows)
+    except ConfigError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_INPUT
+    return 0
+
+
+def _told(rows: Iterator[Row]) -> Iterator[Row]:
+    """The rows, each printed as it comes."""
+    print(f"{'effect':<16}{'level':>6}{'amount':>9}{'pictures':>10}", *(f"{n:>8}" for n in DETECTORS))
+    for row in rows:
+        counts = "".join(f"{count:>9}" for count in row.missed)
+        print(f"{row.kind.__name__:<16}{row.level:>6}{row.amount:>9g}{row.pictures:>10}{counts}", flush=True)
+        yield row
+
+
+def _write_csv(path: Path, rows: Sequence[Row]) -> None:
+    with writing(path, expected="a writable file", remedy="choose another --csv"), path.open("w") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEADS)
+        for row in rows:
+            name, unit = row.kind.__name__, row.kind.UNIT
+            writer.writerow((name, row.level, f"{row.amount:g}", unit, row.pictures, *row.missed))
+
+
+def _write_strips(folder: Path, frames: Sequence[Frame], kinds: Sequence[type[Effect]]) -> None:
+    for frame in frames:
+        for kind in kinds:
+            path = folder / f"{kind.__name__}_{frame.key}.png"
+            with writing(path, expected="a writable folder", remedy="choose another --strips"):
+                folder.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(cv2.imencode(".png", strip(frame, kind))[1])
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="selfdrive.visiond.under_effects",
+        description="Count the real frames in which detectors miss a line behind image effects.",
+    )
+    parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")
+    parser.add_argument("truth", type=Path, metavar="TRUTH", help="JSON file with the true lines")
+    names = [kind.__name__ for kind in LEVELS]
+    parser.add_argument(
+        "--effect", action="append", choices=names, help="these effects alone; may be repeated"
+    )
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="pictures of each frame and level")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="keep the counts")
+    parser.add_argument("--strips", type=Path, metavar="DIR", help="write pictures of all levels instead")
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
