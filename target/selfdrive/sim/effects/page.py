@@ -5,6 +5,7 @@ image-effects with a picture for each effect.
 """
 
 import argparse
+import csv
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +15,7 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
+from selfdrive.sim.effects import PaperFog, PaperOcclusion, PaperRain, PaperSnow, visibility
 from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.levels import CODED, PAPER, PHYSICAL
 from selfdrive.sim.effects.severity import RoadGauge, Severity
@@ -33,6 +35,8 @@ DETECTORS: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour 
 }
 AHEAD, ERROR = 10.0, 0.3  # m: a line counts as found where it is no further off than this
 SMALL = 320, 240
+GREY = 100  # level of the picture on which is measured how much an effect covers
+REAL = "real-frames.csv"  # in the folder of pictures: what `selfdrive.visiond.under_effects` counted
 TEXT = """\
 # Image effects
 
@@ -55,9 +59,36 @@ the one `as_coded`. The tables give means over {seeds} seeds and {pictures} pict
 * False edges: share of the lane's inside, away from its lines, where the horizontal gradient (Sobel) is that
   of a step of 8 grey levels at least, and half as strong as a mark's edge at the contrast that is left. Clean
   pictures have {clean.false_edges:.1%}.
+* Covered: share of the lane's inside, 5 to 30 m ahead, where drops, flakes, blobs or blotches change an even
+  grey by 8 levels or more.
 * Found: share of pictures in which a detector sees both lines, each within 0.3 m of the truth 10 m ahead. The
   one `as_coded` repeats what it last said where it sees nothing at all, which here is right by chance: its
   high shares at the strongest levels mean that it is blind.
+* Missed on real frames: in how many pictures a detector misses a line. There are six frames of highways (from
+  Udacity's first project on lane finding, MIT licence), each seen with 20 seeds where chance has a part in
+  the effect, and without a past. The pictures are not independent of each other: they show six roads. The
+  frames are not in this repository. `python -m selfdrive.visiond.under_effects FRAMES TRUTH` counts anew and,
+  with `--strips`, shows all levels on frames of your own. The detectors were made ready for rain and snow on
+  rendered roads alone.
+
+## What a level of the paper's effects stands for
+
+The paper's text counts streaks, blocks and blobs and gives contrasts, but does not say how bad a weather that
+is. What it leaves open (how long streaks are, how many blocks there are, where blobs lie) is settled by what
+a level stands for:
+
+* Rain: a streak is a drop of 1 mm or more within 2.2 m, so the rate follows from Marshall's and Palmer's
+  (1948) number of drops in what the camera sees of that. A streak is as long as such a drop falls (6 m/s;
+  Atlas and others, 1973) while a shutter is open for 4 ms.
+* Snow: a block of two pixels is a flake that looks as large or larger (Gunn and Marshall, 1958; density after
+  Holroyd, 1971).
+* Fog: the text's contrast is what is left 17.5 m ahead, in the middle of the measured road, after Koschmieder
+  (1924).
+* Range: the meteorological one, at which 5 % of the contrast is left; in rain and snow after their extinction
+  (Halder and others, 2019; ITU-R P.1814). The text's contrasts of rain and snow are worse than that.
+* Occlusion: dirt that hides the sky hides nothing that counts, so blobs lie below the horizon.
+
+{stands_for}
 """
 PRESETS = (
     (
@@ -80,6 +111,7 @@ class Row(NamedTuple):
 
     amount: float
     severity: Severity
+    covered: float
     found: tuple[float, ...]  # share of pictures, for each detector
     picture: np.ndarray  # the last one, in colour, with lines
 
@@ -103,17 +135,20 @@ class Studio:
         """Drives once for each seed under this effect."""
         measures: list[Severity] = []
         found: list[list[bool]] = []
-        shown = np.empty(0)
+        shown, covered = np.empty(0), []
+        grey = np.full_like(self._clean[0], GREY)
         for seed in reversed(SEEDS):  # what is shown is of the first one
             effect = kind(amount, seed, self.model)
             seen = [effect.apply(*pair) for pair in zip(self._clean, self._moments, strict=True)]
             measures += [self._gauge.measure(*pair) for pair in zip(self._clean, seen, strict=True)]
+            covered.append(self._gauge.covered(effect.apply(grey, self._moments[-1])))
             shown = cv2.cvtColor(seen[-1], cv2.COLOR_GRAY2BGR)
             lines = [list(_detected(detector(self.model), seen)) for detector, _, _ in DETECTORS.values()]
             found += [[self._is_found(each) for each in pair] for pair in zip(*lines, strict=True)]
             for each, (_, colour, width) in zip(lines, DETECTORS.values(), strict=True):
                 draw_lines(shown, self.model, each[-1], colour, width)
-        return Row(amount, _mean(measures), tuple(np.mean(found, axis=0)), shown)
+        share = float(np.mean(covered))
+        return Row(amount, _mean(measures), share, tuple(np.mean(found, axis=0)), shown)
 
     def _is_found(self, lines: LaneLines) -> bool:
         return all(
@@ -155,41 +190,78 @@ def strip(rows: list[Row], unit: str) -> np.ndarray:
     return np.hstack(panels)
 
 
-def table(rows: list[Row], unit: str) -> str:
-    """The levels' measures as Markdown."""
-    names = " | ".join(f"found by `{name}`" for name in DETECTORS)
+def table(rows: list[Row], unit: str, real: list[dict[str, str]]) -> str:
+    """The levels' measures as Markdown; `real` are their lines of the table of real frames, or none."""
+    names = ["covered", *(f"found by `{name}`" for name in DETECTORS)]
+    missed = [head for head in (real[0] if real else ()) if head.startswith("missed_")]
+    names += [f"missed on real frames by `{head.removeprefix('missed_')}`" for head in missed]
     lines = [
-        f"| level | amount ({unit}) | PSNR (dB) | mark contrast | false edges | {names} |",
-        "|---|---|---|---|---|" + "---|" * len(DETECTORS),
+        f"| level | amount ({unit}) | PSNR (dB) | mark contrast | false edges | {' | '.join(names)} |",
+        "|---|---|---|---|---|" + "---|" * len(names),
     ]
     for level, row in enumerate(rows, 1):
         psnr, contrast, false_edges = row.severity
         cells = [f"{level}", f"{row.amount:g}", f"{psnr:.1f}", f"{contrast:.0f}", f"{false_edges:.1%}"]
-        cells += [f"{share:.0%}" for share in row.found]
+        cells += [f"{row.covered:.0%}", *(f"{share:.0%}" for share in row.found)]
+        if real:
+            counted = real[level - 1]
+            cells += [f"{counted[head]} of {counted['pictures']}" for head in missed]
         lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def stands_for(measured: dict[type[Effect], list[Row]], model: CameraModel) -> str:
+    """What is outside at each level, as Markdown."""
+    heads = ("rain (mm/h)", "range (m)", "road covered", "fog: contrast left", "range (m)")
+    heads += ("snow (mm/h)", "range (m)", "road covered", "occlusion: road covered")
+    lines = [f"| level | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
+    for level in range(1, 11):
+        rain, snow = visibility.rain(level, model), visibility.snow(level, model)
+        contrast = PaperFog(level, 0, model).contrast
+        covered = {kind: f"{measured[kind][level - 1].covered:.0%}" for kind in measured}
+        cells = [f"{rain.rate:.0f}", f"{rain.range:.0f}", covered[PaperRain]]
+        cells += [f"{contrast:.2f}", f"{visibility.fog(contrast).range:.0f}"]
+        cells += [f"{snow.rate:.1f}", f"{snow.range:.0f}", covered[PaperSnow], covered[PaperOcclusion]]
+        lines.append(f"| {level} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
 def write(out: Path) -> None:
     """Writes page and pictures into the folder `out`."""
     studio = Studio()
-    clean = studio.clean()
-    parts = [TEXT.format(clean=clean, seeds=len(SEEDS), pictures=PICTURES)]
     folder = out / "image-effects"
     folder.mkdir(parents=True, exist_ok=True)
+    measured: dict[type[Effect], list[Row]] = {}
+    parts = []
     for title, levels, about in PRESETS:
         parts.append(f"## {title}\n\n{about}\n")
         for kind, amounts in levels.items():
-            rows = [studio.take(kind, amount) for amount in amounts]
+            rows = measured[kind] = [studio.take(kind, amount) for amount in amounts]
             file = folder / f"{kind.__name__}.jpg"
             cv2.imwrite(str(file), strip(rows, kind.UNIT), [cv2.IMWRITE_JPEG_QUALITY, 80])
             about = " ".join((kind.__doc__ or "").split())
             limits = f"{kind.LEAST:g} to {kind.MOST:g}"
             parts.append(
                 f"### {kind.__name__}\n\n{about} Amount: {limits} ({kind.UNIT}).\n\n"
-                f"![{kind.__name__} at three levels](image-effects/{file.name})\n\n{table(rows, kind.UNIT)}\n"
+                f"![{kind.__name__} at three levels](image-effects/{file.name})\n\n"
+                f"{table(rows, kind.UNIT, _real(folder, kind))}\n"
             )
-    (out / "image-effects.md").write_text("\n".join(parts), encoding="utf-8")
+    text = TEXT.format(
+        clean=studio.clean(),
+        seeds=len(SEEDS),
+        pictures=PICTURES,
+        stands_for=stands_for(measured, studio.model),
+    )
+    (out / "image-effects.md").write_text("\n".join([text, *parts]), encoding="utf-8")
+
+
+def _real(folder: Path, kind: type[Effect]) -> list[dict[str, str]]:
+    """The lines of an effect in the table of real frames, level by level; none without that table."""
+    path = folder / REAL
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8") as file:
+        return [line for line in csv.DictReader(file) if line["effect"] == kind.__name__]
 
 
 def main() -> None:

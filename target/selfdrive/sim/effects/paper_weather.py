@@ -88,13 +88,18 @@ class PaperRain(_PaperWeather):
 class PaperFog(_PaperWeather):
     """Uniform noise, blurred to droplets, on a background that loses contrast."""
 
+    @property
+    def contrast(self) -> float:
+        """What is left of the background's, 0.9 to 0.4."""
+        return self._between(0.9, 0.4)
+
     def _prepare(self, random: np.random.Generator) -> None:
         self._haze = haze(
             random, self.camera.rows, self.camera.width, self.amount / self.MOST, self.thickness
         )
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return hazed(picture, self._haze, self._between(0.9, 0.4), scene)
+        return hazed(picture, self._haze, self.contrast, scene)
 
 
 class PaperSnow(_PaperWeather):
@@ -122,7 +127,7 @@ class PaperSnow(_PaperWeather):
         )
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        snow = hazed(picture, self._haze, self._between(0.9, 0.4), scene)
+        snow = hazed(picture, self._haze, self._between(0.9, 0.4), scene)  # as fog's
         pixels = SNOW_SPEED[0] * scene.t + SNOW_SPEED[1] * scene.position
         for tile, speed in zip(self._tiles, FLAKE_SPEEDS, strict=True):
             way = speed * pixels

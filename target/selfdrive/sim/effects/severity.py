@@ -12,6 +12,7 @@ NEAR, FAR = 5.0, 30.0  # m: part of the road that is measured
 BESIDE = 0.35  # m: from a line's middle to bare road
 INNER = 0.5  # m: what is nearer to a line does not count as the lane's inside
 SAME = 0.5  # share of a mark's edge from which another edge looks like one
+NOTICED = 8.0  # grey levels
 WEAKEST = 32.0  # Sobel's value for a step of 8 grey levels: what is below is no edge
 
 
@@ -50,6 +51,12 @@ class RoadGauge:
             contrast=contrast,
             false_edges=float((edges > max(SAME * mark_edge, WEAKEST)).mean()),
         )
+
+    def covered(self, seen: np.ndarray) -> float:
+        """Share of the lane's inside that something covers in a picture of one grey level, `seen` through
+        an effect: where it differs from the median by what the eye notices."""
+        levels = seen[self._rows][self._inside].astype(float)
+        return float((np.abs(levels - np.median(levels)) >= NOTICED).mean())
 
     def _contrast(self, picture: np.ndarray) -> float:
         differences = []

@@ -51,6 +51,17 @@ def test_weak_edges_count_where_marks_are_weak(gauge, road):
     assert gauge.measure(road, strong).false_edges == 0.0
 
 
+def test_what_covers_the_road_is_what_changes_an_even_grey(gauge, road):
+    """By 8 levels or more; haze that is the same everywhere covers nothing."""
+    grey = np.full_like(road, 100)
+    assert gauge.covered(grey // 2) == 0.0
+    half = grey.copy()
+    half[:, :300] = 107
+    assert gauge.covered(half) == 0.0
+    half[:, :300] = 108
+    assert 0.2 < gauge.covered(half) < 0.5
+
+
 def test_page_has_every_effect_and_level():
     """The committed page has a picture and a table with all levels for every effect."""
     text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")

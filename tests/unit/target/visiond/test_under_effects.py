@@ -1,0 +1,64 @@
+"""The command that counts lines missed behind image effects, on frames of a rendered road."""
+
+import csv
+import json
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond.evaluate import EXIT_INPUT, SOURCES, UDACITY
+from selfdrive.visiond.under_effects import HEADS, IN_A_ROW, PANEL, main
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    """A folder with one frame, and the truth of it."""
+    folder = tmp_path_factory.mktemp("frames")
+    road = RoadRenderer(UDACITY, "solid", 1, periods=2)
+    down = SOURCES["p1"].vanishing_row * 640 / 960 - 200
+    frame = cv2.warpAffine(road.grey(2.0), np.float32([[1, 0, 0], [0, 1, down]]), (640, 360))
+    frame = cv2.resize(frame, (960, 540), interpolation=cv2.INTER_CUBIC)
+    cv2.imwrite(str(folder / "p1_one.png"), cv2.merge([frame] * 3))
+    left, right = (UDACITY.line_in_picture(*line) for line in road.truth())
+    (folder / "truth.json").write_text(json.dumps({"lines": {"p1_one": {"L": left, "R": right}}}))
+    return [str(folder), str(folder / "truth.json")]
+
+
+def test_misses_are_counted_by_level(frames, tmp_path, capsys):
+    """As many pictures as seeds where chance has a part in the effect, one where it has none."""
+    chosen = ["--effect", "PaperOcclusion", "--effect", "MedianBlur", "--seeds", "3"]
+    assert main([*frames, *chosen, "--csv", str(tmp_path / "found.csv")]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    with (tmp_path / "found.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == HEADS
+    assert [(row["effect"], row["pictures"]) for row in rows] == [("PaperOcclusion", "3")] * 10 + [
+        ("MedianBlur", "1")
+    ] * 2
+    assert len(printed) == 1 + len(rows) and printed[-1].split() == ["MedianBlur", "2", "5", "1", "0", "0"]
+
+
+def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
+    """Worse weather has more misses."""
+    assert main([*frames, "--effect", "PaperRain", "--seeds", "2", "--csv", str(tmp_path / "found.csv")]) == 0
+    with (tmp_path / "found.csv").open() as file:
+        missed = [int(row["missed_paper"]) for row in csv.DictReader(file)]
+    assert missed[0] < missed[-1] == 2
+
+
+def test_strips_show_all_levels(frames, tmp_path):
+    """Two rows of five, with room for effects of fewer levels."""
+    kinds = {kind.__name__: kind for kind in LEVELS}
+    for name in ("PaperRain", "GaussianBlur"):
+        assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
+        strip = cv2.imread(str(tmp_path / f"{name}_p1_one.png"), cv2.IMREAD_GRAYSCALE)
+        rows = -(-len(LEVELS[kinds[name]]) // IN_A_ROW)
+        assert strip.shape == (rows * PANEL[1], IN_A_ROW * PANEL[0])
+
+
+def test_missing_frames_are_told(frames, tmp_path, capsys):
+    """In one line, with what to do."""
+    assert main([str(tmp_path), frames[1]]) == EXIT_INPUT
+    assert "p1_one" in capsys.readouterr().err
