@@ -143,7 +143,7 @@ def look(detector: LaneDetector, frame: Frame, picture: np.ndarray) -> Finding:
     return Finding(frame=frame, lines=lines, left=errors[0], right=errors[1])
 
 
-def build(name: str, model: CameraModel) -> LaneDetector:
+def build(name: str, model: CameraModel) -> PaperDetector | RobustDetector:
     """A new detector of that name for pictures of a camera."""
     return PaperDetector(model) if name == PAPER else RobustDetector(model)
 

@@ -1,8 +1,8 @@
 """How well detectors find real lanes in bad weather.
 
 `python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes what `selfdrive.visiond.evaluate` takes. Each
-frame is put behind each level of each effect, once for each seed, and looked at by new detectors, which thus
-have no history. What is counted are pictures in which a detector misses a line. They are not independent of
+frame is put behind each level of each effect, once for each seed, and looked at by detectors without a
+past. What is counted are pictures in which a detector misses a line. They are not independent of
 each other: a frame shows the same road each time. `--strips` writes all levels of a frame side by side, to be
 looked at.
 """
@@ -20,7 +20,9 @@ import numpy as np
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.levels import LEVELS
-from selfdrive.visiond.evaluate import EXIT_INPUT, PAPER, ROBUST, Frame, build, look, read_frames
+from selfdrive.visiond.evaluate import EXIT_INPUT, PAPER, ROBUST, Finding, Frame, build, look, read_frames
+from selfdrive.visiond.paper_detector import PaperDetector
+from selfdrive.visiond.robust_detector import RobustDetector
 
 SEEDS = 20
 MOMENT = Moment(2.0, 50.0, 26.82)
@@ -42,26 +44,38 @@ class Row(NamedTuple):
 
 def measure(frames: Sequence[Frame], kinds: Sequence[type[Effect]], seeds: int) -> Iterator[Row]:
     """The rows of these effects, level by level."""
+    models = {frame.model for frame in frames}
+    made = {model: [build(name, model) for name in DETECTORS] for model in models}
     for kind in kinds:
         for level, amount in enumerate(LEVELS[kind], 1):
             missed, pictures = np.zeros(len(DETECTORS), int), 0
-            for frame in frames:
-                for picture in _pictures(frame, kind, amount, seeds):
-                    found = [look(build(name, frame.model), frame, picture).good for name in DETECTORS]
-                    missed += np.logical_not(found)
-                    pictures += 1
+            for frame, picture in _pictures(frames, kind, amount, seeds):
+                found = [_without_a_past(one, frame, picture).good for one in made[frame.model]]
+                missed += np.logical_not(found)
+                pictures += 1
             yield Row(kind, level, amount, pictures, tuple(missed.tolist()))
 
 
-def _pictures(frame: Frame, kind: type[Effect], amount: float, seeds: int) -> Iterator[np.ndarray]:
-    """The frame behind an effect, for each seed; once where chance has no part in it."""
-    seen = kind(amount, 1, frame.model).apply(frame.grey, MOMENT)
-    yield seen
-    for seed in range(2, seeds + 1):
-        other = kind(amount, seed, frame.model).apply(frame.grey, MOMENT)
-        if seed == 2 and np.array_equal(seen, other):
+def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, picture: np.ndarray) -> Finding:
+    """What the detector makes of a picture; it forgets it afterwards."""
+    new = detector.state
+    finding = look(detector, frame, picture)
+    detector.state = new
+    return finding
+
+
+def _pictures(
+    frames: Sequence[Frame], kind: type[Effect], amount: float, seeds: int
+) -> Iterator[tuple[Frame, np.ndarray]]:
+    """The frames behind an effect, for each seed; for one where chance has no part in it."""
+    before = None
+    for seed in range(1, seeds + 1):
+        made = {model: kind(amount, seed, model) for model in {frame.model for frame in frames}}
+        seen = [made[frame.model].apply(frame.grey, MOMENT) for frame in frames]
+        if seed == 2 and all(map(np.array_equal, seen, before)):
             return
-        yield other
+        before = seen
+        yield from zip(frames, seen, strict=True)
 
 
 def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
