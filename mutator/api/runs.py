@@ -257,9 +257,9 @@ class Run:
         no run writes."""
         cleaning.clean(self.path)
 
-    def is_deleted(self) -> bool:
-        """Whether another command has deleted the folder, once it has ended."""
-        return cleaning.is_deleted(self.path)
+    def finish_deletion(self) -> bool:
+        """Wait for a command that may be deleting the folder, and finish its work; whether it is gone."""
+        return cleaning.finish_deletion(self.path)
 
     def _workspace_if_any(self) -> Workspace | None:
         try:

@@ -179,7 +179,7 @@ def run(
     try:
         _print_end(terminal, out, made, made.summary)
     except MutatorError:  # nobody holds the folder any more: `clean` may have come
-        if not made.is_deleted():
+        if not made.finish_deletion():
             raise
         raise MutatorError(
             "deleted by another command while its report was written",

@@ -33,9 +33,9 @@ def clear(path: Path) -> None:
     _delete(path, sorted(ours, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
 
 
-def is_deleted(path: Path) -> bool:
-    """Whether another command has deleted the run folder, once it has ended; what was written into it
-    meanwhile goes, too."""
+def finish_deletion(path: Path) -> bool:
+    """Wait for another command that may be deleting the run folder, and delete what was written into it
+    meanwhile; whether it is gone."""
     for _ in range(_TRIES):
         try:
             with owned(path, patience_s=0.0):

@@ -1,4 +1,4 @@
-"""Digests of all that a run's bytes hang on: pictures, what detectors see in them, and traces.
+"""Digests of all that a run's bytes depend on: pictures, what detectors see in them, and traces.
 
 `python tests/differential/arithmetic.py` prints them as JSON, on whatever Python and processor it runs.
 """
@@ -15,7 +15,7 @@ from selfdrive.messages import CameraView
 from selfdrive.sim import vision
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
-from selfdrive.sim.moved_picture import GroundView, ShiftedView
+from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.road_look import Look, Paint
 from selfdrive.sim.road_renderer import RoadRenderer
@@ -49,6 +49,8 @@ def digests() -> Iterator[tuple[str, str]]:
     for detector in DETECTORS:
         pictures = Pictures(detector=detector, marks=vision.DASHED)
         yield f"S1 through {detector}", trace(SCENARIOS / "S1.yaml", "standard", pictures)
+    coded = Pictures(detector=vision.AS_CODED, translation=vision.CODED)
+    yield "S1 on the reference plant, as coded", trace(SCENARIOS / "S1.yaml", "reference", coded)
 
 
 def roads() -> dict[str, np.ndarray]:
@@ -59,7 +61,7 @@ def roads() -> dict[str, np.ndarray]:
         for name, look in (("solid", "solid"), ("dashed", "dashed"), ("worn", WORN))
     }
     frame = Picture(("frame",), found["solid"].shape, lambda *_: found["solid"])
-    for mover in (GroundView(model), ShiftedView(model)):
+    for mover in (GroundView(model), ShiftedView(model), CodedView()):
         found[type(mover).__name__] = mover.seen(frame, 0.7, -0.015).pixels()
     return found
 

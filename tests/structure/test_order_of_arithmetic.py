@@ -1,4 +1,4 @@
-"""What a run's bytes hang on is worked out in an order that is written down.
+"""What a run's bytes depend on is worked out in an order that is written down.
 
 `selfdrive.common.ordered` and `selfdrive.common.array_math` say why, and have what to use instead.
 """
@@ -36,7 +36,7 @@ PRODUCTS = {
 FUNCTIONS = {
     *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "power", "float_power", "cbrt", "logaddexp"),
     *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh"),
-    *("arcsinh", "arccosh", "arctanh", "sinc", "logspace", "geomspace"),
+    *("hypot", "corrcoef", "cov", "arcsinh", "arccosh", "arctanh", "sinc", "logspace", "geomspace"),
 }
 UNORDERED = {"partition", "argpartition"}
 SORTS = {"argsort"}  # of equal values any may come first
@@ -52,7 +52,7 @@ EXACT = {  # whole numbers, and sums that a double holds exactly: no order can m
 
 
 def found(source: str) -> Iterator[str]:
-    """Expressions whose order or last digits hang on Python or processor."""
+    """Expressions whose order or last digits depend on Python or processor."""
     for node in ast.walk(ast.parse(source)):
         is_product = isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult)
         if is_product or (isinstance(node, ast.Call) and _is_unordered(node)):
@@ -73,8 +73,8 @@ def _is_unordered(call: ast.Call) -> bool:
     return path[-1] == "dot" or path in (["cv2", name] for name in ("exp", "log", "pow", "gemm", "solve"))
 
 
-def test_results_hang_on_no_order() -> None:
-    """No file of the target that results hang on sums, multiplies or sorts in an order of its processor's."""
+def test_results_depend_on_no_order() -> None:
+    """No file that results depend on sums, multiplies or sorts in an order of its processor's."""
     wrong = []
     for path in sorted(TARGET.rglob("*.py")):
         name = path.relative_to(TARGET)

@@ -1,7 +1,8 @@
-"""Arithmetic of arrays in a written order: the same bytes on any processor.
+"""Arithmetic of arrays in a written order: the same bytes whatever the width of the processor's vectors.
 
-Matrix products, and numpy's elementary functions, come out otherwise by the width of the processor's
-vectors. What is here is made of sums, products, quotients and roots of single elements, which do not.
+Matrix products, and numpy's elementary functions, depend on that width. What is here is made of sums,
+products, quotients and roots of single elements, which do not, and of the C library's functions of single
+values, which may differ in the last digit on a processor without fused multiplication and addition.
 """
 
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from math import log as scalar_log
 import numpy as np
 
 _LOG_2 = scalar_log(2.0)
-_LOG_TERMS = 10  # of the series: the eleventh is less than a double's last digit
+_LOG_TERMS = 10  # the series ends with this power of the square: the next is less than a double's last digit
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -29,14 +30,14 @@ def length(vectors: np.ndarray) -> np.ndarray:
 
 
 def each(function: Callable[[float], float], values: np.ndarray) -> np.ndarray:
-    """A function of `math` of each value, as slow as Python: float64 of the shape of `values`."""
+    """A function of `math` of each value, one at a time and so slowly: float64 of the shape of `values`."""
     found = np.fromiter(map(function, values.ravel().tolist()), float, values.size)
     return found.reshape(values.shape)
 
 
 def log(values: np.ndarray) -> np.ndarray:
-    """Natural logarithm of positive numbers, of their type, to the last digits: 2 artanh((m - 1) / (m + 1))
-    of the mantissa, and its power of two."""
+    """Natural logarithm of positive numbers, float64, to the last digits of their type: 2 artanh((m - 1) /
+    (m + 1)) of the mantissa, and its power of two."""
     mantissa, power = np.frexp(values)
     small = mantissa < np.sqrt(0.5)
     mantissa, power = np.where(small, 2.0 * mantissa, mantissa), power - small

@@ -6,5 +6,5 @@ from operator import add
 
 
 def total(values: Iterable[float]) -> float:
-    """The first and the second value, then the third, and so on; 0 of none."""
+    """The sum, added from left to right; 0 if there are no values."""
     return reduce(add, values, 0)

@@ -1,8 +1,8 @@
 """Finds the threshold of the detector as coded: `python -m selfdrive.visiond.coded_threshold`.
 
-Only clean pictures of the road are looked at: no effect, no run, no hazard. A threshold will do if no more
-than ALLOWED of the windows inside the lane are taken for some with a mark, and if as few pictures as can be
-have a line that is read more than OFF from where it is. The middle of those that will do is taken.
+Only clean pictures of the road are looked at: no effect, no fault, no hazard. A threshold qualifies if at
+most ALLOWED of the windows inside the lane are taken for marks, and the fewest pictures have a line that is
+read more than OFF away. The middle of those that qualify is taken.
 """
 
 from collections.abc import Sequence

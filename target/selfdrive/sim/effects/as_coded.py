@@ -142,6 +142,7 @@ def _streak() -> tuple[np.ndarray, np.ndarray]:
 
 def _flake(sigma: float) -> np.ndarray:
     """Grey levels (FLAKE x FLAKE, flat, uint16) of a blurred white block."""
-    block = np.zeros((FLAKE, FLAKE), np.uint8)
-    block[FLAKE_REACH:-FLAKE_REACH, FLAKE_REACH:-FLAKE_REACH] = WHITE
-    return gaussian(block, sigma).astype(np.uint16).ravel()
+    block = np.zeros((FLAKE + 2 * FLAKE_REACH,) * 2, np.uint8)  # a blur reflects what lies at a border
+    block[2 * FLAKE_REACH : -2 * FLAKE_REACH, 2 * FLAKE_REACH : -2 * FLAKE_REACH] = WHITE
+    inside = slice(FLAKE_REACH, -FLAKE_REACH)
+    return gaussian(block, sigma)[inside, inside].astype(np.uint16).ravel()

@@ -42,7 +42,7 @@ class PaperOcclusion(_OnLens):
         blobs = random.uniform(size=(self.MOST, 3))[: int(self.amount)]
         for column, row, size in blobs:
             radius = BLOB_RADII[0] + size * (BLOB_RADII[1] - BLOB_RADII[0])
-            top = self.camera.horizon
+            top = max(0.0, self.camera.horizon)
             centre = round(column * (columns - 1)), round(top + row * (rows - 1 - top))
             cv2.circle(share, centre, round(radius), 1.0, cv2.FILLED)
         self._cover(cv2.GaussianBlur(share, (0, 0), BLOB_BLUR), BLOB_LEVEL)

@@ -73,7 +73,7 @@ class Particles:
         width = camera.fx * self._size[seen] / ahead
         inside = (end[1] > -MARGIN) & (start[1] < camera.rows + MARGIN)
         # A particle covers pi / 4 * width^2 pixels at a time, and its streak's all in turn.
-        visible = 0.25 * np.pi * width**2 > FAINTEST * (np.hypot(*(end - start)) + 1.0)
+        visible = 0.25 * np.pi * width**2 > FAINTEST * (_lengths(end - start) + 1.0)
         chosen = np.flatnonzero(inside & visible)
         return Streaks(start[:, chosen], end[:, chosen], width[chosen])
 
@@ -124,7 +124,7 @@ class Cover:
         # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
         corner = self._corners[:, grid] + MARGIN - 0.5
         start, end = ((place + 0.5) / scale + corner for place in (streaks.start, streaks.end))
-        counts = (np.hypot(*(end - start)) / SPACING).astype(np.intp) + 1
+        counts = (_lengths(end - start) / SPACING).astype(np.intp) + 1
         share = (0.25 * np.pi) * (streaks.width / scale) ** 2 / counts.astype(np.float32)
         _, columns, rows = strokes(start, end, counts)
         grid = np.repeat(grid, counts)
@@ -139,3 +139,9 @@ def _enlarged(coarse: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """A grid of half the size on a finer one of this shape; both have their margins."""
     fine = cv2.resize(coarse, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_LINEAR)
     return fine[MARGIN : MARGIN + shape[0], MARGIN : MARGIN + shape[1]]
+
+
+def _lengths(ways: np.ndarray) -> np.ndarray:
+    """Of ways (2, n)."""
+    across, down = ways
+    return np.sqrt(across * across + down * down)

@@ -54,7 +54,7 @@ class RoadGauge:
 
     def covered(self, seen: np.ndarray) -> float:
         """Share of the lane's inside that something covers in a picture of one grey level, `seen` through
-        an effect: where it differs from the median by what the eye notices."""
+        an effect: where it differs from the median by what the eye notices. Right up to about a half."""
         levels = seen[self._rows][self._inside].astype(float)
         return float((np.abs(levels - np.median(levels)) >= NOTICED).mean())
 

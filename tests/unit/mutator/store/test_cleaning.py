@@ -8,7 +8,7 @@ import pytest
 
 from mutator.campaigns.plans import freeze, make_plan
 from mutator.errors import MutatorError
-from mutator.store.cleaning import clean, is_deleted
+from mutator.store.cleaning import clean, finish_deletion
 from mutator.store.run_folder import CONTENT
 from mutator.workspace import Workspace
 
@@ -130,10 +130,10 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
 
 def test_what_was_written_while_it_was_deleted_goes_too(run: Path) -> None:
     """A report that another command was writing makes no folder of what has been deleted."""
-    assert not is_deleted(run)
+    assert not finish_deletion(run)
     clean(run)
-    assert is_deleted(run)
+    assert finish_deletion(run)
     (run / "report" / "tables").mkdir(parents=True)
     (run / "report" / "REPORT.md").write_text("of nothing")
-    assert is_deleted(run)
+    assert finish_deletion(run)
     assert not run.exists()

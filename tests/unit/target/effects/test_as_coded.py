@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.effects import CodedFog, CodedOcclusion, CodedRain, CodedSnow
-from selfdrive.sim.effects.as_coded import gaussian
+from selfdrive.sim.effects.as_coded import FLAKE, _flake, gaussian
 
 EFFECTS = (CodedRain, CodedFog, CodedSnow, CodedOcclusion)
 
@@ -58,6 +58,17 @@ def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
     changed = seen != road
     assert changed.any() and not changed[: camera.rows // 2 - 60].any()
     assert seen.min() == 0 and 140 <= seen[changed].max() < 150
+
+
+def test_a_flake_is_a_blurred_block():
+    """The same levels as in the middle of a large picture, at any layer's blur."""
+    block = np.zeros((40, 40), np.uint8)
+    block[19:21, 19:21] = 255
+    for layer in range(1, 11):
+        blurred = gaussian(block, 0.5 + layer / 10.0)
+        middle = slice(20 - FLAKE // 2, 20 + FLAKE // 2)
+        assert np.array_equal(_flake(0.5 + layer / 10.0).reshape(FLAKE, FLAKE), blurred[middle, middle])
+        assert blurred.sum() == blurred[middle, middle].sum()
 
 
 def test_gaussians_end_at_two_sigma():
