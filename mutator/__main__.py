@@ -1,6 +1,6 @@
 """`python -m mutator` is `mutator`."""
 
-from mutator.cli.app import main
+from mutator.cli.app import program
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(program())

@@ -134,6 +134,17 @@ for module in (
     module.register(app)
 
 
+def program() -> int:
+    """The program `mutator`. Where experiments are left it ends at once: a library that found no memory while
+    it was loaded may crash as the interpreter unloads it."""
+    code = main()
+    if code == EXIT_HARNESS_ERRORS:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
     _open_streams()
