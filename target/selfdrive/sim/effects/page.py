@@ -66,10 +66,10 @@ the one `as_coded`. The tables give means over {seeds} seeds and {pictures} pict
   high shares at the strongest levels mean that it is blind.
 * Missed on real frames: in how many pictures a detector misses a line. There are six frames of highways (from
   Udacity's first project on lane finding, MIT licence), each seen with 20 seeds where chance has a part in
-  the effect, and without a past. The pictures are not independent of each other: they show six roads. The
-  frames are not in this repository. `python -m selfdrive.visiond.under_effects FRAMES TRUTH` counts anew and,
-  with `--strips`, shows all levels on frames of your own. The detectors were made ready for rain and snow on
-  rendered roads alone.
+  the effect, by a detector with no memory of earlier pictures. They are not independent of each other: they
+  show six roads. The frames are not in this repository, [the counts](image-effects/real-frames.csv) are.
+  `python -m selfdrive.visiond.under_effects FRAMES TRUTH` counts anew and, with `--strips`, shows all levels
+  on frames of your own. The detectors were tuned for rain and snow on rendered roads only.
 
 ## What a level of the paper's effects stands for
 
