@@ -218,7 +218,8 @@ def stands_for(measured: dict[type[Effect], list[Row]], model: CameraModel) -> s
     for level in range(1, 11):
         rain, snow = visibility.rain(level, model), visibility.snow(level, model)
         contrast = PaperFog(level, 0, model).contrast
-        covered = {kind: f"{measured[kind][level - 1].covered:.0%}" for kind in measured}
+        shown = (PaperRain, PaperSnow, PaperOcclusion)
+        covered = {kind: f"{measured[kind][level - 1].covered:.0%}" for kind in shown}
         cells = [f"{rain.rate:.0f}", f"{rain.range:.0f}", covered[PaperRain]]
         cells += [f"{contrast:.2f}", f"{visibility.fog(contrast).range:.0f}"]
         cells += [f"{snow.rate:.1f}", f"{snow.range:.0f}", covered[PaperSnow], covered[PaperOcclusion]]
