@@ -94,6 +94,7 @@ def edges_in_windows(part: np.ndarray) -> np.ndarray:
     down, across = (size // STRIDE for size in part.shape)
     tiles = power.reshape(down, STRIDE, across, STRIDE).sum(axis=(1, 3))
     sums = tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]
+    # Powers are whole numbers: they are above a limit when they are above its whole part.
     limits = np.floor(STEEP / WINDOW**2 * sums).astype(np.int32)
     of_windows = np.lib.stride_tricks.sliding_window_view(crest, (WINDOW, WINDOW))[::STRIDE, ::STRIDE]
     return (of_windows > limits[:, :, np.newaxis, np.newaxis]).reshape(-1, WINDOW, WINDOW)

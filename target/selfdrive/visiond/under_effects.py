@@ -20,6 +20,7 @@ import numpy as np
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.page import panel
 from selfdrive.visiond.evaluate import EXIT_INPUT, PAPER, ROBUST, Finding, Frame, build, look, read_frames
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
@@ -28,7 +29,6 @@ SEEDS = 20
 MOMENT = Moment(2.0, 50.0, 26.82)
 DETECTORS = PAPER, ROBUST
 IN_A_ROW = 5  # panels of a strip
-PANEL = 320, 240  # px
 HEADS = "effect", "level", "amount", "unit", "pictures", *(f"missed_{name}" for name in DETECTORS)
 
 
@@ -83,10 +83,7 @@ def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
     panels = []
     for level, amount in enumerate(LEVELS[kind], 1):
         seen = kind(amount, 1, frame.model).apply(frame.grey, MOMENT)
-        panel = cv2.resize(seen, PANEL, interpolation=cv2.INTER_AREA)
-        text = f"level {level}: {amount:g} {kind.UNIT}"
-        cv2.putText(panel, text, (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, 255, 1, cv2.LINE_AA)
-        panels.append(panel)
+        panels.append(panel(seen, level, amount, kind.UNIT))
     panels += [np.zeros_like(panels[0])] * (-len(panels) % IN_A_ROW)
     rows = [np.hstack(panels[k : k + IN_A_ROW]) for k in range(0, len(panels), IN_A_ROW)]
     return np.vstack(rows)

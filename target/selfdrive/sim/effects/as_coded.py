@@ -5,6 +5,7 @@ or move, they are elsewhere in the next picture. Contrast, brightness and blur a
 Gaussians end at two sigma, as those of MATLAB do unless it is told otherwise.
 """
 
+from abc import abstractmethod
 from math import ceil, cos, radians, sin
 from typing import ClassVar
 
@@ -45,9 +46,9 @@ class _AsCoded(Effect):
         stream = [self.seed, number, *type(self).__name__.encode()]
         return self._drawn(picture, int(self.amount), np.random.Generator(np.random.PCG64(stream)))
 
+    @abstractmethod
     def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
         """The picture at that level, with what chance puts into it."""
-        raise NotImplementedError
 
 
 class CodedRain(_AsCoded):

@@ -18,14 +18,16 @@ from selfdrive.common.array_math import each
 from selfdrive.sim.effects.canvas import Tile, seamless, splat, strokes
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 
+HAZE = 0.9, 0.4  # share of the contrast that fog leaves, and the fog in which it snows
 STREAKS = 1000  # for each thickness: 10,000 at thickness 10
-REACH = 2.2  # m: up to which distance a drop makes a streak
+# m: up to which distance a drop makes a streak; with it, levels 1 to 10 are light to violent rain
+REACH = 2.2
 # Shares of the drops within reach that are nearer than those of a layer, far to near
 NEARER = 0.9, 0.7, 0.5, 0.3, 0.1
 FALL, EXPOSURE = 6.0, 0.004  # m/s, s: of a drop of 1.6 mm (Atlas and others, 1973); under a dark sky
 STREAK_LEAN = radians(8.0)
 RAIN_SPEED = 1.0 / EXPOSURE, 5.0  # lengths of a streak: in a second, and for each metre driven
-BLOCKS = 100  # of snow for each thickness
+BLOCKS = 100  # of snow for each thickness; with it, levels 1 to 10 are light to heavy snow
 FLAKE_SPEEDS = 1.0, 1.5, 2.0, 3.0, 4.0
 SNOW_SPEED = 40.0, 4.0  # px: in a second, and for each metre driven, times the above
 FOG_SPEED = 6.0, 2.0  # px, likewise
@@ -91,7 +93,7 @@ class PaperFog(_PaperWeather):
     @property
     def contrast(self) -> float:
         """What is left of the background's, 0.9 to 0.4."""
-        return self._between(0.9, 0.4)
+        return self._between(*HAZE)
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._haze = haze(
@@ -127,7 +129,7 @@ class PaperSnow(_PaperWeather):
         )
 
     def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        snow = hazed(picture, self._haze, self._between(0.9, 0.4), scene)  # as fog's
+        snow = hazed(picture, self._haze, self._between(*HAZE), scene)
         pixels = SNOW_SPEED[0] * scene.t + SNOW_SPEED[1] * scene.position
         for tile, speed in zip(self._tiles, FLAKE_SPEEDS, strict=True):
             way = speed * pixels

@@ -7,9 +7,10 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.effects.page import SMALL, TITLE
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.evaluate import EXIT_INPUT, SOURCES, UDACITY
-from selfdrive.visiond.under_effects import HEADS, IN_A_ROW, PANEL, main
+from selfdrive.visiond.under_effects import HEADS, IN_A_ROW, main
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +56,7 @@ def test_strips_show_all_levels(frames, tmp_path):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
         strip = cv2.imread(str(tmp_path / f"{name}_p1_one.png"), cv2.IMREAD_GRAYSCALE)
         rows = -(-len(LEVELS[kinds[name]]) // IN_A_ROW)
-        assert strip.shape == (rows * PANEL[1], IN_A_ROW * PANEL[0])
+        assert strip.shape == (rows * (SMALL[1] + TITLE), IN_A_ROW * SMALL[0])
 
 
 def test_missing_frames_are_told(frames, tmp_path, capsys):
