@@ -48,6 +48,35 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
                 assert line.y == pytest.approx(y, abs=0.005)
 
 
+def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where edges are seen and no cluster is large enough, both are in the first column."""
+    monkeypatch.setattr(coded, "LEAST_POINTS", 10**6)
+    found = seen(CodedDetector(CALTECH), road.grey(4.0))
+    assert [line.y for line in found[:2]] == pytest.approx([7.88, 8.03], abs=0.005)
+    assert [line.prob for line in found[:2]] == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(("edges", "looked_at"), [(24, False), (25, True)])
+def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One fewer and the net is never asked."""
+    crests = np.zeros((np.prod(coded.WINDOWS), 32, 32), bool)
+    crests[40].reshape(-1)[:edges] = True
+    monkeypatch.setattr(coded, "edges_in_windows", lambda part: crests)
+    detector = CodedDetector(CALTECH, threshold=-np.inf)
+    points = detector._points(np.zeros(coded.SIZE, np.uint8))
+    assert len(points) == (edges if looked_at else 0)
+    if looked_at:  # window 40 is the twelfth of the second row
+        assert points.min(axis=0).tolist() == [235 + 16, 90 + 11 * 16]
+
+
+@pytest.mark.parametrize(("points", "column"), [(29, 0), (30, 200)])
+def test_a_cluster_needs_30_points(points: int, column: int) -> None:
+    """A point that several windows found counts as often; without a cluster the line is in column 0."""
+    left = np.column_stack((np.repeat(np.arange(270, 285), 2)[:points], np.full(points, 200)))
+    right = np.column_stack((np.arange(265, 305), np.full(40, 440)))
+    assert coded._columns_of_lines(np.concatenate((left, right))) == pytest.approx((column, 440))
+
+
 def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
     """Of a picture without content nothing is learnt."""
     detector = CodedDetector(CALTECH)
