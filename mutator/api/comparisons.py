@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mutator._common.tables import Table
 from mutator.api.html import text_html
-from mutator.api.runs import Run
+from mutator.api.runs import Run, load_run
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Finding, Gate
@@ -103,11 +103,17 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     `only` is a filter over what is known of them before running. MutatorError when none has a partner;
     CheckFailed when the equivalence check of a run failed.
     """
-    return RunComparison(comparing.compare(_path(a), _path(b), only))
+    runs = [one if isinstance(one, Run) else load_run(one) for one in (a, b)]
+    first, second = map(_alerts_note, runs)
+    return RunComparison(comparing.compare(runs[0].path, runs[1].path, only, (first, second)))
 
 
-def _path(run: Run | str | Path) -> Path:
-    return run.path if isinstance(run, Run) else Path(run)
+def _alerts_note(run: Run) -> str:
+    """The run's note; empty where its target is unknown here."""
+    try:
+        return run.alerts_note()
+    except (MutatorError, KeyError):
+        return ""
 
 
 def _frame(pairs: Sequence[Pair]) -> "pd.DataFrame":

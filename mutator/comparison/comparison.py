@@ -47,11 +47,12 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two runs, matched."""
+    """Two runs, matched. `alerts_notes` say which alerts their fault-free runs raise, too; empty for none."""
 
     a: Side
     b: Side
     matching: Matching
+    alerts_notes: tuple[str, str] = ("", "")
 
     @cached_property
     def names(self) -> Names:
@@ -83,7 +84,10 @@ class Comparison:
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        return remarks(self.a, self.b, self.matching)
+        """What to know before believing the tables."""
+        noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
+        own = tuple(f"{name}: {note}" for name, note in noted if note)
+        return remarks(self.a, self.b, self.matching) + own
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
@@ -118,7 +122,9 @@ class Comparison:
         )
 
 
-def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:
+def compare(
+    run_a: Path, run_b: Path, only: str | None = None, alerts_notes: tuple[str, str] = ("", "")
+) -> Comparison:
     """Compare two run folders; `only` chooses experiments by what is known of them before running.
 
     MutatorError when none of them has a partner; CheckFailed when the proof of a run failed.
@@ -134,7 +140,7 @@ def compare(run_a: Path, run_b: Path, only: str | None = None) -> Comparison:
             expected="runs of the same faults, scenarios and triggers",
             remedy="compare runs of one campaign, or widen `only`",
         )
-    return Comparison(a=a, b=b, matching=matching)
+    return Comparison(a=a, b=b, matching=matching, alerts_notes=alerts_notes)
 
 
 def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ...]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import mutator
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 
@@ -35,6 +36,19 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
         assert wanted in answer.out
     for name in ("COMPARISON.md", "index.html", "pairs.csv", "unmatched.csv"):
         assert (Path("after") / "report" / "compare-before" / name).is_file()
+
+
+def test_alerts_of_fault_free_runs_are_named(
+    cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whichever run has them: the terminal, the page and the Markdown say so beside their tables."""
+    note = "Not every alert is a fault's doing: fault-free runs raise fcw in A."
+    monkeypatch.setattr(mutator.Run, "alerts_note", lambda run: note if run.path.name == "after" else "")
+    answer = cli("compare", *runs, "--out", "c")
+    assert f"after: {note}" in " ".join(answer.out.split())
+    assert "before: Not every" not in answer.out
+    assert f"after: {note}" in (Path("c") / "COMPARISON.md").read_text()
+    assert "after: Not every alert" in (Path("c") / "index.html").read_text()
 
 
 def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
