@@ -1,17 +1,18 @@
 """Which difference between the readings makes faults of pictures hazardous: `python benchmarks/seeing.py`.
 
 The paper's text and its authors' code differ in how pictures are made and seen. This turns each difference
-on alone, then all of them, then all but one, on the reference plant, and counts the runs that end in a
-hazard. An effect is active from 1.5 s on, in every context that a scenario reaches. `--csv FILE` keeps every
-run.
+on alone and then all of them, on the reference plant, and counts the runs that end in a hazard: an effect at
+each level in every context that a scenario reaches. Where all of them together bring hazards, it also takes
+each difference out, and tries other thresholds of the detector as coded. `--csv FILE` keeps every run.
 """
 
 import argparse
 import csv
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
+from itertools import product
 from multiprocessing import Pool
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -35,25 +36,33 @@ from selfdrive.sim.truth import GroundTruth  # noqa: E402
 from selfdrive.sim.vision import Pictures  # noqa: E402
 from selfdrive.visiond import coded_detector  # noqa: E402
 from selfdrive.visiond.coded_detector import CodedDetector  # noqa: E402
-from selfdrive.visiond.detector import LaneLines, MirroredDetector, RoadLine, path_between  # noqa: E402
+from selfdrive.visiond.detector import (  # noqa: E402
+    LANE_WIDTH,
+    LaneLines,
+    MirroredDetector,
+    RoadLine,
+    path_between,
+)
 from selfdrive.visiond.paper_detector import PaperDetector  # noqa: E402
 
-Parts = frozenset[str]
-LATCHING, REDRAWING, MARKS, RIM = "latching", "redrawing", "marks", "rim"
-CLUSTERS, MISSING, PATH, MOVE, LABELS = "clusters", "missing line", "path", "move", "labels"
+ARMING, LATCHING, REDRAWING, MARKS, RIM = "arming", "latching", "redrawing", "marks", "rim"
+PLACE, CLUSTERS, MISSING, PATH = "place", "clusters", "missing line", "path"
+MOVE, LABELS = "move", "labels"
 DIFFERENCES = {
+    ARMING: "triggers are armed from the start, not from 1.5 s on",
     LATCHING: "an effect stays to the end of the run",
-    REDRAWING: "every picture is drawn anew",
-    MARKS: "streaks, fog and flakes as coded; effects on the recorded picture, before it is moved",
+    REDRAWING: "every picture is drawn anew; without it marks as coded stand still",
+    MARKS: "streaks, fog and flakes as coded",
     RIM: "occlusion by black blobs with a gray rim, instead of soft dark ones",
+    PLACE: "effects are drawn before the picture is moved to where the car is",
     CLUSTERS: "the detector as coded: windows, edges and clusters",
     MISSING: "a line that is not seen is sent as 8 m to the left, with full confidence",
     PATH: "the path is straight ahead, with full confidence",
     MOVE: "the picture moves as a whole, and shows 64 % of the way",
     LABELS: "left and right are swapped in the picture and for the controller",
 }
-NONE, ALL = frozenset[str](), frozenset(DIFFERENCES)
-ARMED_FROM = 1.5  # s
+ARMED_FROM = 1.5  # s, without ARMING
+THRESHOLDS = 2.0, 3.0  # beside the detector's own
 SAFE_HEADWAY = 2.0  # s
 CONTEXTS: dict[str, Callable[[float, float], bool]] = {  # of headway time and of how much slower the lead is
     "C1": lambda hwt, slower: hwt <= SAFE_HEADWAY and slower <= 0.0,
@@ -70,15 +79,23 @@ KINDS: dict[str, tuple[type[Effect], type[Effect]]] = {  # as described, as code
     "brightness": (effects.Brightness, effects.Brightness),
     "blur": (effects.AveragingBlur, effects.AveragingBlur),
 }
-DRAWINGS = 20  # of an effect as described, from which each picture has one where it is drawn anew
+DRAWINGS = 20  # of an effect as described: drawn anew, each picture has the next of these
 CYCLE = 0.05  # s between pictures
 FRAMES = "SEEING_FRAMES"  # variable with the folder in which runs share the frames that they draw
+
+
+class Row(NamedTuple):
+    """A line of the table: the differences that are on, and from where on the coded detector sees a mark."""
+
+    name: str
+    parts: frozenset[str]
+    threshold: float = coded_detector.THRESHOLD
 
 
 class Case(NamedTuple):
     """A run; `effect` "" is the fault-free one."""
 
-    parts: Parts
+    row: Row
     scenario: str
     context: str = ""
     effect: str = ""
@@ -93,13 +110,25 @@ class Ending(NamedTuple):
     alert: bool
 
 
+ALL = Row("all: as coded", frozenset(DIFFERENCES))
+FIRST = [
+    Row("none: as described", frozenset()),
+    *(Row(f"{name} alone", frozenset({name})) for name in DIFFERENCES),
+    ALL,
+]
+THEN = [
+    *(Row(f"all but {name}", ALL.parts - {name}) for name in DIFFERENCES),
+    *(Row(f"all, threshold {value:g}", ALL.parts, value) for value in THRESHOLDS),
+]
+
+
 class TrueLabels(ReferencePlant):
     """The reference plant, whose pictures show which side the car is on."""
 
     mirrors = False
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """All there is."""
+        """The car where it is."""
         return truth
 
 
@@ -109,39 +138,36 @@ class FaultyCamera(PictureCamera):
     def __init__(self, camera: PictureCamera, case: Case) -> None:
         self._geometry, self._library, self._move = camera._geometry, camera._library, camera._move
         self.model = camera.model
-        self._case, self._active, self.reached = case, False, NONE
-        if MOVE in case.parts:
+        self._case, self._parts = case, case.row.parts
+        self._active, self.reached = False, frozenset[str]()
+        if MOVE in self._parts:
             self._move = CodedView()
 
     def look(self, truth: GroundTruth) -> CameraView:
         """The view at this moment."""
-        case = self._case
         self._update(truth)
         frame = self._library.frame(truth.t, truth.position)
-        if self._active and MARKS in case.parts:
+        if self._active and PLACE in self._parts:
             frame = self._affected(frame, truth)
         picture = self._move.seen(frame, truth.lateral_offset, truth.heading)
-        if self._active and MARKS not in case.parts:
+        if self._active and PLACE not in self._parts:
             picture = self._affected(picture, truth)
         return self._geometry.look(truth)._replace(picture=picture)
 
     def _update(self, truth: GroundTruth) -> None:
-        if truth.t >= ARMED_FROM:
+        if ARMING in self._parts or truth.t >= ARMED_FROM:
             slower = truth.v_ego - truth.v_lead
             here = frozenset(name for name, holds in CONTEXTS.items() if holds(truth.hwt, slower))
             self.reached |= here
-            self._active = self._case.context in (self.reached if LATCHING in self._case.parts else here)
+            self._active = self._case.context in (self.reached if LATCHING in self._parts else here)
 
     def _affected(self, picture, truth: GroundTruth):
-        case = self._case
-        redrawn, number = REDRAWING in case.parts, round(truth.t / CYCLE)
-        coded = (RIM if case.effect == "occlusion" else MARKS) in case.parts
-        effect = drawing(
-            case.effect, case.level, coded, number % DRAWINGS if redrawn and not coded else 0, self.model
-        )
-        if coded and not redrawn:  # these are drawn for a time
-            return effect.apply(picture, Moment(0.0, truth.position, truth.v_ego))
-        return effect.apply(picture, truth)
+        case, redrawn = self._case, REDRAWING in self._parts
+        coded = (RIM if case.effect == "occlusion" else MARKS) in self._parts
+        number = round(truth.t / CYCLE) % DRAWINGS if redrawn and not coded else 0
+        effect = drawing(case.effect, case.level, coded, number, self.model)
+        moment = Moment(0.0, truth.position, truth.v_ego) if coded and not redrawn else truth
+        return effect.apply(picture, moment)
 
 
 @cache
@@ -155,39 +181,47 @@ def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel
 class MixedDetector:
     """The detector of either reading, with the other one's way to tell a missing line and the path."""
 
-    def __init__(self, parts: Parts, camera: CameraModel) -> None:
-        self._parts = parts
-        self._detector = (CodedDetector if CLUSTERS in parts else PaperDetector)(camera)
+    def __init__(self, row: Row, camera: CameraModel) -> None:
+        self._parts = row.parts
+        coded = CLUSTERS in row.parts
+        self._detector = CodedDetector(camera, row.threshold) if coded else PaperDetector(camera)
         inward = coded_detector.INWARD
-        self._nowhere = tuple(
-            coded_detector.metres(coded_detector.MISSING + side) for side in (inward, -inward)
-        )
+        self._nowhere = [coded_detector.metres(coded_detector.MISSING + side) for side in (inward, -inward)]
+        self._last = [RoadLine(y=side * LANE_WIDTH) for side in (0.5, -0.5)]
 
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in this view."""
-        left, right, path = self._detector.detect(view)
-        left, right = (
-            self._told(*one) for one in zip((left, right), self._nowhere, (1.85, -1.85), strict=True)
-        )
-        path = RoadLine(y=0.0) if PATH in self._parts else path_between(left, right)
-        return LaneLines(left, right, path)
+        lines = list(self._detector.detect(view)[:2])
+        if CLUSTERS in self._parts and MISSING not in self._parts:
+            lines = [self._unseen(*pair) for pair in enumerate(lines)]
+        if MISSING in self._parts and CLUSTERS not in self._parts:
+            lines = self._sent(lines)
+        path = RoadLine(y=0.0) if PATH in self._parts else path_between(*lines)
+        return LaneLines(*lines, path)
 
-    def _told(self, line: RoadLine, nowhere: float, expected: float) -> RoadLine:
-        if MISSING in self._parts:
-            return RoadLine(y=nowhere) if line.prob == 0.0 else line
-        return RoadLine(y=expected, prob=0.0) if line.y == nowhere else line
+    def _unseen(self, side: int, line: RoadLine) -> RoadLine:
+        """The line, without probability where the detector as coded has no cluster."""
+        return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
+
+    def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:
+        """The lines with one that is missing 8 m to the left; if none is seen, the last ones."""
+        if any(line.prob > 0.0 for line in lines):
+            pairs = zip(lines, self._nowhere, strict=True)
+            self._last = [line if line.prob > 0.0 else RoadLine(y=nowhere) for line, nowhere in pairs]
+        return self._last
 
 
 def drive(case: Case) -> tuple[Case, Ending]:
     """Run a case."""
     cv2.setNumThreads(1)
-    simulator.PLANTS[REFERENCE] = ReferencePlant if LABELS in case.parts else TrueLabels
+    labels = LABELS in case.row.parts
+    simulator.PLANTS[REFERENCE] = ReferencePlant if labels else TrueLabels
     scenario = load_scenario(ROOT / "fault_library" / "scenarios" / f"{case.scenario}.yaml")
     run = simulator.Simulator()
     run.reset(on_plant(scenario, REFERENCE), 1, Pictures(cache=Path(os.environ[FRAMES])))
     run._camera = camera = FaultyCamera(run._camera, case)
-    detector = MixedDetector(case.parts, camera.model)
-    run.manager.visiond._detector = MirroredDetector(detector) if LABELS in case.parts else detector
+    detector = MixedDetector(case.row, camera.model)
+    run.manager.visiond._detector = MirroredDetector(detector) if labels else detector
     while not run.done:
         run.step()
     record = run.result().record
@@ -195,39 +229,29 @@ def drive(case: Case) -> tuple[Case, Ending]:
     return case, Ending(camera.reached, hazards[0][1] if hazards else "", bool(record["alerts"]))
 
 
-def cases(free: dict[Case, Ending], levels: Sequence[int]) -> Iterator[Case]:
-    """What to drive, given the fault-free runs. All but one is tried where there are hazards at all."""
+def faulty(free: dict[Case, Ending], names: Iterable[str], levels: Sequence[int]) -> Iterator[Case]:
+    """The runs with these effects, given the fault-free ones."""
     for golden, ending in free.items():
-        some = 1 < len(golden.parts) < len(ALL)
-        names = [name for name in KINDS if not some or name in ("rain", "snow", "occlusion", "contrast")]
-        for context in sorted(ending.reached):
-            yield from (
-                golden._replace(context=context, effect=name, level=level)
-                for name in names
-                for level in levels
-            )
+        for context, name, level in product(sorted(ending.reached), names, levels):
+            yield golden._replace(context=context, effect=name, level=level)
 
 
-def title(parts: Parts) -> str:
-    """A row's name."""
-    if len(parts) > 1 and ALL - parts:
-        return "all but " + ", ".join(ALL - parts)
-    return "all: as coded" if parts else "none: as described"
-
-
-def report(runs: dict[Case, Ending], rows: Sequence[Parts]) -> None:
+def report(runs: dict[Case, Ending], rows: Sequence[Row]) -> None:
     """Markdown: for each row the hazards of each effect, and what its fault-free runs do."""
     print("| differences |", *(f"{name} |" for name in KINDS), "fault-free |")
     print("| --- |" + " --- |" * (len(KINDS) + 1))
-    for parts in rows:
-        name = next(iter(parts)) if len(parts) == 1 else title(parts)
+    for row in rows:
+        ends = {case: end for case, end in runs.items() if case.row == row}
         cells = []
         for effect in KINDS:
-            found = [end for case, end in runs.items() if case.parts == parts and case.effect == effect]
-            cells.append(f"{sum(map(bool, (end.hazard for end in found)))} of {len(found)}" if found else "")
-        free = [(case, end) for case, end in runs.items() if case.parts == parts and not case.effect]
-        told = [f"{case.scenario}: {end.hazard or 'alert'}" for case, end in free if end.hazard or end.alert]
-        print(f"| {name} |", *(f"{cell} |" for cell in cells), ", ".join(told) or "nothing", "|")
+            found = [bool(end.hazard) for case, end in ends.items() if case.effect == effect]
+            cells.append(f"{sum(found)} of {len(found)}" if found else "")
+        told = [
+            f"{case.scenario}: {' and '.join(filter(None, (end.hazard, end.alert and 'alert')))}"
+            for case, end in ends.items()
+            if not case.effect and (end.hazard or end.alert)
+        ]
+        print(f"| {row.name} |", *(f"{cell} |" for cell in cells), ", ".join(told) or "nothing", "|")
 
 
 def main() -> int:
@@ -239,22 +263,30 @@ def main() -> int:
     )
     parser.add_argument("--csv", type=Path, metavar="FILE", help="keep every run")
     options = parser.parse_args()
-    alone = [frozenset({name}) for name in DIFFERENCES]
-    rows = [NONE, *alone, ALL, *(ALL - one for one in alone)]
+    runs: dict[Case, Ending] = {}
     with TemporaryDirectory() as frames:
         os.environ[FRAMES] = frames
         with Pool(options.n) as pool:
-            golden = [Case(parts, scenario) for parts in rows for scenario in options.scenarios]
-            free = dict(pool.imap_unordered(drive, golden))
-            faulty = sorted(cases(free, options.levels), key=lambda case: rows.index(case.parts))
-            runs = free | dict(pool.imap(drive, faulty))
-    report(runs, rows)
+
+            def all_of(rows: Sequence[Row], names: Iterable[str]) -> None:
+                golden = [Case(row, scenario) for row in rows for scenario in options.scenarios]
+                free = dict(pool.imap(drive, golden))
+                runs.update(free)
+                runs.update(pool.imap(drive, faulty(free, names, options.levels)))
+
+            all_of(FIRST, tuple(KINDS))
+            bad = {case.effect for case, end in runs.items() if case.row == ALL and end.hazard}
+            all_of(THEN, [name for name in KINDS if name in bad])
+    print(f"Hazards at levels {options.levels}, in every context that is reached of {options.scenarios}.\n")
+    report(runs, [*FIRST, *THEN])
+    for name, about in DIFFERENCES.items():
+        print(f"{name}: {about}")
     if options.csv:
         with options.csv.open("w", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("differences", *Case._fields[1:], "hazard", "alert"))
+            writer.writerow(("row", *Case._fields[1:], "hazard", "alert"))
             for case, end in runs.items():
-                writer.writerow((" + ".join(sorted(case.parts)), *case[1:], end.hazard, end.alert))
+                writer.writerow((case.row.name, *case[1:], end.hazard, end.alert))
     return 0
 
 
