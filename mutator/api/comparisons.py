@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mutator._common.tables import Table
 from mutator.api.html import text_html
-from mutator.api.runs import Run, load_run
+from mutator.api.runs import Run, known_alerts_note, load_run
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Finding, Gate
@@ -36,7 +36,8 @@ class RunComparison:
         differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.differs]
         facts = Table(heads=("what differs", names.a, names.b), rows=differing).as_html()
         sheets = [text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:SHOWN]]
-        return text_html(self.summary) + facts + "".join(sheets)
+        remarks = "".join(map(text_html, self.comparison.remarks))
+        return text_html(self.summary) + remarks + facts + "".join(sheets)
 
     @property
     def summary(self) -> str:
@@ -104,16 +105,8 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     CheckFailed when the equivalence check of a run failed.
     """
     runs = [one if isinstance(one, Run) else load_run(one) for one in (a, b)]
-    first, second = map(_alerts_note, runs)
+    first, second = map(known_alerts_note, runs)
     return RunComparison(comparing.compare(runs[0].path, runs[1].path, only, (first, second)))
-
-
-def _alerts_note(run: Run) -> str:
-    """The run's note; empty where its target is unknown here."""
-    try:
-        return run.alerts_note()
-    except (MutatorError, KeyError):
-        return ""
 
 
 def _frame(pairs: Sequence[Pair]) -> "pd.DataFrame":

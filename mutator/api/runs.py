@@ -103,7 +103,9 @@ class Run:
         return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}{old}>"
 
     def _repr_html_(self) -> str:
-        return text_html(repr(self)) + facts_html(self.endings.items()) + str(self.counts().as_html())
+        note = known_alerts_note(self)
+        parts = text_html(repr(self)), facts_html(self.endings.items()), self.counts().as_html()
+        return "".join(map(str, (*parts, text_html(note) if note else "")))
 
     @property
     def path(self) -> Path:
@@ -275,6 +277,14 @@ class Run:
     def _traces(self) -> Traces:
         """Traces that are kept in the run folder, and those that are driven when needed."""
         return Traces(self.workspace, self.folder)
+
+
+def known_alerts_note(run: Run) -> str:
+    """The run's `alerts_note`; empty, too, where its target or its golden runs cannot be read here."""
+    try:
+        return run.alerts_note()
+    except (MutatorError, KeyError):
+        return ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -49,6 +49,10 @@ def test_alerts_of_fault_free_runs_are_named(
     assert "before: Not every" not in answer.out
     assert f"after: {note}" in (Path("c") / "COMPARISON.md").read_text()
     assert "after: Not every alert" in (Path("c") / "index.html").read_text()
+    before, after = map(mutator.load_run, runs)
+    assert "after: Not every alert" in mutator.compare(before, after)._repr_html_()
+    assert "Not every alert" in after._repr_html_()
+    assert "Not every alert" not in before._repr_html_()
 
 
 def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:

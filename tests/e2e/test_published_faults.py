@@ -59,3 +59,28 @@ def test_hazards_and_alerts_are_those_of_the_original(
     assert {row["alerts"] for row in found} == {alerts}
     if t_alert is not None:
         assert float(found[0]["t_alert"]) == pytest.approx(t_alert, abs=0.05)
+
+
+# The lanes of the original's simulator are swapped. Source: its runs of the authors' files 14 (value 1) and
+# 16 (value 2); the campaign's first right lane and second large steering error come next to these.
+SWAPPED = {
+    ("path_model", "right", "-2.01"): {"t_h1": 14.79, "t_h3": 11.75, "t_alert": 7.745},
+    ("steer", "angle", "-32.89"): {"t_h3": 13.0},
+}
+
+
+def test_faults_that_see_the_swapped_lanes(tmp_path: Path) -> None:
+    """A right lane that drifts and a steering angle that is off do what they did there, within 0.1 s."""
+    workspace, out = Workspace.find(root=Path(__file__).parents[2]), tmp_path / "run"
+    values = " or ".join(
+        f'(fault_type == "{kind}" and variant == "{variant}" and value == {value})'
+        for kind, variant, value in SWAPPED
+    )
+    choices = Choices(only=f'trigger == "close" and ({values})')
+    assert run_campaign(workspace, "published_s1", out, workers=2, choices=choices).exit_code == 0
+    rows = {
+        (r["fault_type"], r["variant"], r["value"]): r for r in csv.DictReader((out / "results.csv").open())
+    }
+    assert rows.keys() == SWAPPED.keys()
+    for fault, times in SWAPPED.items():
+        assert {name: float(rows[fault][name]) for name in times} == pytest.approx(times, abs=0.1)

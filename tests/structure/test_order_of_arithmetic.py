@@ -55,19 +55,22 @@ def found(source: str) -> Iterator[str]:
     """Expressions whose order or last digits depend on Python or processor."""
     for node in ast.walk(ast.parse(source)):
         is_product = isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult)
-        if is_product or (isinstance(node, ast.Call) and _is_unordered(node)):
+        by_name = isinstance(node, ast.ImportFrom) and node.module in {"numpy", "numpy.linalg"}
+        if is_product or by_name or (isinstance(node, ast.Call) and _is_unordered(node)):
             yield ast.unparse(node)
 
 
 def _is_unordered(call: ast.Call) -> bool:
     function = call.func
     if isinstance(function, ast.Name):
-        return function.id in {"sum", "sumprod"}
+        return function.id in {"sum", "sumprod", "fmean"}
     if not isinstance(function, ast.Attribute):
         return False
     path = ast.unparse(function).split(".")
     if path[-1] in SORTS:
         return not any(word.arg == "kind" and ast.unparse(word.value) == "'stable'" for word in call.keywords)
+    if path[-1] in {"sumprod", "fmean"}:
+        return True
     if path[0] in {"np", "numpy"}:
         return bool({*path[1:]} & (PRODUCTS | FUNCTIONS | UNORDERED))
     return path[-1] == "dot" or path in (["cv2", name] for name in ("exp", "log", "pow", "gemm", "solve"))
@@ -98,6 +101,9 @@ def test_results_depend_on_no_order() -> None:
         "a = b.argsort()",
         "a = np.argpartition(b, 3)",
         "a = cv2.exp(b)",
+        "a = math.sumprod(b, c)",
+        "a = statistics.fmean(b)",
+        "from numpy import dot",
     ],
 )
 def test_such_a_line_is_found(line: str) -> None:

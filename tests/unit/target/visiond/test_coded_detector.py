@@ -112,7 +112,7 @@ def test_edges_are_crests_down_the_picture() -> None:
 
 
 def test_clusters_are_what_pixels_lead_to() -> None:
-    """A bridge of single pixels joins two crowds; the nearest cluster of 30 points to the middle counts."""
+    """A bridge of single pixels joins two crowds, which are apart without it."""
     crowd = np.argwhere(np.ones((8, 8), bool))
     beyond = crowd + np.array([0, 38])
     chain = np.column_stack((np.full(30, 4), np.arange(8, 38)))

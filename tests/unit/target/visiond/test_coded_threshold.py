@@ -1,7 +1,7 @@
 """The threshold of the detector as coded, found on few pictures."""
 
 import pytest
-from selfdrive.visiond import coded_threshold
+from selfdrive.visiond import coded_detector, coded_threshold
 
 
 @pytest.fixture(autouse=True)
@@ -20,10 +20,23 @@ def test_the_least_marks_all_and_the_largest_none() -> None:
     assert found[0][2] == 1.0
 
 
-def test_the_middle_of_those_that_will_do_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    """One that marks more than it may is out, however well it reads."""
+def test_the_middle_of_those_that_will_do_is_printed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One that marks more than it may is out, however well it reads; so are those that misread more."""
+    rows = [(1.0, 0.004, 0.0), (2.0, 0.003, 0.1), (3.0, 0.002, 0.02), (4.0, 0.001, 0.02), (5.0, 0.0, 0.02)]
+    monkeypatch.setattr(coded_threshold, "thresholds", lambda: rows)
     coded_threshold.main()
-    *rows, chosen = capsys.readouterr().out.splitlines()
-    assert len(rows) == 5
-    assert float(chosen) in {3.5, 4.0, 4.5, 50.0}
-    assert rows[0].startswith("-50.00: 100.00% of the windows inside the lane marked, 100.0%")
+    *told, chosen = capsys.readouterr().out.splitlines()
+    assert (len(told), chosen) == (5, "4.00")
+    assert told[0] == " 1.00: 0.40% of the windows inside the lane marked, 0.0% of the pictures off"
+
+
+@pytest.mark.slow
+def test_the_threshold_is_the_one_that_is_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Who changes net, road or rule finds the number anew."""
+    monkeypatch.undo()
+    coded_threshold.main()
+    assert float(capsys.readouterr().out.splitlines()[-1]) == coded_detector.THRESHOLD
