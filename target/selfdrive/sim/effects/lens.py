@@ -30,7 +30,7 @@ class PaperOcclusion(_OnLens):
     """Dark, blurred, round blobs in random places below the horizon, as many as the amount says, of 5 to 50
     pixels' radius.
 
-    On the sky, where the text does not rule them out, they would hide nothing that counts.
+    The paper's text puts them anywhere; on the sky they would hide nothing that counts.
     """
 
     UNIT, LEAST, MOST, WHOLE = "blobs", 1, 10, True

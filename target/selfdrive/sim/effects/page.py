@@ -74,8 +74,8 @@ the one `as_coded`. The tables give means over {seeds} seeds and {pictures} pict
 ## What a level of the paper's effects stands for
 
 The paper's text counts streaks, blocks and blobs and gives contrasts, but does not say how bad a weather that
-is. What it leaves open (how long streaks are, how many blocks there are, where blobs lie) is settled by what
-a level stands for:
+is. What it leaves open (how long streaks are, how many blocks there are) is settled by what a level stands
+for; in one thing, where blobs lie, the effects here depart from it:
 
 * Rain: a streak is a drop of 1 mm or more within 2.2 m, so the rate follows from Marshall's and Palmer's
   (1948) number of drops in what the camera sees of that. A streak is as long as such a drop falls (6 m/s;
@@ -89,7 +89,9 @@ a level stands for:
   (1924).
 * Range: the meteorological one, at which 5 % of the contrast is left; in rain and snow after their extinction
   (Halder and others, 2019; ITU-R P.1814). The text's contrasts of rain and snow are worse than that.
-* Occlusion: dirt that hides the sky hides nothing that counts, so blobs lie below the horizon.
+* Occlusion: the text puts blobs anywhere in the picture. Here they lie below the horizon, as dirt that hides
+  the sky hides nothing that counts. Up to four blobs mostly miss the lane; from five on, a level stands for
+  the share of the lane's inside that is covered, in the table below.
 
 {stands_for}
 """
