@@ -1,8 +1,8 @@
 """What a step of the radar's relative speed does to the lead's history and to the collision warning.
 
 In the original a distance that jumps by more than 2.5 m, or a lead that was gone, begins everything anew. A
-relative speed that jumps begins nothing anew, unless the plan cannot follow it. Source: rules measured on
-openpilot v0.4.2.
+relative speed that jumps begins nothing anew, unless the plan cannot follow it. These rules were measured on
+openpilot v0.4.2; how many cycles they take here follows from them and from this controller.
 """
 
 from typing import NamedTuple

@@ -144,7 +144,7 @@ def test_pictures_show_no_curves():
         build_vision(Pictures(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
 
 
-@pytest.mark.parametrize("translation", [GROUND, SHIFT])
+@pytest.mark.parametrize("translation", [GROUND, SHIFT, CODED])
 @CAMERAS
 def test_a_part_is_that_of_the_whole_view(model, translation, truth):
     """Of a moved frame whatever is cut out, to any row and column, has the bytes that all of it has there."""

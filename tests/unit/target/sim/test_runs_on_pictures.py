@@ -19,8 +19,8 @@ from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main, simulate, write
-from selfdrive.sim.scenario import load_scenario
-from selfdrive.sim.vision import GROUND, PAPER, ROBUST, SHIFT, Pictures
+from selfdrive.sim.scenario import REFERENCE, STANDARD, load_scenario, on_plant
+from selfdrive.sim.vision import AS_CODED, CODED, GROUND, PAPER, ROBUST, SHIFT, Pictures
 from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
 
 CALIBRATION = f"""\
@@ -100,7 +100,7 @@ def test_the_loop_closes_through_the_picture(
     assert result.record["pictures"]["translation"] == translation
 
 
-@pytest.mark.parametrize("detector", [PAPER, ROBUST])
+@pytest.mark.parametrize("detector", [PAPER, ROBUST, AS_CODED])
 def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
     """From fair weather into rain, trace and record are the same whatever is in the cache, also damaged or
     not to be had; and a run whose pictures are all known looks at none.
@@ -211,3 +211,22 @@ def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, t
         assert set(result.record["hazards"].values()) == {None}
         assert "steer_saturated" not in {alert["name"] for alert in result.record["alerts"]}
         assert np.abs(result.trace["lateral_offset"]).max() < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plant", "translation", "alerting", "aside"),
+    [(STANDARD, GROUND, set(), 0.2), (REFERENCE, CODED, {"S2", "S4"}, 0.6)],
+)
+def test_fault_free_runs_seen_as_coded(scenarios, tmp_path_factory, plant, translation, alerting, aside):
+    """They end without a hazard on either plant; on the reference plant two raise *steer saturated*."""
+    cache = tmp_path_factory.getbasetemp() / "pictures"
+    pictures = Pictures(detector=AS_CODED, translation=translation, cache=cache)
+    found = set()
+    for name in ("S1", "S2", "S3", "S4", "S5"):
+        result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0, pictures)
+        assert set(result.record["hazards"].values()) == {None}
+        assert np.abs(result.trace["lateral_offset"]).max() < aside
+        if "steer_saturated" in {alert["name"] for alert in result.record["alerts"]}:
+            found.add(name)
+    assert found == alerting
