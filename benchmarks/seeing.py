@@ -261,6 +261,7 @@ def main() -> int:
     parser.add_argument(
         "--levels", type=int, nargs="+", choices=range(1, 11), default=[5, 10], metavar="LEVEL"
     )
+    parser.add_argument("--effects", nargs="+", choices=KINDS, default=list(KINDS), metavar="NAME")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="keep every run")
     options = parser.parse_args()
     runs: dict[Case, Ending] = {}
@@ -274,9 +275,9 @@ def main() -> int:
                 runs.update(free)
                 runs.update(pool.imap(drive, faulty(free, names, options.levels)))
 
-            all_of(FIRST, tuple(KINDS))
+            all_of(FIRST, options.effects)
             bad = {case.effect for case, end in runs.items() if case.row == ALL and end.hazard}
-            all_of(THEN, [name for name in KINDS if name in bad])
+            all_of(THEN, [name for name in options.effects if name in bad])
     print(f"Hazards at levels {options.levels}, in every context that is reached of {options.scenarios}.\n")
     report(runs, [*FIRST, *THEN])
     for name, about in DIFFERENCES.items():
