@@ -1,7 +1,7 @@
 """From what a user types to a workspace, a target, faults and triggers."""
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -108,7 +108,7 @@ class Bench:
         if not isinstance(given, str):
             check_number("trigger", given, least=0)
         armed = self.manifest.armed_after_s if armed_after_s is None else armed_after_s
-        return find_trigger(self.workspace, str(given), armed)
+        return find_trigger(self.workspace, str(given), armed, self.manifest.observation.variables)
 
 
 def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...]:
@@ -124,8 +124,11 @@ def context_tables(workspace: Workspace) -> tuple[ContextTable, ...]:
     return tuple(map(workspace.context_table, workspace.context_tables))
 
 
-def find_trigger(workspace: Workspace, text: str, armed_after_s: float) -> Trigger:
-    """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition."""
+def find_trigger(
+    workspace: Workspace, text: str, armed_after_s: float, variables: Collection[str]
+) -> Trigger:
+    """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition over
+    these variables."""
     tables = context_tables(workspace)
     named = [
         (table, row.id)
@@ -140,9 +143,10 @@ def find_trigger(workspace: Workspace, text: str, armed_after_s: float) -> Trigg
         )
     if named:
         table, row = named[0]
+        table.check(variables)
         return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
-        return read_trigger(text, armed_after_s)
+        return read_trigger(text, armed_after_s, variables)
     except MutatorError as e:
         contexts = ", ".join(row.id for table in tables for row in table.rows)
         raise MutatorError(

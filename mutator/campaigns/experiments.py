@@ -116,6 +116,7 @@ class Expansion:
         """One for each row of the context table; random times are drawn for the same rows, as their pairs."""
         with self._placed(("triggers", "table")):
             table = self.workspace.context_table(self.campaign.table)
+            table.check(self.manifest.observation.variables)
         with self._placed(("triggers", "rows")):
             return table.triggers(
                 hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.rows

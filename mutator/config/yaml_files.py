@@ -5,6 +5,7 @@ and aliases (a small file could unfold into gigabytes), one document a file, no 
 """
 
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -203,11 +204,14 @@ def _scalar(kind: str, text: str) -> Any:
     return text
 
 
-def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
+def read(
+    path: Path, model: type[M], schema: str, older: Mapping[str, Callable[[Source], Source]] | None = None
+) -> tuple[M, Source]:
     """Parse `path`, check its `schema: name/version` key against `schema`, validate the rest as `model`.
 
-    The schema key is not part of the model. A newer version, an unknown or doubled key, a wrong type
-    or a value out of range is a MutatorError with file, line, value, what was expected, and a remedy.
+    `older` has what makes a file of `schema` of one of an older schema. The schema key is not part of the
+    model. A newer version, an unknown or doubled key, a wrong type or a value out of range is a MutatorError
+    with file, line, value, what was expected, and a remedy.
     """
     source = load(path)
     if not isinstance(source.data, dict):
@@ -217,7 +221,10 @@ def read(path: Path, model: type[M], schema: str) -> tuple[M, Source]:
             expected="a mapping of keys to values",
             remedy="see docs",
         )
-    _check_schema(source, schema)
+    if older and source.data.get("schema") in older:
+        source = older[source.data["schema"]](source)
+    else:
+        _check_schema(source, schema)
     body = {key: value for key, value in source.data.items() if key != "schema"}
     try:
         return model.model_validate(body), source

@@ -5,28 +5,23 @@ Until then a mutant's run is the golden run, so its probe observes the same valu
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from types import CodeType
 
-from mutator.mutants.probe import Truth, decision, truth
+from mutator.mutants.probe import decision
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # looked up by identity: there are thousands
 class Observed:
     """What a probe observes in a golden run.
 
-    `values` are the observed values (OBSERVED) of each observation, `before` is the number of observations
-    before each step, `libraries` are the modules that the run imports on its way.
+    `values` are time and observed values of each observation, `before` is the number of observations before
+    each step, `libraries` are the modules that the run imports on its way.
     """
 
-    values: tuple[tuple[float, float, float, float], ...]
+    values: tuple[tuple[float, ...], ...]
     before: tuple[int, ...]
     libraries: tuple[str, ...] = ()
-
-    @cached_property
-    def truths(self) -> list[Truth]:
-        """What a condition is evaluated on, for each observation."""
-        return [truth(*values) for values in self.values]
 
     def step_of(self, observation: int) -> int:
         """The step in which that observation was made; none is made before the first step."""
@@ -59,7 +54,7 @@ def _without_texts(probe: CodeType) -> CodeType:
 @lru_cache(maxsize=64)  # faults share their triggers: contexts of the hazard analysis
 def _first_active(probe: CodeType, seen: Observed) -> Start | None:
     armed_t, holds = decision(probe)
-    for number, values in enumerate(seen.truths):
+    for number, values in enumerate(seen.values):
         if values[0] >= armed_t and holds(*values):
             step = seen.step_of(number)
             done = seen.before[step]

@@ -34,7 +34,6 @@ from mutator.model import Limits, Status
 from mutator.mutants.building import build
 from mutator.mutants.probe import probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.observation import OBSERVED
 from mutator.triggers.kinds import always
 
 _Key = tuple[str, int, tuple[str, ...]]
@@ -154,7 +153,7 @@ class ForkEngine:
             "probe": swap.probe,
             "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
             "probe_state": state_after(start.observed, start.began, start.t),
-            "watch": OBSERVED if watch else (),
+            "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}

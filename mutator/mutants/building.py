@@ -129,7 +129,7 @@ def _probe(
             expected="that name free for the probe",
             remedy="rename the target's file, or point the manifest at the original tree",
         )
-    values = template_values(mutant_id, trigger, hold, ids)
+    values = template_values(mutant_id, trigger, hold, ids, manifest.observation, manifest.step_s)
     return render(models.probe, values, models.folder / PROBE_TEMPLATE)
 
 

@@ -16,14 +16,13 @@ from mutator._common.hashing import content_id
 from mutator.config.locations import PROBE_NAME
 from mutator.errors import MutatorError
 from mutator.model import Activation, Hold, Injection, Trigger
-from mutator.triggers.conditions import check_condition, to_code
+from mutator.targets.observation import Observation
+from mutator.triggers.conditions import TIME, check_condition, to_code
 
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
 # in quotes, in a name or in a tag: a number of eight digits is none
 INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
-
-Truth = tuple[float, ...]
 
 _MARK = "# fi:"
 _TAG = rf"{_MARK}([0-9a-z]+)(?: guard:(\d+))?"
@@ -40,7 +39,7 @@ _SETTING = re.compile(
     r'|^\+HOLD = "(?P<hold>\w+)"$'
     r"|^\+HOLD_S = (?P<hold_s>.+)$"
     r"|^\+ARMED_AFTER_S = (?P<armed_after_s>.+)$"
-    r"|^\+def _condition\(.*\n\+    return (?P<condition>.+)$",
+    r"|^\+def _condition\(.*\n(?:\+    \w+ = .*\n)*\+    return (?P<condition>.+)$",
     re.MULTILINE,
 )
 
@@ -66,14 +65,27 @@ def injection_id(index: int, injection: Injection) -> str:
 
 
 def template_values(
-    mutant: str, trigger: Trigger, hold: Hold, injections: Sequence[str]
+    mutant: str,
+    trigger: Trigger,
+    hold: Hold,
+    injections: Sequence[str],
+    observation: Observation,
+    step_s: float,
 ) -> dict[str, object]:
-    """What the probe's template is rendered with; MutatorError for a hold time that is missing."""
+    """What the probe's template is rendered with; MutatorError for a hold time that is missing, and for a
+    condition over what the target does not observe."""
     if hold is Hold.FOR and trigger.hold_s is None:
         raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
+    names = [value.name for value in observation.values]
     return {
         "mutant": mutant,
-        "condition": to_code(check_condition(trigger.condition)),
+        "condition": to_code(check_condition(trigger.condition, variables=observation.variables)),
+        "values": names,
+        "variables": [TIME, *names],
+        "observed": [name for name, _ in observation.expressions],
+        "derived": [(value.name, to_code(value.text, number=True)) for value in observation.derived],
+        "counted": observation.time is None,
+        "step_s": float(step_s),
         "hold": hold.value,
         "hold_s": float(trigger.hold_s or 0.0),
         "armed_after_s": float(trigger.armed_after_s),
@@ -175,13 +187,8 @@ def _end_of_settings(patch: str, begin: int, end: int) -> int:
 # A probe at work
 
 
-def truth(t: float, d_rel: float, v_ego: float, v_lead: float) -> Truth:
-    """The values of a condition's variables: those observed, time headway (s) and closing speed (m/s)."""
-    return (t, d_rel, v_ego, v_lead, d_rel / v_ego if v_ego > 0.0 else math.inf, v_ego - v_lead)
-
-
 def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
-    """The time (s) from which a probe is armed, and its condition, to be called with a `truth`.
+    """The time (s) from which a probe is armed, and its condition, to be called with what it observes.
 
     A fault is first active where the probe is armed and the condition holds. Calling `observe` for every
     value instead takes almost four times as long.

@@ -6,18 +6,10 @@ from mutator._common.tables import Table
 from mutator.outcomes.columns import PLAN_COLUMNS, TIMINGS, Column, result_columns
 from mutator.reference.tables import generated
 from mutator.targets.manifest import Channel, TargetManifest
-from mutator.triggers.conditions import VARIABLES
+from mutator.targets.observation import variable_units
 from mutator.workspace import Workspace
 
 _ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
-OBSERVED = {
-    "t": ("s", "time of simulation"),
-    "d_rel": ("m", "distance to the vehicle ahead"),
-    "v_ego": ("m/s", "the car's own speed"),
-    "v_lead": ("m/s", "speed of the vehicle ahead"),
-    "hwt": ("s", "headway time, `d_rel / v_ego`; infinite at standstill"),
-    "rs": ("m/s", "relative speed, `v_ego - v_lead`: positive when closing in"),
-}
 
 
 def results(workspace: Workspace) -> str:
@@ -69,12 +61,6 @@ def channels(workspace: Workspace) -> str:
         "[manifest](target-manifest.md) says.\nInside everything is SI and radians; other units are "
         "for files and "
         "tables alone, and stand in the names there\n([units](fault-spec.md#units)).\n",
-        "## What triggers can ask\n",
-        "Ground truth, the same for every target; `hwt` and `rs` are derived.\n",
-        Table(
-            heads=("variable", "unit", "meaning"), rows=[(f"`{name}`", *OBSERVED[name]) for name in VARIABLES]
-        ).as_markdown(escape=False),
-        "",
     ]
     for manifest in manifests:
         parts += _target(manifest)
@@ -83,6 +69,11 @@ def channels(workspace: Workspace) -> str:
 
 def _target(manifest: TargetManifest) -> Iterator[str]:
     yield f"## {manifest.name}\n"
+    yield "Triggers and contexts can ask for:\n"
+    observed = variable_units(manifest.observation)
+    variables = [(f"`{name}`", *told) for name, told in observed.items()]
+    yield Table(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
+    yield ""
     yield (
         f"A trace is an array for each channel in `{manifest.trace_file}`, with a value for each step of "
         f"{manifest.step_s:g} s; `{manifest.time_channel}` is the time in s.\n"

@@ -16,7 +16,7 @@ from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
 from mutator.mutants.probe import INJECTION_ID, settings, tagged_additions
 from mutator.mutants.readable_diffs import adds_file, file_patches
-from mutator.triggers.conditions import VARIABLES
+from mutator.triggers.conditions import TIME, names_in
 
 Span = tuple[int, int, str]  # of a value in a patch: begin, end, name (empty: not known yet)
 
@@ -27,7 +27,6 @@ _NUMBER = (  # with its sign, and with that of a sum: `- 3.0`
     r"|float\('-?(?:nan|inf)'\))|(?<![\w.])(?:True|False)(?!\w)"
 )
 _VALUE = re.compile(rf"(?P<id>{INJECTION_ID})|{_NUMBER}")
-_VARIABLE = re.compile(rf"\b(?:{'|'.join(VARIABLES)})\b")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +102,7 @@ def without_values(patch: str) -> str:
 def group_label(fault: Fault, trigger: Trigger) -> str:
     """Where, what and when, in words without values; only mutants with one label can share a shape.
 
-    `selfdrive/sim/radar.py RadarSensor.measure after_assign d_rel: offset(by, target=d_rel); state, while`.
+    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap); state, while`.
     """
     when = f"{trigger_kind(trigger)}, {hold_of(fault, trigger).value}"
     return "; ".join((*map(injection_label, fault.injections), when))
@@ -129,7 +128,7 @@ def trigger_kind(trigger: Trigger) -> str:
     """`always`, `time` (a condition on the time alone) or `state` (anything else, like a context)."""
     if trigger.condition == "True":
         return "always"
-    return "time" if set(_VARIABLE.findall(trigger.condition)) == {"t"} else "state"
+    return "time" if names_in(trigger.condition) == (TIME,) else "state"
 
 
 def hold_of(fault: Fault, trigger: Trigger) -> Hold:

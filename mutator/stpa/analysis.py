@@ -15,7 +15,6 @@ from pydantic import Field
 from mutator._common.text import suggestion
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
-from mutator.triggers.conditions import VARIABLES
 
 _WIDEST = 100  # rows and columns of the drawing
 
@@ -181,11 +180,6 @@ def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[s
 
 
 def _check_structure(structure: StructureModel, source: Source) -> None:
-    for name, component in structure.components.items():
-        for variable, model in component.process_model.items():
-            if model.observed is not None:
-                at = ("components", name, "process_model", variable, "observed")
-                _known(source, at, "variable", model.observed, VARIABLES)
     _check_grid(structure, source)
     for name, link in structure.links.items():
         if name in structure.components:

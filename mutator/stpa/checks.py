@@ -10,7 +10,7 @@ from mutator.faults.specs import FaultSpec
 from mutator.stpa.analysis import Analysis, Category, FactorModel, UnsafeActionModel
 from mutator.stpa.context_tables import ContextRow
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import VARIABLES
+from mutator.triggers.conditions import names_in
 
 Specs = dict[str, FaultSpec]
 
@@ -28,6 +28,7 @@ def check_analysis(
     return [
         *_hazards(analysis),
         *_unobserved(analysis, manifest),
+        *_unknown_variables(analysis, manifest),
         *_unmodelled(analysis),
         *_categories(analysis),
         *_contradictions(analysis),
@@ -66,14 +67,27 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
             )
 
 
+def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
+    """Process models that name what the target does not observe."""
+    known = manifest.observation.variables
+    for name, component in analysis.structure.components.items():
+        for variable, model in component.process_model.items():
+            if model.observed is not None and model.observed not in known:
+                yield analysis.structure_source.error(
+                    ("components", name, "process_model", variable, "observed"),
+                    f"variable '{model.observed}'",
+                    expected=f"one that the target observes: {', '.join(known)}",
+                    remedy="correct the name" + suggestion(model.observed, list(known)),
+                )
+
+
 def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
     """Contexts that ask for a variable which no controller has in its process model."""
     models = [component.process_model for component in analysis.structure.components.values()]
     observed = {variable.observed for model in models for variable in model.values()}
     for table in analysis.tables.values():
         for row in table.rows:
-            names = {node.id for node in ast.walk(ast.parse(row.condition)) if isinstance(node, ast.Name)}
-            for name in sorted(names & set(VARIABLES) - observed):
+            for name in sorted(set(names_in(row.condition)) - observed):
                 yield table.source.error(
                     ("contexts", row.id, "when"),
                     f"context '{row.id}' asks for '{name}', which no process model has",

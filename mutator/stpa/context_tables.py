@@ -1,7 +1,7 @@
 """STPA as data: hazards and context tables, from which the guided triggers come."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.stpa.coverage import Coverage, measure_coverage
-from mutator.triggers.conditions import VARIABLES, check_condition
+from mutator.triggers.conditions import TIME, check_condition, names_in
 
 CONTEXT_SCHEMA = "context_table/1"
 HAZARDS_SCHEMA = "hazards/1"
@@ -48,6 +48,18 @@ class ContextTable:
     rows: tuple[ContextRow, ...]
     coverage: Coverage
     source: Source
+
+    def check(self, variables: Collection[str]) -> None:
+        """MutatorError, with its line, for a row that asks for what is not among the target's variables."""
+        for row in self.rows:
+            unknown = [name for name in names_in(row.condition) if name not in variables]
+            if unknown:
+                raise self.source.error(
+                    ("contexts", row.id, "when"),
+                    f"unknown name '{unknown[0]}' in '{row.condition}'",
+                    expected=f"what the target observes: {', '.join(variables)}",
+                    remedy="correct it, or add it to `observation` in the target's manifest",
+                )
 
     def triggers(
         self,
@@ -95,8 +107,7 @@ class _VerdictsModel(StrictModel, title="A verdict"):
 
 class _RowModel(StrictModel, title="A context"):
     when: str = Field(
-        description="A condition over `t` (s), `d_rel` (m), `v_ego`, `v_lead` (m/s), `hwt` (s), `rs` (m/s) "
-        "and the constants."
+        description="A condition over `t` (s), the values that the target observes, and the constants."
     )
     about: str = Field(description="What it is, in words.")
     actions: dict[str, _VerdictsModel] = Field(
@@ -134,7 +145,7 @@ def load_context_table(path: Path) -> ContextTable:
     """
     model, source = read(path, TableModel, CONTEXT_SCHEMA)
     for name in model.constants:
-        if not _CONSTANT.match(name) or name in VARIABLES:
+        if not _CONSTANT.match(name) or name == TIME:
             raise source.error(
                 ("constants", name), f"constant '{name}'", expected="a name of its own in small letters"
             )

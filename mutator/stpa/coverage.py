@@ -3,7 +3,7 @@
 Where every condition compares one observed variable with a constant, the constants cut each variable's line
 into points and open intervals, and no condition can tell two places of one cell apart. So it is enough to
 test one place of every cell, borders and the outermost cells (which reach to infinity) included. Variables
-are taken as independent of each other, though hwt and rs are made from others: a table that passes is right,
+are taken as independent of each other, though some may be made from others: a table that passes is right,
 one that is only right because of that dependence does not pass.
 """
 
@@ -13,14 +13,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise, product
 
-from mutator.triggers.conditions import VARIABLES, evaluate
+from mutator.triggers.conditions import evaluate
 
 MAX_TESTS = 400_000  # of a context in a cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """A piece of a variable's line: `value` lies in it, `text` says it (`hwt > 2.0`)."""
+    """A piece of a variable's line: `value` lies in it, `text` says it (`gap > 2.0`)."""
 
     value: float
     text: str
@@ -64,7 +64,7 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
 
 
 def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
-    """The constants each variable is compared with, variables in the order of VARIABLES."""
+    """The constants each variable is compared with."""
     found: dict[str, set[float]] = {}
     for condition in conditions:
         for node in ast.walk(ast.parse(condition, mode="eval")):
@@ -72,7 +72,7 @@ def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
                 for left, right in pairwise((node.left, *node.comparators)):
                     name, value = _cut(left, right)
                     found.setdefault(name, set()).add(value)
-    return {name: found[name] for name in VARIABLES if name in found}
+    return found
 
 
 def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:

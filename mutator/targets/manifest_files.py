@@ -9,8 +9,9 @@ from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.targets.manifest import Channel, Film, TargetManifest
 from mutator.targets.observation import ObservationModel, read_observation
+from mutator.targets.upgrade import OLD, upgraded
 
-SCHEMA = "target/1"
+SCHEMA = "target/2"
 
 
 class _ChannelModel(StrictModel, title="A channel"):
@@ -119,7 +120,7 @@ class ManifestModel(StrictModel, title="The file"):
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
-    model, source = read(path, ManifestModel, SCHEMA)
+    model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
     folder = (root or _root(path, model.root)).resolve()
     if not folder.is_dir():
         raise source.error(

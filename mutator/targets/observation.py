@@ -1,44 +1,92 @@
-"""Where a target's ground truth is observed, as its manifest has it."""
+"""What is observed of a target: values at one place in each step, and what follows from them."""
 
 import ast
+import keyword
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from pydantic import Field
 
 from mutator._common.text import shown
-from mutator.config.locations import AtModel, dotted_name
+from mutator.config.locations import PROBE_NAME, AtModel, dotted_name
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.errors import MutatorError
 from mutator.model import FaultLocation
 from mutator.targets.paths import inside
+from mutator.triggers.conditions import TIME, check_formula
 
-OBSERVED = ("t", "d_rel", "v_ego", "v_lead")
 _LONGEST = 1000  # characters of an expression
-_READING = (ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.UAdd, ast.USub, ast.Load)
+_READING = (
+    *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.Subscript, ast.Call),
+    *(ast.operator, ast.unaryop, ast.cmpop),
+)
+_FUNCTIONS = ("abs", "min", "max", "hypot", "float", "len")
+_TAKEN = ("abs", "min", "max", "hypot", "inf", TIME)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Observation:
-    """Where ground truth is observed, and the target's expressions for it.
+class Value:
+    """An observed value: `text` is an expression at the place, or, derived, a formula over the values before
+    it. `unit` is for tables, `-` for none.
+    """
 
-    `expressions` gives, for each of t, d_rel, v_ego, v_lead, an expression valid at the location.
+    name: str
+    text: str
+    unit: str
+    about: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observation:
+    """Where a target is observed. `time` is an expression for the time (s) at the place; None: steps are
+    counted.
     """
 
     location: FaultLocation
-    expressions: tuple[tuple[str, str], ...]
+    time: str | None
+    values: tuple[Value, ...]
+    derived: tuple[Value, ...]
+
+    @property
+    def expressions(self) -> tuple[tuple[str, str], ...]:
+        """What the target is asked for at the place: names, and expressions valid there."""
+        time = () if self.time is None else ((TIME, self.time),)
+        return (*time, *((value.name, value.text) for value in self.values))
+
+    @cached_property
+    def variables(self) -> tuple[str, ...]:
+        """What conditions may ask for: time, the observed values, the derived ones."""
+        return (TIME, *(value.name for value in (*self.values, *self.derived)))
+
+
+class _ValueModel(StrictModel, title="A value"):
+    is_: str = Field(alias="is", description="What it is, as an expression.")
+    unit: str = Field(description="Its unit, for tables; `-` for none.")
+    about: str = Field(description="What it means.")
 
 
 class ObservationModel(StrictModel, title="The observation"):
     """Where ground truth is read, once in each step: time goes on from one to the next, or starts again with
-    another run. Each value is a name or attribute that the place knows, a number, or a sum, difference or
-    product of these."""
+    another run."""
 
     at: AtModel = Field(description="The place; values are read there.")
-    t: str = Field(description="Time in s.")
-    d_rel: str = Field(description="Distance to the vehicle ahead in m.")
-    v_ego: str = Field(description="The car's own speed in m/s.")
-    v_lead: str = Field(description="Speed of the vehicle ahead in m/s.")
+    time: str | None = Field(
+        None,
+        description="Time in s, as an expression like those of values. Without it steps are counted: the "
+        "n-th observation is at (n - 1) times `step_s`, and a process cannot drive a second run.",
+    )
+    values: dict[str, _ValueModel] = Field(
+        default_factory=dict,
+        description="Name -> what is read at the place: names, attributes, items with constant keys, "
+        "numbers, arithmetic, comparisons, and calls of `abs`, `min`, `max`, `hypot`, `float`, `len`.",
+    )
+    derived: dict[str, _ValueModel] = Field(
+        default_factory=dict,
+        description="Name -> a formula over the values above it: arithmetic, `abs`, `min`, `max`, `hypot`, "
+        "`inf`, and a choice, `a if b > 0 else c`. Division by 0 is infinite or NaN, and no error.",
+    )
 
 
 def read_observation(model: ObservationModel, source: Source, root: Path) -> Observation:
@@ -50,18 +98,63 @@ def read_observation(model: ObservationModel, source: Source, root: Path) -> Obs
         raise source.error(
             ("observation", "at", "file"), error.got, expected=error.expected, remedy=error.remedy
         ) from None
-    expressions = []
-    for name in OBSERVED:
+    _check_names(model, source)
+    time = None if model.time is None else _read(model.time, source, ("observation", "time"))
+    values = tuple(
+        Value(
+            name=name,
+            text=_read(value.is_, source, ("observation", "values", name, "is")),
+            unit=value.unit,
+            about=value.about,
+        )
+        for name, value in model.values.items()
+    )
+    return Observation(
+        location=location, time=time, values=values, derived=_derived(model, source, [TIME, *model.values])
+    )
+
+
+def _check_names(model: ObservationModel, source: Source) -> None:
+    for key, names in (("values", model.values), ("derived", model.derived)):
+        for name in names:
+            good = name.isidentifier() and not keyword.iskeyword(name) and not name.startswith("_")
+            if not good or name in _TAKEN or (key == "derived" and name in model.values):
+                raise source.error(
+                    ("observation", key, name),
+                    f"'{name}'",
+                    expected=f"a name of letters, digits and _, once, none of {', '.join(_TAKEN)}",
+                    remedy="rename it",
+                )
+
+
+def _derived(model: ObservationModel, source: Source, known: list[str]) -> tuple[Value, ...]:
+    found = []
+    for name, value in model.derived.items():
         try:
-            expressions.append((name, _expression(getattr(model, name))))
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            text = check_formula(value.is_, known)
+        except MutatorError as error:
             raise source.error(
-                ("observation", name),
-                shown(getattr(model, name)),
-                expected="a local name or attribute, a number, or a sum, difference or product of them",
-                remedy="say where the value is at that statement",
+                ("observation", "derived", name, "is"),
+                error.got,
+                expected=error.expected,
+                remedy=error.remedy,
             ) from None
-    return Observation(location=location, expressions=tuple(expressions))
+        found.append(Value(name=name, text=text, unit=value.unit, about=value.about))
+        known.append(name)
+    return tuple(found)
+
+
+def _read(text: str, source: Source, keys: tuple[str, ...]) -> str:
+    try:
+        return _expression(text)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise source.error(
+            keys,
+            shown(text),
+            expected="names, attributes, items with constant keys, numbers, arithmetic, comparisons, and "
+            f"calls of {', '.join(_FUNCTIONS)}",
+            remedy="say where the value is at that statement",
+        ) from None
 
 
 def _expression(text: str) -> str:
@@ -70,8 +163,45 @@ def _expression(text: str) -> str:
         raise ValueError(text)
     tree = ast.parse(text.strip(), mode="eval").body
     for node in ast.walk(tree):
-        constant = isinstance(node, ast.Constant) and type(node.value) in (int, float)
-        name = isinstance(node, ast.Name | ast.Attribute) and dotted_name(ast.unparse(node))
-        if not (constant or name or isinstance(node, _READING)):
+        if isinstance(node, ast.Call):
+            known = isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS
+            if not known or node.keywords:
+                raise ValueError(text)
+        elif isinstance(node, ast.Subscript):
+            _check_constant(node.slice, text)
+        elif not _is_plain(node):
             raise ValueError(text)
-    return ast.unparse(tree)
+    return ast.unparse(_Hypot().visit(tree))
+
+
+def _check_constant(node: ast.expr, text: str) -> None:
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        node = node.operand
+    if not (isinstance(node, ast.Constant) and type(node.value) in (int, str)):
+        raise ValueError(text)
+
+
+def _is_plain(node: ast.AST) -> bool:
+    if isinstance(node, ast.Constant):
+        return type(node.value) in (int, float, str)
+    if isinstance(node, ast.Name):
+        return dotted_name(node.id)
+    if isinstance(node, ast.Attribute):
+        return dotted_name(node.attr)
+    return isinstance(node, _READING)
+
+
+class _Hypot(ast.NodeTransformer):
+    """The place need not know `hypot`; the probe does."""
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.func, ast.Name) and node.func.id == "hypot":
+            node.func = ast.Attribute(ast.Name(PROBE_NAME, ast.Load()), "hypot", ast.Load())
+        return node
+
+
+def variable_units(observation: Observation) -> Mapping[str, tuple[str, str]]:
+    """Unit and meaning of everything that a condition may ask for."""
+    values = (*observation.values, *observation.derived)
+    return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

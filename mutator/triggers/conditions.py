@@ -1,52 +1,78 @@
-"""Conditions over observed ground truth: checked, total, and never more than data.
+"""Conditions over observed values: checked, total, and never more than data.
 
-A condition has one canonical text (`hwt <= 2.0 and rs > 0.0`), which is what ids are made of. All numbers are
-floats, and division cannot raise, so a condition is True or False for every observation.
+A condition has one canonical text (`gap <= 2.0 and closing > 0.0`), which is what ids are made of. All
+numbers are floats, and division cannot raise, so a condition is True or False for every observation. A
+formula is a number in the same language; it can choose (`a / b if b > 0 else inf`).
 """
 
 import ast
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
 
 from mutator.errors import MutatorError
 
-VARIABLES = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
-_FUNCTIONS = ("abs", "min", "max")
+TIME = "t"  # s; every target has it
+_FUNCTIONS = ("abs", "min", "max", "hypot")
+_ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2)}  # at least, at most; any other takes two or more
+_NAMES = (*_FUNCTIONS, "inf", "True", "False")  # no variable is called so
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _MAX_LENGTH = 1000
-_ALLOWED = "comparisons, and/or/not, + - * /, abs/min/max, numbers, True, and " + ", ".join(VARIABLES)
+_ALLOWED = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, and "
 
 
-def check_condition(text: str, constants: Mapping[str, float] | None = None) -> str:
+def check_condition(
+    text: str, constants: Mapping[str, float] | None = None, variables: Collection[str] | None = None
+) -> str:
     """The condition in its one canonical text, constants replaced by their numbers.
 
-    Allowed: the variables, numbers, `True`, comparisons, and/or/not, + - * /, abs/min/max. Anything else
-    raises MutatorError (without place: the caller knows file and line).
+    Allowed: the variables (None: any name, to be checked when the target is known), numbers, `True`,
+    comparisons, and/or/not, + - * /, abs/min/max/hypot. Anything else raises MutatorError (without place: the
+    caller knows file and line).
     """
+    return _checked(text, constants or {}, variables, number=False)
+
+
+def check_formula(text: str, variables: Collection[str]) -> str:
+    """The formula in its one canonical text. Allowed is what `check_condition` allows inside a comparison,
+    `inf`, and a choice: `a if CONDITION else b`. Raises as it does.
+    """
+    return _checked(text, {}, variables, number=True)
+
+
+def _checked(
+    text: str, constants: Mapping[str, float], variables: Collection[str] | None, *, number: bool
+) -> str:
     try:
-        canonical = _Writer(text, constants or {}, divide="({} / {})").boolean(_parse(text))
-        _function(canonical)  # what the probe is given must be readable and compile too
+        writer = _Writer(text, constants, variables, divide="({} / {})")
+        canonical = writer.number(_parse(text)) if number else writer.boolean(_parse(text))
+        # what the probe is given must be readable and compile too
+        _function(canonical, names_in(canonical), number)
     except (SyntaxError, RecursionError, MemoryError):
-        raise _refuse("too much in one expression", text, "write it shorter") from None
+        raise _refuse("too much in one expression", text, variables, "write it shorter") from None
     return canonical
 
 
-def to_code(condition: str) -> str:
-    """Python source of a checked condition that cannot raise: division goes through the probe's `_div`."""
-    return _Writer(condition, {}, divide="_div({}, {})").boolean(_parse(condition))
+def names_in(text: str) -> tuple[str, ...]:
+    """The variables of a checked condition or formula, in the order in which they come."""
+    nodes = (node for node in ast.walk(_parse(text)) if isinstance(node, ast.Name))
+    found = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
+    return tuple(dict.fromkeys(node.id for node in found if node.id not in _NAMES))
+
+
+def to_code(text: str, *, number: bool = False) -> str:
+    """Python source of a checked condition (or formula) that cannot raise: division goes through the probe's
+    `_div`, and `math` must be there.
+    """
+    writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
+    return writer.number(_parse(text)) if number else writer.boolean(_parse(text))
 
 
 def evaluate(condition: str, values: Mapping[str, float]) -> bool:
-    """What the probe would decide for these values of `VARIABLES` (missing hwt and rs are derived)."""
-    known = dict(values)
-    if "rs" not in known and {"v_ego", "v_lead"} <= known.keys():
-        known["rs"] = known["v_ego"] - known["v_lead"]
-    if "hwt" not in known and {"v_ego", "d_rel"} <= known.keys():
-        known["hwt"] = known["d_rel"] / known["v_ego"] if known["v_ego"] > 0.0 else math.inf
-    arguments = [float(known.get(name, math.nan)) for name in VARIABLES]
-    return bool(_function(condition)(*arguments))
+    """What the probe would decide for these values of the variables; those that are missing are NaN."""
+    names = names_in(condition)
+    return bool(_function(condition, names, False)(*(float(values.get(name, math.nan)) for name in names)))
 
 
 def divide(a: float, b: float) -> float:
@@ -57,14 +83,17 @@ def divide(a: float, b: float) -> float:
 
 
 @lru_cache(maxsize=256)
-def _function(condition: str) -> Callable[..., object]:
-    source = f"lambda {', '.join(VARIABLES)}: {to_code(condition)}"
-    functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "_div": divide}
+def _function(text: str, names: tuple[str, ...], number: bool) -> Callable[..., object]:
+    source = f"lambda {', '.join(names)}: {to_code(text, number=number)}"
+    functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "math": math, "_div": divide}
     return eval(compile(source, "<condition>", "eval"), functions)  # type: ignore[no-any-return]
 
 
-def _refuse(what: str, condition: str, remedy: str = "rewrite the condition") -> MutatorError:
-    return MutatorError(f"{what} in condition {condition!r}", expected=_ALLOWED, remedy=remedy)
+def _refuse(
+    what: str, text: str, variables: Collection[str] | None, remedy: str = "rewrite it"
+) -> MutatorError:
+    known = "the target's observed values" if variables is None else ", ".join(variables)
+    return MutatorError(f"{what} in {text!r}", expected=_ALLOWED + known, remedy=remedy)
 
 
 def _parse(text: str) -> ast.expr:
@@ -73,16 +102,27 @@ def _parse(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise _refuse(f"{getattr(error, 'msg', error)}", text) from None
+        raise _refuse(f"{getattr(error, 'msg', error)}", text, None) from None
 
 
 class _Writer:
     """Writes a parsed condition back, refusing whatever is not on the list; booleans and numbers apart."""
 
-    def __init__(self, text: str, constants: Mapping[str, float], divide: str) -> None:
+    def __init__(
+        self,
+        text: str,
+        constants: Mapping[str, float],
+        variables: Collection[str] | None,
+        *,
+        divide: str,
+        infinity: str = "inf",
+        hypot: str = "hypot",
+    ) -> None:
         self.text = text
         self.constants = constants
+        self.variables = variables
         self.divide = divide
+        self.written = {"inf": infinity, "hypot": hypot}
 
     def boolean(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant) and isinstance(node.value, bool):
@@ -94,64 +134,74 @@ class _Writer:
             return f"not {self._boolean_operand(node.operand)}"
         if isinstance(node, ast.Compare):
             return self._compare(node)
-        raise _refuse(
-            f"{ast.unparse(node)!r} is no truth value", self.text, "compare it with something: hwt <= 2.0"
-        )
+        raise self._refuse(f"{ast.unparse(node)!r} is no truth value", "compare it with something: t <= 2.0")
+
+    def number(self, node: ast.expr) -> str:
+        """A formula: a number, or a choice between two."""
+        if isinstance(node, ast.IfExp):
+            return f"{self._term(node.body)} if {self.boolean(node.test)} else {self.number(node.orelse)}"
+        return self._term(node)
 
     def _boolean_operand(self, node: ast.expr) -> str:
         text = self.boolean(node)
         return f"({text})" if isinstance(node, ast.BoolOp) else text
 
     def _compare(self, node: ast.Compare) -> str:
-        parts = [self._number(node.left)]
+        parts = [self._term(node.left)]
         for operator, value in zip(node.ops, node.comparators, strict=True):
             if type(operator) not in _COMPARE:
-                raise _refuse(f"{ast.unparse(node)!r}", self.text)
-            parts += [_COMPARE[type(operator)], self._number(value)]
+                raise self._refuse(f"{ast.unparse(node)!r}")
+            parts += [_COMPARE[type(operator)], self._term(value)]
         return " ".join(parts)
 
-    def _number(self, node: ast.expr) -> str:
+    def _term(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant):
             return self._constant(node)
         if isinstance(node, ast.Name):
             return self._name(node.id)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
             sign = "-" if isinstance(node.op, ast.USub) else ""
-            return f"{sign}{self._number(node.operand)}"
+            return f"{sign}{self._term(node.operand)}"
         if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC:
-            left, right = self._number(node.left), self._number(node.right)
+            left, right = self._term(node.left), self._term(node.right)
             if isinstance(node.op, ast.Div):
                 return self.divide.format(left, right)
             return f"({left} {_ARITHMETIC[type(node.op)]} {right})"
         if isinstance(node, ast.Call):
             return self._call(node)
-        raise _refuse(f"{ast.unparse(node)!r}", self.text)
+        raise self._refuse(f"{ast.unparse(node)!r}")
 
     def _constant(self, node: ast.Constant) -> str:
         if isinstance(node.value, bool) or not isinstance(node.value, int | float):
-            raise _refuse(f"{node.value!r}", self.text)
+            raise self._refuse(f"{node.value!r}")
         try:
             number = float(node.value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise _refuse("a number too large", self.text)
+            raise self._refuse("a number too large")
         return repr(number)
 
     def _name(self, name: str) -> str:
-        if name in VARIABLES:
-            return name
         if name in self.constants:
             return repr(float(self.constants[name]))
+        if name == "inf":
+            return self.written["inf"]
+        if name not in _NAMES and (self.variables is None or name in self.variables):
+            return name
         remedy = (
             f"known constants here: {', '.join(self.constants)}" if self.constants else "check its spelling"
         )
-        raise _refuse(f"unknown name '{name}'", self.text, remedy)
+        raise self._refuse(f"unknown name '{name}'", remedy)
 
     def _call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if name not in _FUNCTIONS or node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
-            raise _refuse(f"a call of '{name}'", self.text)
-        if (len(node.args) != 1) if name == "abs" else (len(node.args) < 2):
-            raise _refuse(f"{name} with {len(node.args)} arguments", self.text)
-        return f"{name}({', '.join(self._number(a) for a in node.args)})"
+            raise self._refuse(f"a call of '{name}'")
+        least, most = _ARGUMENTS.get(name, (2, math.inf))
+        if not least <= len(node.args) <= most:
+            raise self._refuse(f"{name} with {len(node.args)} arguments")
+        return f"{self.written.get(name, name)}({', '.join(self._term(a) for a in node.args)})"
+
+    def _refuse(self, what: str, remedy: str = "rewrite it") -> MutatorError:
+        return _refuse(what, self.text, self.variables, remedy)

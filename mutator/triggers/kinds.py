@@ -4,7 +4,7 @@ A kind is a function that makes its triggers and, if people may type it, a reade
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from mutator._common.random_streams import generator
 from mutator.errors import MutatorError
@@ -46,27 +46,32 @@ def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: flo
     return round(frame * step_s, 9)
 
 
-def _read_always(text: str, armed_after_s: float) -> Trigger | None:
+def _read_always(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
     return always(armed_after_s=armed_after_s) if text == "always" else None
 
 
-def _read_time(text: str, armed_after_s: float) -> Trigger | None:
+def _read_time(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
     try:
         return at_time(float(text))
     except ValueError:
         return None
 
 
-def _read_condition(text: str, armed_after_s: float) -> Trigger:
-    return Trigger(name="condition", condition=check_condition(text), armed_after_s=armed_after_s)
+def _read_condition(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
+    condition = check_condition(text, variables=variables)
+    return Trigger(name="condition", condition=condition, armed_after_s=armed_after_s)
+
+
+_Reader = Callable[[str, float, Collection[str]], Trigger | None]
 
 
 # in this order; a reader returns None for what is not of its kind, and the last one raises MutatorError
-READERS: tuple[Callable[[str, float], Trigger | None], ...] = (_read_always, _read_time, _read_condition)
-TYPED = "a time in s, `always`, or a condition, e.g. 'hwt <= 2'"
+READERS: tuple[_Reader, ...] = (_read_always, _read_time, _read_condition)
+TYPED = "a time in s, `always`, or a condition, e.g. 't > 3'"
 
 
-def read_trigger(text: str, armed_after_s: float) -> Trigger:
-    """The trigger that somebody typed (`TYPED`); MutatorError for anything else."""
-    found = (reader(text, armed_after_s) for reader in READERS)
+def read_trigger(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
+    """The trigger that somebody typed (`TYPED`), over what the target observes; MutatorError for anything
+    else."""
+    found = (reader(text, armed_after_s, variables) for reader in READERS)
     return next(trigger for trigger in found if trigger is not None)

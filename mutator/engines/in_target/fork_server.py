@@ -203,7 +203,8 @@ class Process:
     def finish(self, job: dict[str, Any]) -> dict[str, Any]:
         """Drive the run to its end as the mutant; the report on it."""
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
-        probe, known = None, set(sys.modules) if job["watch"] else set()
+        watch = job["watch"]
+        probe, known = None, set() if watch is None else set(sys.modules)
         try:
             probe = swap.install(job["probe_name"], job["probe"])
             swap.swap_code(job["functions"], probe)
@@ -212,7 +213,7 @@ class Process:
             holder, state = job["probe_state"]  # what it would know had it been there from the beginning
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
-            seen = swap.keep_observations(probe, job["watch"]) if job["watch"] else None
+            seen = None if watch is None else swap.keep_observations(probe, holder, watch)
             run = self.begin(job["args"]) if self.run is None else self.run
             if seen is not None:
                 report |= {"seen": seen, "before": swap.observations_before_steps(run, seen)}

@@ -73,14 +73,15 @@ def _mangled(holder: Any, name: str) -> str:
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 
 
-def keep_observations(probe: Any, names: Sequence[str]) -> list[tuple[float, ...]]:
-    """Have the probe keep what it observes; the list that it fills with the values of these `names`."""
+def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
+    """Have the probe keep what it observes; the list that it fills with the time and the values of these
+    `names`. `holder` is the name of the object in which the probe keeps the time."""
     observe = probe.observe
     seen: list[tuple[float, ...]] = []
 
     def observe_and_keep(**values: Any) -> None:
-        seen.append(tuple(float(values[name]) for name in names))
         observe(**values)
+        seen.append((getattr(probe, holder).t, *(float(values[name]) for name in names)))
 
     probe.observe = observe_and_keep
     return seen

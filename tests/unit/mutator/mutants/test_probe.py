@@ -15,15 +15,16 @@ from mutator.errors import MutatorError
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.rendering import render
-from mutator.triggers.conditions import check_condition, evaluate, to_code
+from mutator.triggers.conditions import check_condition, evaluate
 from mutator.web import asset
 from mutator.workspace import Workspace
 
 
 def probe(clone: Workspace, condition: str = "rs > 0", **more: Any) -> Any:
     """A fresh probe module with two injections, `a` and `b`."""
-    values = {"mutant": "m1", "hold": "while", "hold_s": 0.0, "armed_after_s": 0.0, "injections": ("a", "b")}
-    values |= {"condition": to_code(check_condition(condition)), **more}
+    observation = clone.manifest("openpilot").observation
+    trigger = Trigger(name="test", condition=check_condition(condition))
+    values = contract.template_values("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1) | more
     module = types.ModuleType("_fi")
     models = clone.fault_models()
     exec(render(models.probe, values, models.folder / "_fi.py.j2"), module.__dict__)
@@ -147,7 +148,10 @@ def test_probe_and_planner_agree(clone: Workspace) -> None:
                 name: stream.choice([0.0, 1.0, 2.5, 20.0, 40.0]) for name in ("d_rel", "v_ego", "v_lead")
             }
             fi.observe(t=i * 0.01, **values)
-            assert fi.active("a") == evaluate(check_condition(condition), {"t": i * 0.01, **values})
+            speed, closing = values["v_ego"], values["v_ego"] - values["v_lead"]
+            hwt = values["d_rel"] / speed if speed else math.inf
+            known = {"t": i * 0.01, "hwt": hwt, "rs": closing, **values}
+            assert fi.active("a") == evaluate(check_condition(condition), known)
 
 
 def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
@@ -297,7 +301,8 @@ TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s
 def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
     """The text of a probe that is rendered as a mutant's is."""
     models = clone.fault_models()
-    values = contract.template_values("0123456789abcdef", trigger, trigger.hold, ("0a1b2c3d", "4e5f6071"))
+    observation, ids = clone.manifest("openpilot").observation, ("0a1b2c3d", "4e5f6071")
+    values = contract.template_values("0123456789abcdef", trigger, trigger.hold, ids, observation, 0.1)
     return render(models.probe, values, models.folder / "_fi.py.j2")
 
 
@@ -312,7 +317,7 @@ def test_the_decision_is_the_probes(clone: Workspace) -> None:
         values = (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0)
         module["_run"] = module["_Run"]()
         module["observe"](*values)
-        assert module["_run"].active == (values[0] >= armed_t and holds(*contract.truth(*values)))
+        assert module["_run"].active == (values[0] >= armed_t and holds(*values))
 
 
 def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
@@ -376,10 +381,18 @@ def test_settings_are_all_that_differs(clone: Workspace) -> None:
     }
 
 
-def test_a_hold_time_is_needed() -> None:
+def test_a_hold_time_is_needed(clone: Workspace) -> None:
     """A trigger that holds for a time must say how long."""
+    observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="holds for a time"):
-        contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, ())
+        contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
+
+
+def test_a_condition_asks_for_what_the_target_observes(clone: Workspace) -> None:
+    """Any other name is refused, and those that are known are listed."""
+    observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
+    with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
+        contract.template_values("m", trigger, Hold.WHILE, (), observation, 0.1)
 
 
 NEVER = {"first": None, "last": None, "count": 0}

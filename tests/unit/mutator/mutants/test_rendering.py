@@ -189,7 +189,8 @@ def test_values_keep_their_kind(
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     lines = snippet(models.get(name), given, "ab12")
-    settings = template_values("m", always(), Hold.WHILE, ("ab12",))
+    observation = clone.manifest("openpilot").observation
+    settings = template_values("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
     probe = types.ModuleType("_fi")
     exec(render(models.probe, settings, models.folder / "_fi.py.j2"), vars(probe))
     probe.observe(t=0.0, d_rel=1.0, v_ego=1.0, v_lead=1.0)

@@ -1,5 +1,6 @@
 """Context tables and hazards."""
 
+import math
 import re
 from pathlib import Path
 
@@ -30,9 +31,8 @@ def test_an_unknown_row(toy: Workspace) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("when: hwt <= safe_hwt_s", "when: hwt <= safe", "6: unknown name 'safe' in condition 'hwt <= safe'"),
         ("when: hwt <= safe_hwt_s", "when: hwt", "6: 'hwt' is no truth value"),
-        ("safe_hwt_s: 2.0", "rs: 2.0", "3: constant 'rs'; expected a name of its own"),
+        ("safe_hwt_s: 2.0", "t: 2.0", "3: constant 't'; expected a name of its own"),
         ("safe_hwt_s: 2.0", "safe_hwt_s: two", "3: 'two' for 'safe_hwt_s'; expected a number"),
         ("provided: H1,", "provided: 1,", "9: 1 for 'provided'; expected text"),
     ],
@@ -44,6 +44,17 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
     with pytest.raises(MutatorError) as caught:
         load_context_table(path)
     assert said in str(caught.value).replace(f"{path}:", "")
+
+
+def test_rows_ask_for_what_a_target_observes(toy: Workspace) -> None:
+    """A name that is neither a constant nor observed is told at its line, with those that are."""
+    path = toy.library / "stpa" / "contexts" / "pedals.yaml"
+    path.write_text(path.read_text().replace("when: hwt <= safe_hwt_s", "when: hwt <= safe", 1))
+    table, variables = load_context_table(path), toy.manifest("toy").observation.variables
+    with pytest.raises(
+        MutatorError, match=r"pedals.yaml:6: unknown name 'safe' in 'hwt <= safe'; .*: t, d_rel"
+    ):
+        table.check(variables)
 
 
 def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
@@ -63,7 +74,8 @@ def test_the_table_that_ships(clone: Workspace) -> None:
     for d_rel in (10.0, 40.0, 60.0, 200.0):
         for v_ego in (0.0, 10.0, 20.0, 30.0):
             for v_lead in (0.0, 10.0, 20.0, 30.0):
-                values = {"t": 1.0, "d_rel": d_rel, "v_ego": v_ego, "v_lead": v_lead}
+                hwt = d_rel / v_ego if v_ego else math.inf
+                values = {"hwt": hwt, "rs": v_ego - v_lead}
                 assert sum(evaluate(t.condition, values) for t in triggers) == 1
     cells = {
         (row.id, action): (v.provided, v.not_provided)

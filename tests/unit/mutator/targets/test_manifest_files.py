@@ -24,12 +24,31 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
 
 
 def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
-    """What a target does not hold as such is a sum, difference or product of what it holds, or a constant."""
+    """What a target does not hold as such is reckoned from names, attributes and items that it holds."""
     path = toy.library / "targets" / "toy.yaml"
-    text = path.read_text().replace("d_rel: now.gap", "d_rel: now.lead_x - (now.x + 4.5)")
-    path.write_text(text.replace("v_lead: now.lead_speed", "v_lead: '0.0'"))
+    text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
+    path.write_text(text.replace("is: now.lead_speed", "is: 'hypot(now.v[0], now.v[1]) > 3'"))
     expressions = dict(toy.manifest("toy").observation.expressions)
-    assert (expressions["d_rel"], expressions["v_lead"]) == ("now.lead_x - (now.x + 4.5)", "0.0")
+    assert expressions["d_rel"] == "now['lead'].x[-1] - (now.x + 4.5)"
+    assert expressions["v_lead"] == "_fi.hypot(now.v[0], now.v[1]) > 3"
+
+
+def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
+    """It observed the same four values for every target; errors name its lines."""
+    path = toy.library / "targets" / "toy.yaml"
+    before, text = toy.manifest("toy").observation, path.read_text()
+    head, _, rest = text.partition("  time: now.time")
+    tail = rest.partition("hazards:")[2]
+    old = "  t: now.time\n  d_rel: now.gap\n  v_ego: now.speed\n  v_lead: now.lead_speed\nhazards:"
+    path.write_text(head.replace("target/2", "target/1") + old + tail)
+    after = toy.manifest("toy").observation
+    assert after.expressions == before.expressions
+    assert [(v.name, v.text, v.unit) for v in after.derived] == [
+        (v.name, v.text, v.unit) for v in before.derived
+    ]
+    path.write_text(path.read_text().replace("now.gap", "now.gap()"))
+    with pytest.raises(MutatorError, match=r"toy.yaml:20: 'now.gap\(\)'; expected names, attributes"):
+        toy.manifest("toy")
 
 
 def test_arguments(toy: Workspace) -> None:
@@ -122,15 +141,19 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("step_s: 0.1", "step_s: 0", "7: 0 for 'step_s'; expected greater than or equal to 0.000001"),
         ("step_s: 0.1", "step_s: .inf", "7: inf for 'step_s'; expected a finite number"),
         ("tolerance: 0.5", "tolerance: -1", "16: -1 for 'tolerance'"),
-        ("t: now.time", "t: now.time()", "19: 'now.time()'; expected a local name or attribute"),
-        ("t: now.time", "t: now.time / 2", "19: 'now.time / 2'; expected a local name or attribute"),
-        ("t: now.time", "t: '[0][0]'", "19: '[0][0]'; expected a local name or attribute"),
-        ("t: now.time", "t: _fi.x", "19: '_fi.x'; expected a local name or attribute"),
+        ("time: now.time", "time: now.time()", "19: 'now.time()'; expected names, attributes"),
+        ("time: now.time", "time: '[0][0]'", "19: '[0][0]'; expected names, attributes"),
+        ("time: now.time", "time: _fi.x", "19: '_fi.x'; expected names, attributes"),
+        ("is: now.gap", "is: 'now[i]'", "21: 'now[i]'; expected names, attributes, items with constant keys"),
+        ("is: now.gap", "is: 'open(\"x\")'", "21: 'open(\"x\")'; expected names, attributes"),
+        ("    d_rel:", "    t:", "21: 't'; expected a name of letters, digits and _, once, none of"),
+        ("    hwt:", "    d_rel:", "25: 'd_rel'; expected a name of letters, digits and _, once"),
+        ("is: v_ego - v_lead", "is: v_ego - v_leed", "26: unknown name 'v_leed' in 'v_ego - v_leed'"),
         ("file: toycar/world.py", "file: ../world.py", "18: path '../world.py' leads out of the target"),
-        ("hazards: [H1]", "hazards: [H1, alert]", "23: 'alert'; expected a name"),
-        ("hazards: [H1]", "hazards: [H1, h1]", "23: 'h1'; expected a name"),
-        ("alerts: [beep]", "alerts: [beep;boop]", "24: 'beep;boop'; expected a name"),
-        ("v_lead:", "v_leed:", "22: unknown key 'v_leed'; expected one of at, t, d_rel, v_ego, v_lead"),
+        ("hazards: [H1]", "hazards: [H1, alert]", "27: 'alert'; expected a name"),
+        ("hazards: [H1]", "hazards: [H1, h1]", "27: 'h1'; expected a name"),
+        ("alerts: [beep]", "alerts: [beep;boop]", "28: 'beep;boop'; expected a name"),
+        ("  derived:", "  deriven:", "24: unknown key 'deriven'; expected one of at, time, values, derived"),
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:

@@ -5,9 +5,16 @@ import math
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.triggers.conditions import check_condition, divide, evaluate, to_code
+from mutator.triggers.conditions import (
+    check_condition,
+    check_formula,
+    divide,
+    evaluate,
+    names_in,
+    to_code,
+)
 
-FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
+FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0, "rs": 2.0}
 
 
 @pytest.mark.parametrize(
@@ -59,14 +66,44 @@ def test_one_text_for_one_condition(text: str, canonical: str) -> None:
 def test_anything_else_is_refused(text: str, piece: str) -> None:
     """What is no plain comparison of observed ground truth is an error that shows the culprit."""
     with pytest.raises(MutatorError) as caught:
-        check_condition(text)
+        check_condition(text, variables=FOLLOWING)
     assert piece in str(caught.value)
 
 
-def test_evaluation_derives_headway_and_relative_speed() -> None:
-    """hwt is d_rel / v_ego, infinite at standstill; rs is v_ego - v_lead."""
+def test_what_is_not_known_is_not_a_number() -> None:
+    """A condition over known values is decided; with a value that is missing, no comparison holds."""
     assert evaluate("hwt == 2 and rs == 2", FOLLOWING)
-    assert evaluate("hwt > 1000", {**FOLLOWING, "v_ego": 0.0})
+    assert not evaluate("gap > 1", FOLLOWING) and not evaluate("gap <= 1", FOLLOWING)
+
+
+@pytest.mark.parametrize(
+    ("text", "canonical", "code"),
+    [
+        (
+            "d_rel / v_ego if v_ego > 0 else inf",
+            "(d_rel / v_ego) if v_ego > 0.0 else inf",
+            "_div(d_rel, v_ego) if v_ego > 0.0 else math.inf",
+        ),
+        ("hypot(t, rs)", "hypot(t, rs)", "math.hypot(t, rs)"),
+        ("-abs(rs)", "-abs(rs)", "-abs(rs)"),
+    ],
+)
+def test_formulas(text: str, canonical: str, code: str) -> None:
+    """A formula is a number over the variables, has one text, and becomes code that cannot raise."""
+    assert check_formula(text, FOLLOWING) == check_formula(canonical, FOLLOWING) == canonical
+    assert to_code(canonical, number=True) == code
+
+
+@pytest.mark.parametrize("text", ["t > 1", "gap", "1 if t else 2", "(1 if t > 0 else 2) + 1", "hypot(t)"])
+def test_what_is_no_formula_is_refused(text: str) -> None:
+    """Truth values, unknown names, and choices inside of sums are none."""
+    with pytest.raises(MutatorError):
+        check_formula(text, FOLLOWING)
+
+
+def test_names_come_in_the_order_of_the_text() -> None:
+    """Functions and words of the language are none."""
+    assert names_in("rs > 0.0 and min(hwt, inf) < abs(rs) or True") == ("rs", "hwt")
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
     """`always`, a time and a condition are read as what they are; conditions wait until armed."""
-    assert read_trigger("always", 1.5) == always(armed_after_s=1.5)
-    assert read_trigger("12.5", 1.5) == at_time(12.5)
-    typed = read_trigger("hwt<=2", 1.5)
+    assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
+    assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
+    typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))
     assert (typed.condition, typed.armed_after_s, typed.hold) == ("hwt <= 2.0", 1.5, Hold.WHILE)
 
 
@@ -24,7 +24,7 @@ def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
 def test_anything_else_is_refused(text: str) -> None:
     """What is no trigger is a mistake of the user's, and never a trigger by chance."""
     with pytest.raises(MutatorError):
-        read_trigger(text, 0.0)
+        read_trigger(text, 0.0, ("t", "hwt"))
 
 
 def test_ready_made_triggers() -> None:
