@@ -8,7 +8,8 @@ from mutator.api.html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_diffs import readable
-from mutator.outcomes.golden import Trace
+from mutator.outcomes.golden import Trace, on_steps
+from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdicts import reaction_time
 from mutator.targets.manifest import TargetManifest
 
@@ -127,10 +128,17 @@ class ExperimentResult(ABC):
 
 
 def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
-    """A trace by time in s; `attrs["units"]` has the units of the channels that the manifest names."""
+    """A trace by time in s; `attrs["units"]` has the units of the channels that the manifest names.
+
+    A channel with times of its own keeps its newest value.
+    """
     import pandas as pd
 
-    frame = pd.DataFrame(dict(trace)).set_index(manifest.time_channel)
+    time = manifest.time_channel
+    own = {own_times(name) for name in trace}
+    names = [name for name in trace if name != time and name not in own]
+    columns = {name: on_steps(trace, name, trace[time]) for name in names}
+    frame = pd.DataFrame(columns, index=pd.Index(trace[time], name=time))
     frame.attrs["units"] = {c.name: c.unit for c in (*manifest.compared, *manifest.plotted)}
     return frame
 

@@ -11,7 +11,8 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
-from mutator.outcomes.golden import Trace, hazards_of, load_record, load_trace
+from mutator.outcomes.golden import Trace, load_trace
+from mutator.outcomes.judging import load_judged
 from mutator.targets.manifest import TargetManifest
 
 
@@ -53,7 +54,7 @@ class Trial(ExperimentResult):
     def golden_hazards(self) -> tuple[tuple[str, float], ...]:
         """Hazards (name, time in s) that the fault-free run reaches itself, so that they are not the fault's
         doing; a campaign would refuse such a scenario. MutatorError when its record cannot be read."""
-        found = hazards_of(load_record(self.manifest, self.single.golden), self.manifest.hazards)
+        found = load_judged(self.manifest, self.single.golden).hazards
         return tuple(sorted(found, key=lambda hazard: hazard[1]))
 
     def traces(self) -> TraceFrames:

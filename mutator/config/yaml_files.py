@@ -5,7 +5,8 @@ and aliases (a small file could unfold into gigabytes), one document a file, no 
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -64,6 +65,14 @@ class Source:
     ) -> MutatorError:
         """An error (not raised) that points at the value at `keys`."""
         return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
+
+    @contextmanager
+    def placing(self, keys: Keys) -> Iterator[None]:
+        """Have an error about the value at `keys`, which knows no place, point at it."""
+        try:
+            yield
+        except MutatorError as error:
+            raise self.error(keys, error.got, expected=error.expected, remedy=error.remedy) from None
 
 
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]

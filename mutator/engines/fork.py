@@ -229,7 +229,7 @@ class ForkEngine:
                 raise Lost(execution.detail)
             if execution.status is not Status.OK:
                 raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
-            for name in (self._manifest.trace_file, self._manifest.record_file):
+            for name in self._manifest.outputs:
                 if no_pipe(execution.out / name).read_bytes() != (golden / name).read_bytes():
                     raise Refused(f"its {name} is another one when it is driven step by step")
             report = read_report(folder / "report.json")

@@ -18,6 +18,7 @@ from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
+from mutator.outcomes.judging import judge_run
 from mutator.outcomes.verdicts import first_events, judge
 from mutator.targets.manifest import TargetManifest
 
@@ -54,8 +55,8 @@ class Goldens:
     def trace(self, experiment: Experiment) -> Trace:
         key = (experiment.scenario, experiment.changes)
         if key not in self._traces:
-            channels = [channel.name for channel in self._manifest.compared]
-            self._traces[key] = golden.load_trace(self._manifest, self.folder(experiment), channels)
+            folder = self.folder(experiment)
+            self._traces[key] = golden.load_trace(self._manifest, folder, self._manifest.compared)
         return self._traces[key]
 
 
@@ -158,7 +159,8 @@ class Runner:
         channels = self.manifest.compared
         reference = self.goldens.trace(experiment)
         try:
-            faulty = golden.load_trace(self.manifest, execution.out, [channel.name for channel in channels])
+            needed = [*dict.fromkeys((*channels, *self.manifest.judged))]
+            faulty = golden.load_trace(self.manifest, execution.out, needed)
             said = golden.load_record(self.manifest, execution.out)
         except BadOutput as err:
             if activation is None:
@@ -167,7 +169,8 @@ class Runner:
         difference = golden.compare(reference, faulty, channels, self.manifest.time_channel)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
-        hazards = first_events(golden.hazards_of(said, self.manifest.hazards), activation)
+        judged = judge_run(self.manifest, faulty, said)
+        hazards = first_events(judged.hazards, activation)
         return Record(
             experiment_id=experiment.id,
             status=Status.OK,
@@ -178,9 +181,11 @@ class Runner:
             t_manifest=difference.t_first,
             max_dev=difference.max_dev,
             hazards=tuple(hazards),
-            alerts=tuple(first_events(golden.alerts_of(said, self.manifest.alerts), activation)),
+            alerts=tuple(first_events(judged.alerts, activation)),
             trace_digest=golden.trace_digest(self.manifest, execution.out),
             patch=digest(built.patch_bytes),
+            t_end=judged.t_end,
+            metrics=judged.metrics,
         )
 
 

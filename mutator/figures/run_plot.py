@@ -15,7 +15,7 @@ import numpy as np
 
 from mutator.errors import MutatorError
 from mutator.model import Record
-from mutator.outcomes.golden import Trace
+from mutator.outcomes.golden import Trace, times_of
 from mutator.targets.manifest import Channel, TargetManifest
 
 if TYPE_CHECKING:
@@ -82,7 +82,8 @@ def draw_run(
     figure, axes = _figure(len(channels))
     time = manifest.time_channel
     for axis, channel in zip(axes, channels, strict=True):
-        _panel(axis, channel, (golden[time], golden[channel.name]), (faulty[time], faulty[channel.name]))
+        lines = [(times_of(trace, channel.name, time), trace[channel.name]) for trace in (golden, faulty)]
+        _panel(axis, channel, *lines)
     _decorate(figure, axes, title, tuple(marks))
     return figure
 

@@ -56,6 +56,9 @@ _TO_REACTION = (
         "reaction_time", "number", "s", "first hazard minus first alert; empty unless the alert came first"
     ),
 )
+_END = (
+    Column("t_end", "number", "s", "when a terminal hazard ended the drive; later steps are in no metric"),
+)
 EXTRA = (
     Column("variant", "text", "", "the variant of the spec"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
@@ -77,8 +80,12 @@ _TEXTS = {column.name for column in (*_TO_MANIFEST, *_TO_REACTION, *EXTRA) if co
 _TEXTS |= {*_DERIVED_TEXTS}
 
 
-def result_columns(hazards: Iterable[str], compared: Sequence[str]) -> tuple[Column, ...]:
-    """The columns of results.csv, in order, for a target's hazards and the names of its compared channels."""
+def result_columns(
+    hazards: Iterable[str], compared: Sequence[str], metrics: Iterable[Sequence[str]] = ()
+) -> tuple[Column, ...]:
+    """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, and
+    name, unit and meaning of its metrics."""
+    metrics = tuple(metrics)
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -87,6 +94,8 @@ def result_columns(hazards: Iterable[str], compared: Sequence[str]) -> tuple[Col
             Column(column, "number", "the channel's", f"largest difference of `{name}` from golden")
             for name, column in deviation_columns(compared).items()
         ),
+        *(_END if metrics else ()),
+        *(Column(name, "number", unit, about) for name, unit, about in metrics),
         *EXTRA,
     )
 
@@ -124,17 +133,27 @@ def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
 def check_names(manifest: TargetManifest) -> None:
     """MutatorError, at its line of the manifest, for a hazard whose columns have the name of another one."""
     taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
-    taken |= {*DERIVED}
+    taken |= {*DERIVED, _END[0].name}
+    named = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):
         names = {column.name for column in hazard_columns(hazard)}
         if names & taken:
             raise manifest.source.error(
-                ("hazards", i),
+                ("hazards", hazard if named else i),
                 f"'{hazard}'",
                 expected=f"a name whose columns, {' and '.join(sorted(names))}, the results do not have yet",
                 remedy="rename it",
             )
         taken |= names
+    for metric in manifest.measures:
+        if metric.name in taken:
+            raise manifest.source.error(
+                ("metrics", metric.name),
+                f"'{metric.name}'",
+                expected="a name that no other column of the results has",
+                remedy="rename it",
+            )
+        taken.add(metric.name)
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:

@@ -14,6 +14,8 @@ from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
 from mutator._common.shortages import shortage
 from mutator.errors import MutatorError
+from mutator.outcomes import trace_files
+from mutator.outcomes.trace_files import own_times
 from mutator.targets.manifest import Channel, TargetManifest
 
 Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
@@ -21,6 +23,7 @@ Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
 
 _LARGEST = sys.float_info.max
 _TRIAL = 64 << 20  # bytes
+_TINY = 1e-9  # s
 
 
 class BadOutput(MutatorError):
@@ -45,33 +48,53 @@ def trace_digest(manifest: TargetManifest, out: Path) -> str:
         raise BadOutput("the run left no trace", where=out / manifest.trace_file) from None
 
 
-def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[str] | None = None) -> Trace:
-    """Channels (default: all) and time of the trace in the output folder `out`."""
+def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[Channel] | None = None) -> Trace:
+    """Channels (default: all that there are) and time of the trace in the output folder `out`."""
     path = out / manifest.trace_file
+    kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
-        loaded = np.load(no_pipe(path), allow_pickle=False)
-        if not isinstance(loaded, np.lib.npyio.NpzFile):
-            raise BadOutput("an array alone", where=path, expected="an .npz file")
-        with loaded as file:
-            names = file.files if channels is None else [manifest.time_channel, *channels]
-            trace = {name: np.asarray(file[name]) for name in names}
+        trace = trace_files.read(path, manifest, channels)
+    except trace_files.BadTrace as err:
+        raise BadOutput(err.got, where=path, expected=err.expected) from None
     except KeyError as err:
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
     except MutatorError:
         raise
-    except Exception as err:  # a run may write anything, and numpy fails at it in any way
+    except Exception as err:  # a run may write anything, and readers fail at it in any way
         _check_is_of_output(err)
-        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected="an .npz file") from None
-    shapes = {values.shape for values in trace.values()}
-    if any(len(shape) != 1 for shape in shapes) or len(shapes) > 1:
-        raise BadOutput("channels of different lengths", where=path, expected="one value per step")
-    if words := [name for name, values in trace.items() if values.dtype.kind not in "biuf"]:
-        raise BadOutput(f"channel {words[0]} of something else than numbers", where=path)
+        raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected=kind) from None
+    _check_arrays(trace, manifest, path)
     return trace
 
 
+def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
+    for name, values in trace.items():
+        if values.dtype.kind not in "biuf":
+            raise BadOutput(f"channel {name} of something else than numbers", where=path)
+        if values.ndim != 1 or values.shape != times_of(trace, name, manifest.time_channel).shape:
+            raise BadOutput("channels of different lengths", where=path, expected="one value per step")
+
+
+def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
+    """The times (s) of a channel's values: its own, or those of the steps, in the channel `time`."""
+    return trace.get(own_times(channel), trace[time])
+
+
+def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
+    """A channel's value in each step: the newest one of a channel with times of its own, NaN before its
+    first."""
+    own = trace.get(own_times(channel))
+    if own is None:
+        return trace[channel]
+    at = np.searchsorted(own, steps + _TINY, side="right")
+    return np.concatenate(([np.nan], trace[channel]))[at]
+
+
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
-    """What the target itself said about a run in `out`: hazards, alerts, and more."""
+    """What the target itself said about a run in `out`: hazards, alerts, and more; nothing, where the
+    manifest names no record."""
+    if manifest.record_file is None:
+        return {"hazards": {}, "alerts": []}
     path = out / manifest.record_file
     try:
         data = json.loads(no_pipe(path).read_bytes())
@@ -102,7 +125,7 @@ def _why(err: Exception) -> str:
 
 
 def _has_times(record: dict[str, Any]) -> bool:
-    hazards, events = record.get("hazards"), _events(record)
+    hazards, events = record.get("hazards", {}), _events(record)
     if not isinstance(hazards, dict) or not isinstance(events, list):
         return False
     times = [time for time in hazards.values() if time is not None]
@@ -118,30 +141,32 @@ def _events(record: Mapping[str, Any]) -> Any:
     return record.get("alert_events") or record.get("alerts") or []
 
 
-def hazards_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
-    """(hazard, first time) of those that occurred, of the hazards that count."""
-    hazards = record["hazards"].items()
-    return [(name, time) for name, time in hazards if time is not None and name in counted]
-
-
 def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
     """(alert, time) of every raise that the record knows, of the alerts that count."""
     return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
 
 
 def compare(golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str) -> Difference:
-    """Compare the channels row by row; NaN equals NaN; a trace of another length differs where one ends."""
-    rows = min(len(golden[time]), len(faulty[time]))
-    longer = max(golden[time], faulty[time], key=len)
-    first = rows if rows < len(longer) else None
+    """Compare channels value by value; NaN equals NaN. Traces of two lengths differ where one ends."""
+    first = _end_of_shorter(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
     for channel in channels:
+        times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
+        first = min(first, _end_of_shorter(*times))
+        rows = min(map(len, times))
         deviation = _deviation(golden[channel.name][:rows], faulty[channel.name][:rows])
         largest.append((channel.name, float(deviation.max(initial=0.0))))
         beyond = np.flatnonzero(deviation > channel.tolerance)
-        if beyond.size and (first is None or beyond[0] < first):
-            first = int(beyond[0])
-    return Difference(t_first=None if first is None else float(longer[first]), max_dev=tuple(largest))
+        if beyond.size:
+            first = min(first, float(times[0][beyond[0]]))
+    return Difference(t_first=None if first == np.inf else first, max_dev=tuple(largest))
+
+
+def _end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
+    """The time of the first step that one run has and the other has not; infinite where both are as long."""
+    rows = min(len(golden), len(faulty))
+    longer = max(golden, faulty, key=len)
+    return float(longer[rows]) if rows < len(longer) else np.inf
 
 
 def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:

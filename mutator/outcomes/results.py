@@ -58,7 +58,8 @@ def row(experiment: Experiment, record: Record, hazards: Sequence[str]) -> dict[
         cells[flag.name] = int(name in times) if ok else None
         cells[time.name] = _time(times.get(name))
     columns = deviation_columns([name for name, _ in record.max_dev])
-    return cells | {columns[name]: value for name, value in record.max_dev}
+    cells |= {columns[name]: value for name, value in record.max_dev}
+    return cells | {"t_end": _time(record.t_end), **dict(record.metrics)}
 
 
 def _time(value: float | None) -> float | None:
@@ -96,7 +97,7 @@ def tables(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
     experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     head = folder.head
-    columns = result_columns(head["hazards"], head["compared"])
+    columns = result_columns(head["hazards"], head["compared"], head.get("metrics", ()))
     rows = [row(e, records[e.id], head["hazards"]) for e in experiments if e.id in records]
     return {
         CSV: _csv(rows, [column.name for column in columns]),
@@ -111,7 +112,8 @@ def _made_from(folder: RunFolder) -> str:
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
     found = [(path.relative_to(run).as_posix(), Digest.of_file(path)) for path in files]
-    return digest([SCHEMA, VERSION, folder.head["hazards"], folder.head["compared"], found])
+    head = folder.head
+    return digest([SCHEMA, VERSION, head["hazards"], head["compared"], head.get("metrics", []), found])
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:

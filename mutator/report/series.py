@@ -16,7 +16,7 @@ from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.figures.run_plot import finite, marks_of
 from mutator.model import Record, Status
-from mutator.outcomes.golden import Trace
+from mutator.outcomes.golden import Trace, times_of
 from mutator.outcomes.rows import Row
 from mutator.report.panel import FOLDER as REPORT
 from mutator.store.run_folder import RunFolder
@@ -101,7 +101,7 @@ def packed_series(manifest: TargetManifest, golden: Trace, faulty: Trace, record
     """Every channel of the manifest that both runs have, compared ones first; marks and time active."""
     time = manifest.time_channel
     wanted = (*manifest.compared, *manifest.plotted)
-    channels = [c for c in wanted if c.name in golden and c.name in faulty]
+    channels = [c for c in wanted if len(golden.get(c.name, ())) and len(faulty.get(c.name, ()))]
     end = float(max(golden[time][-1], faulty[time][-1]))
     active = record.activation
     return {
@@ -115,8 +115,9 @@ def packed_series(manifest: TargetManifest, golden: Trace, faulty: Trace, record
 
 
 def _channel(channel: Channel, compared: bool, golden: Trace, faulty: Trace, time: str) -> dict[str, Any]:
-    lines = [_line(trace[time], finite(trace[channel.name])) for trace in (golden, faulty)]
-    rows = min(len(golden[time]), len(faulty[time]))
+    times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
+    lines = [_line(t, finite(trace[channel.name])) for t, trace in zip(times, (golden, faulty), strict=True)]
+    rows = min(map(len, times))
     strip, largest = _strip(finite(golden[channel.name])[:rows], finite(faulty[channel.name])[:rows])
     return {
         "name": channel.name,
@@ -125,7 +126,7 @@ def _channel(channel: Channel, compared: bool, golden: Trace, faulty: Trace, tim
         "golden": lines[0],
         "faulty": lines[1],
         "strip": strip,  # over the time that both runs have, `until`
-        "until": float(golden[time][rows - 1]),
+        "until": float(times[0][rows - 1]),
         "largest": largest,
     }
 

@@ -46,6 +46,8 @@ def record_from(data: Mapping[str, Any]) -> Record:
         trace_digest=data["trace_digest"],
         error=RunError(**data["error"]) if data.get("error") else None,
         patch=data.get("patch", ""),
+        t_end=data.get("t_end"),
+        metrics=_pairs(data.get("metrics", [])),
     )
 
 

@@ -40,6 +40,7 @@ _SHAPES: dict[str, Any] = {
     "limits": {str: int},
     "hazards": [str],
     "compared": [str],
+    "metrics": [[str]],
     "goldens": [list],
     "golden_files": [str],
     "canary": {str: object},
@@ -50,7 +51,7 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": 2, "chunks": 3}  # of each item
+_SIZES = {"goldens": 2, "chunks": 3, "metrics": 3}  # of each item
 
 
 class Head(dict[str, Any]):

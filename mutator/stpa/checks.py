@@ -65,6 +65,15 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
                 f"channel '{action.channel}'",
                 expected=f"one that the target compares: {', '.join(channels)}",
             )
+    components = analysis.structure.components
+    for channel in manifest.channels:
+        if channel.component and channel.component not in components:
+            yield manifest.source.error(
+                ("channels", channel.name, "component"),
+                f"component '{channel.component}'",
+                expected=f"one of the control structure: {', '.join(components)}",
+                remedy="correct the name" + suggestion(channel.component, list(components)),
+            )
 
 
 def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:

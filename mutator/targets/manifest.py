@@ -1,5 +1,6 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -8,20 +9,14 @@ from pathlib import Path
 from mutator._common import caches
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
+from mutator.targets.channels import Channel, Role
+from mutator.targets.judging import Hazard, Metric
 from mutator.targets.observation import Observation
+from mutator.targets.scene import Scene
 from mutator.targets.source_tree import SourceTree, matches, read_tree
+from mutator.triggers.conditions import names_in
 
 FILM = "film"  # folder in the output of a run that is filmed
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Channel:
-    """A recorded channel: its unit for axis labels, and by how much it may differ from golden (0: exact)."""
-
-    name: str
-    unit: str
-    tolerance: float = 0.0
-    about: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,13 +51,14 @@ class TargetManifest:
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
     armed_after_s: float  # triggers wait so long where nothing else is said: until the controller is at work
-    trace_file: str  # an .npz in {out}
+    trace_file: str  # in {out}; its suffix says what kind of file it is
     time_channel: str
-    compared: tuple[Channel, ...]  # actuator outputs: differing from golden means manifested
-    plotted: tuple[Channel, ...]  # others worth a plot
-    record_file: str  # a JSON in {out}
+    channels: tuple[Channel, ...]
+    record_file: str | None  # a JSON in {out}, where the target leaves one
     observation: Observation
-    hazards: tuple[str, ...]
+    rules: tuple[Hazard, ...]
+    metrics: tuple[Metric, ...]
+    scene: Scene | None
     alerts: tuple[str, ...]  # alerts that count in experiments
     source: Source = field(repr=False, compare=False)  # the file's lines, for errors
     film: Film | None = None
@@ -80,6 +76,37 @@ class TargetManifest:
                 remedy="correct `root`, `package` or `files`",
             )
         return tree
+
+    @cached_property
+    def compared(self) -> tuple[Channel, ...]:
+        """Actuator outputs: one that differs from golden means that the fault manifested."""
+        return tuple(channel for channel in self.channels if channel.role is Role.ACTUATOR)
+
+    @cached_property
+    def plotted(self) -> tuple[Channel, ...]:
+        """The channels that are not compared."""
+        return tuple(channel for channel in self.channels if channel.role is not Role.ACTUATOR)
+
+    @cached_property
+    def judged(self) -> tuple[Channel, ...]:
+        """The channels that hazards and metrics are judged by."""
+        needed = self.observation.inputs(_names_of(self.rules, self.metrics))
+        return tuple(channel for channel in self.channels if channel.name in needed)
+
+    @cached_property
+    def hazards(self) -> tuple[str, ...]:
+        """The names of the hazards."""
+        return tuple(hazard.name for hazard in self.rules)
+
+    @cached_property
+    def measures(self) -> tuple[Metric, ...]:
+        """All numbers that a run is given: the margins of its hazards, then its metrics."""
+        return (*(hazard.metric for hazard in self.rules if hazard.metric), *self.metrics)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The files that a run leaves in {out}."""
+        return (self.trace_file, *([self.record_file] if self.record_file else []))
 
     def reads_any(self, paths: Iterable[str]) -> bool:
         """Whether a run itself reads one of these files: what it caches follows from their content."""
@@ -120,3 +147,12 @@ class TargetManifest:
                 remedy="say there which commands take and show a film",
             )
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args), stepwise=None)
+
+
+def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric]) -> set[str]:
+    """What the formulas of hazards and metrics ask for. Of an STL formula every word: channels are found
+    among them."""
+    texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
+    texts += [text for metric in metrics for text in (metric.formula, metric.where)]
+    words = (word for rule in rules for word in re.findall(r"\w+", rule.stl))
+    return {name for text in texts if text for name in names_in(text)}.union(words)

@@ -1,30 +1,19 @@
 """Target manifests as YAML: `fault_library/targets/<name>.yaml`, checked and read into a `TargetManifest`."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import Field
 
 from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.yaml_files import Source, StrictModel, read
-from mutator.targets.manifest import Channel, Film, TargetManifest
+from mutator.targets.channels import ChannelModel, TraceModel, read_channels
+from mutator.targets.judging import HazardModel, MetricModel, read_hazards, read_metrics
+from mutator.targets.manifest import Film, TargetManifest
 from mutator.targets.observation import ObservationModel, read_observation
+from mutator.targets.scene import SceneModel, read_scene
 from mutator.targets.upgrade import OLD, upgraded
 
 SCHEMA = "target/2"
-
-
-class _ChannelModel(StrictModel, title="A channel"):
-    """By its name in the trace."""
-
-    unit: str = Field(description="Its unit, for tables and axes; `-` for none.")
-    tolerance: float = Field(
-        0.0,
-        ge=0.0,
-        allow_inf_nan=False,
-        description="By how much it may differ from golden and still count as the same.",
-    )
-    about: str = Field("", description="What it is.")
 
 
 class _ChangeModel(StrictModel, title="A change"):
@@ -96,24 +85,25 @@ class ManifestModel(StrictModel, title="The file"):
         description="When `mutator try` arms triggers, where nothing else is said.",
     )
     entry: _EntryModel = Field(description="How a run is started.")
-    trace_file: str = Field(
-        description="The trace's name in `{out}`: an `.npz` with an array for each channel."
+    trace: TraceModel = Field(TraceModel(), description="The numbers that a run records.")
+    record: str | None = Field(
+        None,
+        description="The record's name in `{out}`: a JSON file in which the target tells of hazards and "
+        "alerts, see [another controller tree](../how-to/add-a-target.md#what-a-run-leaves-behind).",
     )
-    time_channel: str = Field(description="The channel that holds time in s.")
-    record_file: str = Field(
-        description="The record's name in `{out}`: a JSON file, see [another controller "
-        "tree](../how-to/add-a-target.md#what-a-run-leaves-behind)."
-    )
-    compare: dict[str, _ChannelModel] = Field(
-        description="Actuator outputs: one that differs from golden means that the fault manifested."
-    )
-    plot: dict[str, _ChannelModel] = Field(
-        default_factory=dict, description="More channels that are worth a plot."
-    )
+    channels: dict[str, ChannelModel] = Field(description="What is recorded, and which part it plays.")
     observation: ObservationModel = Field(description="Where ground truth is read.")
-    hazards: list[str] = Field(description="Names of the hazards that the target checks.")
+    hazards: list[str] | dict[str, HazardModel] = Field(
+        description="What a run must not come to: by name how it is found in the trace, or a list of names "
+        "that the record has."
+    )
+    metrics: dict[str, MetricModel] = Field(
+        default_factory=dict, description="Numbers that each run is given: columns of the results."
+    )
+    scene: SceneModel | None = Field(None, description="How a drive looks from above.")
     alerts: list[str] = Field(
-        description="Names of the alerts that count; others that a record has are left out."
+        default_factory=list,
+        description="Names of the alerts that count; others that a record has are left out.",
     )
     film: _FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
 
@@ -132,6 +122,9 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     _check_names(model, source)
     _check_events(model, source)
     changes = model.entry.changes
+    channels = read_channels(model.channels, model.trace, source)
+    observation = read_observation(model.observation, source, folder)
+    known = observation.judgeable(channel.name for channel in channels)
     return TargetManifest(
         name=model.name,
         path=path,
@@ -148,13 +141,14 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, _ChangeModel)},
         step_s=model.step_s,
         armed_after_s=model.armed_after_s,
-        trace_file=model.trace_file,
-        time_channel=model.time_channel,
-        compared=_channels(model.compare),
-        plotted=_channels(model.plot),
-        record_file=model.record_file,
-        observation=read_observation(model.observation, source, folder),
-        hazards=tuple(model.hazards),
+        trace_file=model.trace.file,
+        time_channel=model.trace.time,
+        channels=channels,
+        record_file=model.record,
+        observation=observation,
+        rules=read_hazards(model.hazards, known, source, recorded=model.record is not None),
+        metrics=read_metrics(model.metrics, known, source),
+        scene=None if model.scene is None else read_scene(model.scene, known, source),
         alerts=tuple(model.alerts),
         source=source,
         film=_film(model.film),
@@ -173,29 +167,24 @@ def _check_names(model: ManifestModel, source: Source) -> None:
             raise source.error((key, "module"), f"'{command.module}'", expected="a dotted module name")
     if (stepwise := model.entry.stepwise) is not None and not stepwise.isidentifier():
         raise source.error(("entry", "stepwise"), f"'{stepwise}'", expected="a function of the entry module")
-    for key in ("trace_file", "record_file"):
-        name = getattr(model, key)
-        if Path(name).name != name:
-            raise source.error((key,), f"'{name}'", expected="a bare file name, made in {out}")
+    if model.record is not None and Path(model.record).name != model.record:
+        raise source.error(("record",), f"'{model.record}'", expected="a bare file name, made in {out}")
 
 
 def _check_events(model: ManifestModel, source: Source) -> None:
     """Hazards and alerts have names that tables can take, each once."""
     for key in ("hazards", "alerts"):
         seen = set[str]()
-        for i, name in enumerate(getattr(model, key)):
+        names = getattr(model, key)
+        for i, name in enumerate(names):
             if not name.isidentifier() or name.lower() in seen:
                 raise source.error(
-                    (key, i),
+                    (key, name if isinstance(names, dict) else i),
                     f"'{name}'",
                     expected="a name of letters, digits and _, once",
                     remedy="rename it",
                 )
             seen.add(name.lower())
-
-
-def _channels(channels: Mapping[str, _ChannelModel]) -> tuple[Channel, ...]:
-    return tuple(Channel(name=name, **channel.model_dump()) for name, channel in channels.items())
 
 
 def _film(model: _FilmModel | None) -> Film | None:

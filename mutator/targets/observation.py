@@ -2,7 +2,7 @@
 
 import ast
 import keyword
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +12,9 @@ from pydantic import Field
 from mutator._common.text import shown
 from mutator.config.locations import PROBE_NAME, AtModel, dotted_name
 from mutator.config.yaml_files import Source, StrictModel
-from mutator.errors import MutatorError
 from mutator.model import FaultLocation
 from mutator.targets.paths import inside
-from mutator.triggers.conditions import TIME, check_formula
+from mutator.triggers.conditions import TIME, check_formula, names_in
 
 _LONGEST = 1000  # characters of an expression
 _READING = (
@@ -23,7 +22,7 @@ _READING = (
     *(ast.operator, ast.unaryop, ast.cmpop),
 )
 _FUNCTIONS = ("abs", "min", "max", "hypot", "float", "len")
-_TAKEN = ("abs", "min", "max", "hypot", "inf", TIME)
+_TAKEN = ("abs", "min", "max", "hypot", "ever", "rate", "inf", TIME)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +59,23 @@ class Observation:
         """What conditions may ask for: time, the observed values, the derived ones."""
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
+    def inputs(self, names: Iterable[str]) -> frozenset[str]:
+        """These names, and those that their formulas are over, if they are derived values."""
+        found = set(names)
+        for value in reversed(self.derived):
+            if value.name in found:
+                found.update(names_in(value.text))
+        return frozenset(found)
+
+    def judgeable(self, channels: Iterable[str]) -> tuple[str, ...]:
+        """What formulas over a trace with these channels can ask for: time, the channels, and the derived
+        values that follow from them."""
+        known = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
+        for value in self.derived:
+            if all(name in known for name in names_in(value.text)):
+                known[value.name] = None
+        return tuple(known)
+
 
 class _ValueModel(StrictModel, title="A value"):
     is_: str = Field(alias="is", description="What it is, as an expression.")
@@ -92,12 +108,8 @@ class ObservationModel(StrictModel, title="The observation"):
 def read_observation(model: ObservationModel, source: Source, root: Path) -> Observation:
     """The observation of a manifest; errors point into `source`."""
     location = model.at.location(source, ("observation", "at"))
-    try:
+    with source.placing(("observation", "at", "file")):
         inside(root, location.path)
-    except MutatorError as error:
-        raise source.error(
-            ("observation", "at", "file"), error.got, expected=error.expected, remedy=error.remedy
-        ) from None
     _check_names(model, source)
     time = None if model.time is None else _read(model.time, source, ("observation", "time"))
     values = tuple(
@@ -130,15 +142,8 @@ def _check_names(model: ObservationModel, source: Source) -> None:
 def _derived(model: ObservationModel, source: Source, known: list[str]) -> tuple[Value, ...]:
     found = []
     for name, value in model.derived.items():
-        try:
+        with source.placing(("observation", "derived", name, "is")):
             text = check_formula(value.is_, known)
-        except MutatorError as error:
-            raise source.error(
-                ("observation", "derived", name, "is"),
-                error.got,
-                expected=error.expected,
-                remedy=error.remedy,
-            ) from None
         found.append(Value(name=name, text=text, unit=value.unit, about=value.about))
         known.append(name)
     return tuple(found)

@@ -19,21 +19,43 @@ _DERIVED = {
 
 def upgraded(source: Source) -> Source:
     """The manifest as one of target/2; its values keep their lines. What is no manifest stays as it is."""
-    observation = source.data.get("observation")
-    if not isinstance(observation, dict):
-        return source
-    rest = {key: value for key, value in observation.items() if key not in ("t", *_OBSERVED)}
-    lines: dict[Keys, int] = dict(source.lines)
-    if "t" in observation:
-        rest["time"] = observation["t"]
-        lines["observation", "time"] = source.lines["observation", "t"]
-    rest["values"] = {}
+    data, lines = dict(source.data), dict(source.lines)
+    if isinstance(observation := data.get("observation"), dict):
+        data["observation"] = _observation(observation, lines)
+    if isinstance(data.get("compare"), dict) and isinstance(data.get("plot", {}), dict):
+        data["channels"] = _channels(data, lines)
+    if "trace_file" in data and "time_channel" in data:
+        data["trace"] = {"file": data.pop("trace_file"), "time": data.pop("time_channel")}
+        lines[("trace",)] = lines["trace", "file"] = lines[("trace_file",)]
+    if "record_file" in data:
+        data["record"] = data.pop("record_file")
+        lines[("record",)] = lines[("record_file",)]
+    return replace(source, data=data, lines=lines)
+
+
+def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
+    new = {key: value for key, value in old.items() if key not in ("t", *_OBSERVED)}
+    if "t" in old:
+        new["time"] = old["t"]
+        lines["observation", "time"] = lines["observation", "t"]
+    new["values"] = {}
     for name, (unit, about) in _OBSERVED.items():
-        if name in observation:
-            rest["values"][name] = {"is": observation[name], "unit": unit, "about": about}
-            lines["observation", "values", name] = source.lines["observation", name]
-    rest["derived"] = derived()
-    return replace(source, data={**source.data, "observation": rest}, lines=lines)
+        if name in old:
+            new["values"][name] = {"is": old[name], "unit": unit, "about": about}
+            lines["observation", "values", name] = lines["observation", name]
+    return new | {"derived": derived()}
+
+
+def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
+    """Of `compare` and `plot`, which leave `data`: actuators, and what the target told no role of."""
+    channels = {}
+    for key, role in (("compare", "actuator"), ("plot", "internal")):
+        for name, channel in data.pop(key, {}).items():
+            channels[name] = {**channel, "role": role} if isinstance(channel, dict) else channel
+            for keys in [keys for keys in lines if keys[:2] == (key, name)]:
+                lines["channels", *keys[1:]] = lines[keys]
+    lines.setdefault(("channels",), lines[("compare",)])
+    return channels
 
 
 def derived() -> dict[str, dict[str, Any]]:

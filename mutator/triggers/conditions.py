@@ -14,8 +14,9 @@ from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
 _FUNCTIONS = ("abs", "min", "max", "hypot")
-_ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2)}  # at least, at most; any other takes two or more
-_NAMES = (*_FUNCTIONS, "inf", "True", "False")  # no variable is called so
+_OVER_TIME = ("ever", "rate")  # whether a condition has held by now; the change of a number in a second
+_ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # at least, at most; others take two or more
+_NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # no variable is called so
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _MAX_LENGTH = 1000
@@ -23,32 +24,45 @@ _ALLOWED = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, 
 
 
 def check_condition(
-    text: str, constants: Mapping[str, float] | None = None, variables: Collection[str] | None = None
+    text: str,
+    constants: Mapping[str, float] | None = None,
+    variables: Collection[str] | None = None,
+    *,
+    over_time: bool = False,
 ) -> str:
     """The condition in its one canonical text, constants replaced by their numbers.
 
     Allowed: the variables (None: any name, to be checked when the target is known), numbers, `True`,
-    comparisons, and/or/not, + - * /, abs/min/max/hypot. Anything else raises MutatorError (without place: the
-    caller knows file and line).
+    comparisons, and/or/not, + - * /, abs/min/max/hypot, and `over_time` what a whole trace can answer: `ever`
+    of a condition, `rate` of a number. Anything else raises MutatorError (without place: the caller knows
+    file and line).
     """
-    return _checked(text, constants or {}, variables, number=False)
+    return _checked(text, constants or {}, variables, number=False, over_time=over_time)
 
 
-def check_formula(text: str, variables: Collection[str]) -> str:
+def check_formula(text: str, variables: Collection[str], *, over_time: bool = False) -> str:
     """The formula in its one canonical text. Allowed is what `check_condition` allows inside a comparison,
     `inf`, and a choice: `a if CONDITION else b`. Raises as it does.
     """
-    return _checked(text, {}, variables, number=True)
+    return _checked(text, {}, variables, number=True, over_time=over_time)
 
 
 def _checked(
-    text: str, constants: Mapping[str, float], variables: Collection[str] | None, *, number: bool
+    text: str,
+    constants: Mapping[str, float],
+    variables: Collection[str] | None,
+    *,
+    number: bool,
+    over_time: bool,
 ) -> str:
     try:
-        writer = _Writer(text, constants, variables, divide="({} / {})")
-        canonical = writer.number(_parse(text)) if number else writer.boolean(_parse(text))
+        writer = _Writer(text, constants, variables, divide="({} / {})", over_time=over_time)
+        canonical = writer.number(parse(text)) if number else writer.boolean(parse(text))
         # what the probe is given must be readable and compile too
-        _function(canonical, names_in(canonical), number)
+        if over_time:
+            compile(canonical, "<condition>", "eval")
+        else:
+            _function(canonical, names_in(canonical), number)
     except (SyntaxError, RecursionError, MemoryError):
         raise _refuse("too much in one expression", text, variables, "write it shorter") from None
     return canonical
@@ -56,7 +70,7 @@ def _checked(
 
 def names_in(text: str) -> tuple[str, ...]:
     """The variables of a checked condition or formula, in the order in which they come."""
-    nodes = (node for node in ast.walk(_parse(text)) if isinstance(node, ast.Name))
+    nodes = (node for node in ast.walk(parse(text)) if isinstance(node, ast.Name))
     found = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
     return tuple(dict.fromkeys(node.id for node in found if node.id not in _NAMES))
 
@@ -66,7 +80,7 @@ def to_code(text: str, *, number: bool = False) -> str:
     `_div`, and `math` must be there.
     """
     writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
-    return writer.number(_parse(text)) if number else writer.boolean(_parse(text))
+    return writer.number(parse(text)) if number else writer.boolean(parse(text))
 
 
 def evaluate(condition: str, values: Mapping[str, float]) -> bool:
@@ -96,7 +110,8 @@ def _refuse(
     return MutatorError(f"{what} in {text!r}", expected=_ALLOWED + known, remedy=remedy)
 
 
-def _parse(text: str) -> ast.expr:
+def parse(text: str) -> ast.expr:
+    """The tree of a condition or formula; MutatorError for what is no expression."""
     if len(text) > _MAX_LENGTH:
         raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MAX_LENGTH}")
     try:
@@ -117,12 +132,14 @@ class _Writer:
         divide: str,
         infinity: str = "inf",
         hypot: str = "hypot",
+        over_time: bool = False,
     ) -> None:
         self.text = text
         self.constants = constants
         self.variables = variables
         self.divide = divide
         self.written = {"inf": infinity, "hypot": hypot}
+        self.over_time = over_time
 
     def boolean(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant) and isinstance(node.value, bool):
@@ -134,6 +151,10 @@ class _Writer:
             return f"not {self._boolean_operand(node.operand)}"
         if isinstance(node, ast.Compare):
             return self._compare(node)
+        if isinstance(node, ast.Call) and self.over_time and ast.unparse(node.func) == "ever":
+            if len(node.args) != 1 or node.keywords:
+                raise self._refuse(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
+            return f"ever({self.boolean(node.args[0])})"
         raise self._refuse(f"{ast.unparse(node)!r} is no truth value", "compare it with something: t <= 2.0")
 
     def number(self, node: ast.expr) -> str:
@@ -196,7 +217,8 @@ class _Writer:
 
     def _call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
-        if name not in _FUNCTIONS or node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
+        known = (*_FUNCTIONS, "rate") if self.over_time else _FUNCTIONS
+        if name not in known or node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
             raise self._refuse(f"a call of '{name}'")
         least, most = _ARGUMENTS.get(name, (2, math.inf))
         if not least <= len(node.args) <= most:

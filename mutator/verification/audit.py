@@ -134,7 +134,7 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
     for result in checks["results"]:
         if not result["passed"]:
             yield MutatorError(f"check `{result['name']}` failed: {result['detail']}", where=path)
-    old = [manifest.trace_file, manifest.record_file] if manifest else []
+    old = list(manifest.outputs) if manifest else []
     for name, found in golden_digests(folder, folder.head.get("golden_files", old)).items():
         if checks["goldens"].get(name) != found:
             known = str(checks["goldens"].get(name))

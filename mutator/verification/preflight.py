@@ -28,6 +28,7 @@ from mutator.mutants.building import InvalidMutant, build
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput
+from mutator.outcomes.judging import load_judged
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.digests import Digest
@@ -261,16 +262,16 @@ class _Checks:
             last = f" ({log.splitlines()[-1]})" if log else ""
             return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
         try:
-            record = golden.load_record(self.manifest, execution.out)
-            golden.load_trace(self.manifest, execution.out, [c.name for c in self.manifest.compared])
+            golden.load_trace(self.manifest, execution.out, self.manifest.compared)
+            judged = load_judged(self.manifest, execution.out)
         except BadOutput as err:
             return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
         return CheckRun(
             problem="",
             digest=_digest_of(self.manifest, execution.out),
             trace=golden.trace_digest(self.manifest, execution.out),
-            alerts=tuple(golden.alerts_of(record, self.manifest.alerts)),
-            hazards=tuple(golden.hazards_of(record, self.manifest.hazards)),
+            alerts=tuple(judged.alerts),
+            hazards=tuple(judged.hazards),
             triggered=was_triggered(execution.probe),
             cpu_s=execution.cpu_s,
             modules=execution.modules,
@@ -327,8 +328,6 @@ def _result(name: str, problem: str, found: str) -> CheckResult:
 def _digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty when they are not there."""
     try:
-        return digest(
-            [digest(no_pipe(out / name).read_bytes()) for name in (manifest.trace_file, manifest.record_file)]
-        )
+        return digest([digest(no_pipe(out / name).read_bytes()) for name in manifest.outputs])
     except OSError:
         return ""

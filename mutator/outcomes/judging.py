@@ -1,0 +1,140 @@
+"""What a run came to: its hazards, where its drive ended, and its metrics, from trace and record."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mutator.outcomes.golden import Trace, alerts_of, load_record, load_trace, on_steps
+from mutator.outcomes.verdicts import Events
+from mutator.targets.judging import Hazard, Metric
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers import over_time, stl
+from mutator.triggers.conditions import TIME, names_in
+
+Values = Mapping[str, np.ndarray]
+
+_TINY = 1e-9  # s; times are sums of steps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """`hazards` are (name, first time) of those that came; `alerts` (name, time) of every raise. `t_end` is
+    when a terminal hazard ended the drive (None: none did). `metrics` are numbers, margins among them; one
+    that has no value is left out. Times are in s.
+    """
+
+    hazards: Events
+    alerts: Events
+    t_end: float | None
+    metrics: tuple[tuple[str, float], ...]
+
+
+def load_judged(manifest: TargetManifest, out: Path) -> Judged:
+    """What the run in the output folder `out` came to; BadOutput for one that left no trace or record."""
+    return judge_run(manifest, load_trace(manifest, out, manifest.judged), load_record(manifest, out))
+
+
+def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:
+    """What a run came to. `trace` has at least the channels that the manifest judges by."""
+    values = values_of(manifest, trace)
+    hazards, ends, metrics = [], [], []
+    for hazard in manifest.rules:
+        robust = stl.robustness(hazard.stl, values, manifest.step_s) if hazard.stl else None
+        first = _first(hazard, values, robust, record)
+        if first is not None:
+            hazards.append((hazard.name, first))
+        ends += _ends(hazard, first, values)
+        if hazard.metric is not None:
+            numbers = robust if robust is not None else over_time.numbers(hazard.margin, values)
+            metrics.append((hazard.metric, numbers))
+    metrics += [(metric, _numbers(metric, values)) for metric in manifest.metrics]
+    t_end = min(ends, default=None)
+    found = [(metric.name, _aggregate(metric, numbers, values, t_end)) for metric, numbers in metrics]
+    return Judged(
+        hazards=tuple(hazards),
+        alerts=tuple(alerts_of(record, manifest.alerts)),
+        t_end=t_end,
+        metrics=tuple((name, value) for name, value in found if value is not None),
+    )
+
+
+def values_of(manifest: TargetManifest, trace: Trace) -> Values:
+    """What the manifest's formulas are over, a number for each step: time, channels, derived values.
+
+    A channel with times of its own keeps its newest value; before the first it has none (NaN).
+    """
+    time = np.asarray(trace[manifest.time_channel], dtype=float)
+    values = {TIME: time}
+    for channel in manifest.judged:
+        values[channel.name] = on_steps(trace, channel.name, time).astype(float)
+    for value in manifest.observation.derived:
+        if value.name not in values and all(name in values for name in names_in(value.text)):
+            values[value.name] = over_time.numbers(value.text, values)
+    return values
+
+
+def _first(
+    hazard: Hazard, values: Values, robust: np.ndarray | None, record: Mapping[str, Any]
+) -> float | None:
+    """When a hazard first came."""
+    if hazard.recorded:
+        return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
+    holds = robust < 0.0 if robust is not None else over_time.holds(hazard.when, values)
+    return _first_of(_lasting(holds, values[TIME], hazard.for_s), values[TIME])
+
+
+def _lasting(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
+    """Whether a condition has held for so long."""
+    if not for_s:
+        return holds
+    begins = holds & ~np.concatenate(([False], holds[:-1]))
+    since = np.maximum.accumulate(np.where(begins, time, -np.inf))
+    return holds & (time - since >= for_s - _TINY)
+
+
+def _first_of(holds: np.ndarray, time: np.ndarray) -> float | None:
+    at = np.flatnonzero(holds)
+    return float(time[at[0]]) if at.size else None
+
+
+def _ends(hazard: Hazard, first: float | None, values: Values) -> list[float]:
+    """When the drive is over because of a hazard: at most one time."""
+    if hazard.terminal == "True":
+        return [] if first is None else [first]
+    if not hazard.terminal:
+        return []
+    end = _first_of(over_time.holds(hazard.terminal, values), values[TIME])
+    return [] if end is None else [end]
+
+
+def _numbers(metric: Metric, values: Values) -> np.ndarray:
+    if metric.aggregate == "duration":
+        return over_time.holds(metric.formula, values).astype(float)
+    return over_time.numbers(metric.formula, values)
+
+
+def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:
+    """One number of a metric's values up to the end of the drive; None where there is nothing to tell.
+
+    Sums are exact (`fsum`), so they do not depend on how a processor adds.
+    """
+    time = values[TIME]
+    driven = time <= (math.inf if t_end is None else t_end + _TINY)
+    if metric.aggregate == "at_end":
+        driven &= t_end is not None and time == time[driven].max(initial=-math.inf)
+    counts = np.isfinite(numbers) & driven
+    if metric.where:
+        counts &= over_time.holds(metric.where, values)
+    if metric.aggregate in ("integral", "duration"):
+        lengths = np.diff(time, append=time[-1:])  # each value lasts until the next step
+        return math.fsum((numbers * lengths)[counts])
+    kept = numbers[counts]
+    if not kept.size:
+        return None
+    if metric.aggregate == "mean":
+        return math.fsum(kept) / kept.size
+    return float({"min": kept.min(), "max": kept.max()}.get(metric.aggregate, kept[-1]))

@@ -1,0 +1,124 @@
+"""Trace files of runs, by suffix: each reader gives the arrays of the channels that it is asked for."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mutator._common.files import no_pipe
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
+
+Arrays = dict[str, np.ndarray]
+
+
+class BadTrace(ValueError):
+    """What is wrong with a trace file, and what was expected."""
+
+    def __init__(self, got: str, expected: str) -> None:
+        super().__init__(got)
+        self.got, self.expected = got, expected
+
+
+def own_times(name: str) -> str:
+    """Where a trace keeps the times of a channel that is not there in each step."""
+    return f"{name}@"
+
+
+def read(path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None) -> Arrays:
+    """Channels and time of a trace, by the names that the manifest has for them; under `own_times` the times
+    of those that are not there in each step.
+
+    Without `channels`: all that there is, also what the manifest does not name. BadTrace, KeyError for a
+    channel that is not there, and what the readers raise.
+    """
+    wanted = manifest.channels if channels is None else tuple(channels)
+    if path.suffix == ".mcap":
+        return _read_mcap(path, manifest.time_channel, wanted)
+    of_time = [channel.time for channel in wanted if channel.time]
+    names = [manifest.time_channel, *of_time, *(channel.source for channel in wanted)]
+    columns = _COLUMNS[path.suffix](path, None if channels is None else names)
+    known = {channel.source for channel in wanted} | {*of_time}
+    values = {name: column for name, column in columns.items() if channels is None and name not in known}
+    values[manifest.time_channel] = columns[manifest.time_channel]
+    for channel in wanted:
+        if channels is None and channel.source not in columns:
+            continue
+        column = columns[channel.source]
+        there = np.full(column.shape, True) if path.suffix == ".npz" else ~_empty(column)
+        if channel.time:
+            values[own_times(channel.name)] = columns[channel.time][there]
+            column = column[there]
+        values[channel.name] = column
+    return values
+
+
+def _empty(values: np.ndarray) -> np.ndarray:
+    return np.isnan(values) if values.dtype.kind == "f" else np.zeros(values.shape, dtype=bool)
+
+
+def _read_npz(path: Path, names: Iterable[str] | None) -> Arrays:
+    loaded = np.load(no_pipe(path), allow_pickle=False)
+    if not isinstance(loaded, np.lib.npyio.NpzFile):
+        raise BadTrace("an array alone", "an .npz file")
+    with loaded as file:
+        wanted = dict.fromkeys(file.files if names is None else names)
+        return {name: np.asarray(file[name]) for name in wanted}
+
+
+def _read_csv(path: Path, names: Iterable[str] | None) -> Arrays:
+    import pandas as pd
+
+    return _columns(pd.read_csv(no_pipe(path)), names)
+
+
+def _read_parquet(path: Path, names: Iterable[str] | None) -> Arrays:
+    import pandas as pd
+
+    return _columns(pd.read_parquet(no_pipe(path)), names)
+
+
+def _columns(frame: Any, names: Iterable[str] | None) -> Arrays:
+    wanted = dict.fromkeys(frame.columns if names is None else names)
+    return {str(name): frame[name].to_numpy() for name in wanted}
+
+
+_COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None], Arrays]] = {
+    ".npz": _read_npz,
+    ".csv": _read_csv,
+    ".parquet": _read_parquet,
+}
+
+
+def _read_mcap(path: Path, steps: str, channels: Iterable[Channel]) -> Arrays:
+    """Of JSON messages: `/topic:field.of.field`. Log times are the simulation's, in ns."""
+    try:
+        from mcap.reader import make_reader  # type: ignore[import-not-found]
+    except ImportError:
+        raise BadTrace("an .mcap file, and no package mcap", "pip install 'mutator[mcap]'") from None
+    places = {channel.name: channel.source.partition(":")[::2] for channel in channels}
+    topics = {steps, *(topic for topic, _ in places.values())}
+    seen: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
+    with no_pipe(path).open("rb") as file:
+        for _, channel, message in make_reader(file).iter_messages(topics=sorted(topics)):
+            if channel.message_encoding != "json":
+                raise BadTrace(f"{channel.message_encoding} messages in {channel.topic}", "JSON messages")
+            seen[channel.topic].append((message.log_time / 1e9, json.loads(message.data)))
+    if not seen[steps]:
+        raise KeyError(steps)
+    values = {steps: np.array([t for t, _ in seen[steps]])}
+    for name, (topic, field) in places.items():
+        if not seen[topic]:
+            raise KeyError(topic)
+        values[name] = np.array([_field(data, field) for _, data in seen[topic]])
+        if topic != steps:
+            values[own_times(name)] = np.array([t for t, _ in seen[topic]])
+    return values
+
+
+def _field(data: Any, path: str) -> Any:
+    for key in path.split("."):
+        data = data[key]
+    return data

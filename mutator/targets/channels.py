@@ -1,0 +1,130 @@
+"""What a target records: channels, the part that each plays, and the file that they are in."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator.config.yaml_files import Source, StrictModel
+
+SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
+
+
+class Role(StrEnum):
+    """What a channel is to a verdict: a fault manifests where an `actuator` differs from golden."""
+
+    ACTUATOR = "actuator"
+    TRUTH = "truth"
+    INTERNAL = "internal"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """A recorded channel. `unit` is for axis labels, `-` for none; `tolerance` says by how much an actuator
+    may differ from golden (0: exact); `component` names the part of the controller that it is of.
+
+    `time` is the channel with its own times, where it is not there in each step. `source` is what the trace
+    calls it, where that is another name.
+    """
+
+    name: str
+    unit: str
+    role: Role = Role.INTERNAL
+    component: str = ""
+    tolerance: float = 0.0
+    about: str = ""
+    time: str = ""
+    source: str = ""
+
+
+class ChannelModel(StrictModel, title="A channel"):
+    """By the name that conditions, tables and plots use."""
+
+    unit: str = Field(description="Its unit, for tables and axes; `-` for none.")
+    role: Role = Field(
+        Role.INTERNAL,
+        strict=False,
+        description="`actuator`: what the controller commands; one that differs from golden means that the "
+        "fault manifested. `truth`: the state of the world. `internal`: what the controller believes.",
+    )
+    component: str = Field(
+        "", description="The component that it belongs to, of the control structure where there is one."
+    )
+    tolerance: float = Field(
+        0.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="By how much an actuator may differ from golden and still count as the same.",
+    )
+    about: str = Field("", description="What it is.")
+    time: str = Field(
+        "",
+        description="For a channel that is not recorded in each step: the channel that holds its times. In a "
+        "table (`.csv`, `.parquet`) its empty cells are skipped.",
+    )
+    from_: str = Field(
+        "",
+        alias="from",
+        description="What the trace calls it, if not by this name. In an `.mcap` file: the topic and the "
+        "field of its JSON messages, `/car/state:speed`.",
+    )
+
+
+class TraceModel(StrictModel, title="The trace"):
+    """The numbers that a run records."""
+
+    file: str = Field(
+        "trace.npz",
+        description="Its name in `{out}`: an `.npz` with an array for each channel, a `.csv` or `.parquet` "
+        "with a column for each, or an `.mcap` with JSON messages (`pip install 'mutator[mcap]'`).",
+    )
+    time: str = Field(
+        "t",
+        description="The channel that holds the time in s of each step. In an `.mcap` file the topic with a "
+        "message for each step, whose log times are simulated time.",
+    )
+
+
+def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: Source) -> tuple[Channel, ...]:
+    """The channels of a manifest, in its order; MutatorError for a trace or a channel that cannot be."""
+    if Path(trace.file).name != trace.file or Path(trace.file).suffix not in SUFFIXES:
+        raise source.error(
+            ("trace", "file"),
+            f"'{trace.file}'",
+            expected=f"a bare file name, made in {{out}}, that ends in {', '.join(SUFFIXES)}",
+        )
+    if not any(model.role is Role.ACTUATOR for model in models.values()):
+        raise source.error(
+            ("channels",),
+            "no channel with `role: actuator`",
+            expected="what the controller commands: a fault manifests where it differs from golden",
+            remedy="say of one channel that it is an actuator",
+        )
+    return tuple(_channel(name, model, trace, source) for name, model in models.items())
+
+
+def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) -> Channel:
+    keys = ("channels", name)
+    if name == trace.time:
+        raise source.error(keys, f"'{name}'", expected="a channel beside the time", remedy="leave it out")
+    if model.tolerance and model.role is not Role.ACTUATOR:
+        raise source.error(
+            (*keys, "tolerance"),
+            f"a tolerance of a channel that is no actuator ({model.role})",
+            expected="a tolerance only where a difference counts",
+            remedy="leave it out, or say `role: actuator`",
+        )
+    in_topics = trace.file.endswith(".mcap")
+    if in_topics and not all(model.from_.partition(":")):
+        raise source.error(
+            (*keys, "from"),
+            f"'{model.from_}'",
+            expected="the topic and the field of its messages: `/car/state:speed`",
+        )
+    if in_topics and model.time:
+        raise source.error(
+            (*keys, "time"), f"'{model.time}'", expected="none: a message has its time", remedy="leave it out"
+        )
+    plain = model.model_dump(exclude={"from_"})
+    return Channel(name=name, source=model.from_ or name, **plain)

@@ -1,0 +1,124 @@
+"""A scene: what a drive looks like from above, in channels. It is checked here and drawn elsewhere."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
+
+from mutator.config.yaml_files import Keys, Source, StrictModel
+from mutator.triggers.conditions import check_condition, check_formula
+
+Shape = Literal["box", "circle"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actor:
+    """Something that moves: its middle at (`x`, `y`) in m, turned by `heading` (rad, left positive), each a
+    formula over channels; `width` is a circle's diameter. It is there while `visible` holds."""
+
+    name: str
+    shape: Shape
+    length: float
+    width: float
+    x: str
+    y: str
+    heading: str
+    visible: str
+    about: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """A line on the ground: points (x, y) in m, or one that runs along x at `y`, a formula over channels."""
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+    y: str
+    dashed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """What can be drawn of a drive. `follow` is the actor that the view stays with ('' none)."""
+
+    actors: tuple[Actor, ...]
+    lines: tuple[Line, ...]
+    follow: str
+
+
+class _ActorModel(StrictModel, title="An actor"):
+    shape: Shape = Field("box", description="`box` or `circle`.")
+    length_m: float = Field(gt=0.0, allow_inf_nan=False, description="Along its heading, or across a circle.")
+    width_m: float | None = Field(
+        None, gt=0.0, allow_inf_nan=False, description="Across it; the length if left out."
+    )
+    x: str = Field(description="Of its middle, m: a formula over channels and derived values.")
+    y: str = Field("0", description="Of its middle, m, left positive.")
+    heading: str = Field("0", description="rad, left positive.")
+    visible: str = Field("True", description="The condition while which it is there.")
+    about: str = Field("", description="What it is.")
+
+
+class _LineModel(StrictModel, title="A line"):
+    points_m: list[list[float]] | None = Field(
+        None, min_length=2, description="The points [x, y] that it joins; or else `y`."
+    )
+    y: str | None = Field(None, description="Of a line along x, m: a formula over channels.")
+    dashed: bool = Field(False, description="Whether it is drawn dashed.")
+
+
+class SceneModel(StrictModel, title="The scene"):
+    """How a drive looks from above: SI units, x ahead, y to the left."""
+
+    actors: dict[str, _ActorModel] = Field(min_length=1, description="What moves, by name.")
+    lines: dict[str, _LineModel] = Field(default_factory=dict, description="Lanes and other lines, by name.")
+    follow: str | None = Field(None, description="The actor that the view stays with.")
+
+
+def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Scene:
+    """The scene of a manifest, `known` being the names that formulas may use; MutatorError with the line."""
+    if model.follow is not None and model.follow not in model.actors:
+        raise source.error(
+            ("scene", "follow"), f"'{model.follow}'", expected=f"one of {', '.join(model.actors)}"
+        )
+    actors = tuple(_actor(name, actor, known, source) for name, actor in model.actors.items())
+    lines = tuple(_line(name, line, known, source) for name, line in model.lines.items())
+    return Scene(actors=actors, lines=lines, follow=model.follow or "")
+
+
+def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source) -> Actor:
+    keys: Keys = ("scene", "actors", name)
+    with source.placing((*keys, "visible")):
+        visible = check_condition(model.visible, variables=known, over_time=True)
+    return Actor(
+        name=name,
+        shape=model.shape,
+        length=model.length_m,
+        width=model.width_m or model.length_m,
+        x=_formula(model.x, known, source, (*keys, "x")),
+        y=_formula(model.y, known, source, (*keys, "y")),
+        heading=_formula(model.heading, known, source, (*keys, "heading")),
+        visible=visible,
+        about=model.about,
+    )
+
+
+def _line(name: str, model: _LineModel, known: Collection[str], source: Source) -> Line:
+    keys: Keys = ("scene", "lines", name)
+    if (model.points_m is None) == (model.y is None):
+        raise source.error(keys, f"line '{name}'", expected="either `points_m` or `y`")
+    for i, point in enumerate(model.points_m or ()):
+        if len(point) != 2:
+            raise source.error((*keys, "points_m", i), f"{point}", expected="[x, y]")
+    return Line(
+        name=name,
+        points=tuple((x, y) for x, y in model.points_m or ()),
+        y="" if model.y is None else _formula(model.y, known, source, (*keys, "y")),
+        dashed=model.dashed,
+    )
+
+
+def _formula(text: str, known: Collection[str], source: Source, keys: Keys) -> str:
+    with source.placing(keys):
+        return check_formula(text, known, over_time=True)
