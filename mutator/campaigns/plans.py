@@ -25,7 +25,7 @@ from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
+from mutator.outcomes.columns import PLAN_COLUMNS, metric_columns, plan_row
 from mutator.store import digests, plan_file
 from mutator.store.check_results import measured_cpu_s
 from mutator.store.digests import Digest, Ledger
@@ -310,7 +310,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "limits": plain(plan.campaign.limits),
         "hazards": list(manifest.hazards),
         "compared": [channel.name for channel in manifest.compared],
-        "metrics": [[metric.name, metric.unit, metric.about] for metric in manifest.measures],
+        "metrics": metric_columns(manifest),
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
         "golden_files": list(manifest.outputs),
         "canary": canary,

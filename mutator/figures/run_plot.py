@@ -16,7 +16,8 @@ import numpy as np
 from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.outcomes.golden import Trace, times_of
-from mutator.targets.manifest import Channel, TargetManifest
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -56,9 +56,7 @@ _TO_REACTION = (
         "reaction_time", "number", "s", "first hazard minus first alert; empty unless the alert came first"
     ),
 )
-_END = (
-    Column("t_end", "number", "s", "when a terminal hazard ended the drive; later steps are in no metric"),
-)
+T_END = "t_end"
 EXTRA = (
     Column("variant", "text", "", "the variant of the spec"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
@@ -85,7 +83,6 @@ def result_columns(
 ) -> tuple[Column, ...]:
     """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, and
     name, unit and meaning of its metrics."""
-    metrics = tuple(metrics)
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -94,10 +91,17 @@ def result_columns(
             Column(column, "number", "the channel's", f"largest difference of `{name}` from golden")
             for name, column in deviation_columns(compared).items()
         ),
-        *(_END if metrics else ()),
         *(Column(name, "number", unit, about) for name, unit, about in metrics),
         *EXTRA,
     )
+
+
+def metric_columns(manifest: TargetManifest) -> list[list[str]]:
+    """Name, unit and meaning of the columns of a target's metrics; first when the drive ended, where a hazard
+    can end it."""
+    ends = any(hazard.terminal for hazard in manifest.rules)
+    end = [[T_END, "s", "when a terminal hazard ended the drive: later steps are in no metric"]]
+    return [*(end if ends else ()), *([m.name, m.unit, m.about] for m in manifest.measures)]
 
 
 def is_text(column: str) -> bool:
@@ -133,7 +137,7 @@ def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
 def check_names(manifest: TargetManifest) -> None:
     """MutatorError, at its line of the manifest, for a hazard whose columns have the name of another one."""
     taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
-    taken |= {*DERIVED, _END[0].name}
+    taken |= {*DERIVED, T_END}
     named = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):
         names = {column.name for column in hazard_columns(hazard)}

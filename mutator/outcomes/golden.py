@@ -16,7 +16,8 @@ from mutator._common.shortages import shortage
 from mutator.errors import MutatorError
 from mutator.outcomes import trace_files
 from mutator.outcomes.trace_files import own_times
-from mutator.targets.manifest import Channel, TargetManifest
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
 
 Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
 
@@ -68,10 +69,12 @@ def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[Channel] 
 
 
 def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
+    times = {own_times(name) for name in trace}
     for name, values in trace.items():
         if values.dtype.kind not in "biuf":
             raise BadOutput(f"channel {name} of something else than numbers", where=path)
-        if values.ndim != 1 or values.shape != times_of(trace, name, manifest.time_channel).shape:
+        wanted = values if name in times else times_of(trace, name, manifest.time_channel)
+        if values.ndim != 1 or values.shape != wanted.shape:
             raise BadOutput("channels of different lengths", where=path, expected="one value per step")
 
 
@@ -103,7 +106,8 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
         raise BadOutput(
             f"not a readable record ({_why(err)})", where=path, expected="a JSON object"
         ) from None
-    if not isinstance(data, dict) or not _has_times(data):
+    judges = any(hazard.recorded for hazard in manifest.rules)
+    if not isinstance(data, dict) or not _has_times(data, judges=judges):
         expected = "{hazards: {NAME: time or null}, alerts: [{name: NAME, t: time}]}"
         raise BadOutput("no hazards and alerts with their times", where=path, expected=expected)
     return data
@@ -124,8 +128,8 @@ def _why(err: Exception) -> str:
     return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
 
 
-def _has_times(record: dict[str, Any]) -> bool:
-    hazards, events = record.get("hazards", {}), _events(record)
+def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
+    hazards, events = record.get("hazards", None if judges else {}), _events(record)
     if not isinstance(hazards, dict) or not isinstance(events, list):
         return False
     times = [time for time in hazards.values() if time is not None]

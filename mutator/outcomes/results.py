@@ -13,6 +13,7 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.columns import (
+    T_END,
     TIMINGS,
     Column,
     deviation_columns,
@@ -59,7 +60,8 @@ def row(experiment: Experiment, record: Record, hazards: Sequence[str]) -> dict[
         cells[time.name] = _time(times.get(name))
     columns = deviation_columns([name for name, _ in record.max_dev])
     cells |= {columns[name]: value for name, value in record.max_dev}
-    return cells | {"t_end": _time(record.t_end), **dict(record.metrics)}
+    end = {} if record.t_end is None else {T_END: _time(record.t_end)}
+    return cells | end | dict(record.metrics)
 
 
 def _time(value: float | None) -> float | None:

@@ -38,15 +38,15 @@ def read(path: Path, manifest: TargetManifest, channels: Iterable[Channel] | Non
     if path.suffix == ".mcap":
         return _read_mcap(path, manifest.time_channel, wanted)
     of_time = [channel.time for channel in wanted if channel.time]
-    names = [manifest.time_channel, *of_time, *(channel.source for channel in wanted)]
+    names = [manifest.time_channel, *of_time, *(channel.in_trace for channel in wanted)]
     columns = _COLUMNS[path.suffix](path, None if channels is None else names)
-    known = {channel.source for channel in wanted} | {*of_time}
+    known = {channel.in_trace for channel in wanted} | {*of_time}
     values = {name: column for name, column in columns.items() if channels is None and name not in known}
     values[manifest.time_channel] = columns[manifest.time_channel]
     for channel in wanted:
-        if channels is None and channel.source not in columns:
+        if channels is None and channel.in_trace not in columns:
             continue
-        column = columns[channel.source]
+        column = columns[channel.in_trace]
         there = np.full(column.shape, True) if path.suffix == ".npz" else ~_empty(column)
         if channel.time:
             values[own_times(channel.name)] = columns[channel.time][there]
@@ -98,7 +98,7 @@ def _read_mcap(path: Path, steps: str, channels: Iterable[Channel]) -> Arrays:
         from mcap.reader import make_reader  # type: ignore[import-not-found]
     except ImportError:
         raise BadTrace("an .mcap file, and no package mcap", "pip install 'mutator[mcap]'") from None
-    places = {channel.name: channel.source.partition(":")[::2] for channel in channels}
+    places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}
     topics = {steps, *(topic for topic, _ in places.values())}
     seen: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     with no_pipe(path).open("rb") as file:

@@ -3,9 +3,11 @@
 from collections.abc import Iterable, Iterator
 
 from mutator._common.tables import Table
-from mutator.outcomes.columns import PLAN_COLUMNS, TIMINGS, Column, result_columns
+from mutator.outcomes.columns import PLAN_COLUMNS, TIMINGS, Column, metric_columns, result_columns
 from mutator.reference.tables import generated
-from mutator.targets.manifest import Channel, TargetManifest
+from mutator.targets.channels import Channel
+from mutator.targets.judging import Hazard, Metric
+from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import variable_units
 from mutator.workspace import Workspace
 
@@ -28,7 +30,7 @@ def results(workspace: Workspace) -> str:
             "Hazards and compared channels are the target's: its [manifest](target-manifest.md) names them. "
             "A hazard has two\ncolumns, its name in small letters and `t_` and that name. A channel has one, "
             "`max_dev_` and the first word of its\nname, or its whole name where two channels begin with the "
-            "same word.\n",
+            "same word. Margins of hazards and metrics\nhave the names that the manifest gives them.\n",
             *(line for manifest in manifests for line in _table_of(manifest)),
             "## plan.csv\n",
             f"`plan.csv` has what is known before a run: {left_out}.\n",
@@ -42,7 +44,8 @@ def results(workspace: Workspace) -> str:
 
 def _table_of(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
-    yield from _columns(result_columns(manifest.hazards, [channel.name for channel in manifest.compared]))
+    compared = [channel.name for channel in manifest.compared]
+    yield from _columns(result_columns(manifest.hazards, compared, metric_columns(manifest)))
 
 
 def _columns(columns: Iterable[Column]) -> Iterator[str]:
@@ -78,17 +81,41 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
         f"A trace is an array for each channel in `{manifest.trace_file}`, with a value for each step of "
         f"{manifest.step_s:g} s; `{manifest.time_channel}` is the time in s.\n"
     )
-    rows = [_channel(channel, "compared with golden") for channel in manifest.compared]
-    rows += [_channel(channel, "plotted") for channel in manifest.plotted]
-    yield Table(heads=("channel", "unit", "role", "meaning"), rows=rows).as_markdown(escape=False)
+    rows = map(_channel, manifest.channels)
+    heads = ("channel", "unit", "role", "component", "meaning")
+    yield Table(heads=heads, rows=rows).as_markdown(escape=False)
     yield ""
-    yield f"Hazards: {', '.join(manifest.hazards)}. Alerts that count: {', '.join(manifest.alerts)}.\n"
+    hazards = [_hazard(hazard) for hazard in manifest.rules]
+    heads = ("hazard", "comes when", "ends the drive", "meaning")
+    yield Table(heads=heads, rows=hazards).as_markdown(escape=False)
+    yield ""
+    metrics = [_metric(metric) for metric in manifest.measures]
+    if metrics:
+        heads = ("metric", "unit", "is", "worse", "meaning")
+        yield Table(heads=heads, rows=metrics).as_markdown(escape=False)
+        yield ""
+    yield f"Alerts that count: {', '.join(manifest.alerts) or 'none'}.\n"
     changes = [(f"`{name}`", f"`{' '.join(words)}`") for name, words in manifest.changes.items()]
     yield Table(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(escape=False)
     yield ""
 
 
-def _channel(channel: Channel, role: str) -> tuple[str, str, str, str]:
-    if channel.tolerance:
-        role += f", to {channel.tolerance:g}"
-    return f"`{channel.name}`", channel.unit, role, channel.about or "-"
+def _channel(channel: Channel) -> tuple[str, ...]:
+    role = f"{channel.role}, to {channel.tolerance:g}" if channel.tolerance else str(channel.role)
+    return f"`{channel.name}`", channel.unit, role, channel.component or "-", channel.about or "-"
+
+
+def _hazard(hazard: Hazard) -> tuple[str, ...]:
+    when = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "the record says so"
+    if hazard.for_s:
+        when += f" for {hazard.for_s:g} s"
+    ends = {"": "no", "True": "yes"}.get(hazard.terminal, f"`{hazard.terminal}`")
+    return hazard.name, when, ends, hazard.about or "-"
+
+
+def _metric(metric: Metric) -> tuple[str, ...]:
+    what = f"{metric.aggregate} of `{metric.formula}`" if metric.formula else "min of its robustness"
+    if metric.where:
+        what += f" where `{metric.where}`"
+    about = f"{metric.about} ({metric.source})" if metric.source else metric.about
+    return f"`{metric.name}`", metric.unit, what, metric.worse, about

@@ -20,7 +20,8 @@ from mutator.outcomes.golden import Trace, times_of
 from mutator.outcomes.rows import Row
 from mutator.report.panel import FOLDER as REPORT
 from mutator.store.run_folder import RunFolder
-from mutator.targets.manifest import Channel, TargetManifest
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
 from mutator.web import packed
 
 if TYPE_CHECKING:

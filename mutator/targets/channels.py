@@ -37,6 +37,11 @@ class Channel:
     time: str = ""
     source: str = ""
 
+    @property
+    def in_trace(self) -> str:
+        """What the trace calls it."""
+        return self.source or self.name
+
 
 class ChannelModel(StrictModel, title="A channel"):
     """By the name that conditions, tables and plots use."""
@@ -127,4 +132,4 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
             (*keys, "time"), f"'{model.time}'", expected="none: a message has its time", remedy="leave it out"
         )
     plain = model.model_dump(exclude={"from_"})
-    return Channel(name=name, source=model.from_ or name, **plain)
+    return Channel(name=name, source=model.from_, **plain)

@@ -8,7 +8,8 @@ import pytest
 
 from mutator.execution.running import run_campaign
 from mutator.outcomes.golden import load_trace
-from mutator.triggers.conditions import VARIABLES, evaluate
+from mutator.outcomes.judging import values_of
+from mutator.triggers.over_time import holds
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -87,9 +88,7 @@ def test_contexts_that_fault_free_runs_reach(quickstart: Path, workspace: Worksp
     manifest = workspace.manifest("openpilot")
     trace = load_trace(manifest, quickstart / "golden" / scenario)
     table = workspace.context_table("accelerate_decelerate")
-    reached = set()
-    for t, d_rel, v_ego, v_lead in zip(*(trace[name] for name in VARIABLES[:4]), strict=True):
-        values = {"t": t, "d_rel": d_rel, "v_ego": v_ego, "v_lead": v_lead}
-        if t >= 1.5:
-            reached |= {row.id for row in table.rows if evaluate(row.condition, values)}
+    values = values_of(manifest, trace)
+    armed = trace["t"] >= 1.5
+    reached = [row.id for row in table.rows if (holds(row.condition, values) & armed).any()]
     assert len(reached) == CONTEXTS[scenario]

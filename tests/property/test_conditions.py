@@ -1,13 +1,17 @@
 """Conditions: one canonical text, and a decision for every observation."""
 
 import ast
+import re
 
+import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.errors import MutatorError
-from mutator.triggers.conditions import VARIABLES, check_condition, evaluate, to_code
+from mutator.triggers.conditions import check_condition, check_formula, evaluate, to_code
+from mutator.triggers.over_time import holds, numbers
 
+VARIABLES = ("t", "gap", "speed", "closing")
 NUMBERS = st.integers(-100, 100).map(str) | st.floats(0, 1e300).map(repr) | st.sampled_from(VARIABLES)
 TERMS = st.recursive(
     NUMBERS,
@@ -57,20 +61,44 @@ def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, floa
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.text(max_size=40) | st.text(alphabet="hwt rs<=>()[].'_+-*/0123456789,:andort", max_size=40))
+@given(st.text(max_size=40) | st.text(alphabet="gap speed<=>()[].'_+-*/0123456789,:andort", max_size=40))
 def test_any_text_is_answered(text: str) -> None:
     """Whatever is typed is a condition of the few allowed kinds, or a MutatorError."""
     try:
-        code = to_code(check_condition(text))
+        code = to_code(check_condition(text, variables=VARIABLES))
     except MutatorError:
         return
     names = {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}
-    assert names <= {*VARIABLES, "abs", "min", "max", "_div"}
-    assert not any(
-        isinstance(n, ast.Attribute | ast.Subscript | ast.Lambda) for n in ast.walk(ast.parse(code))
-    )
+    assert names <= {*VARIABLES, "abs", "min", "max", "math", "_div"}
+    assert not any(isinstance(n, ast.Subscript | ast.Lambda) for n in ast.walk(ast.parse(code)))
 
 
-def test_infinite_headway_is_more_than_any() -> None:
-    """At standstill every finite headway is exceeded."""
-    assert evaluate("hwt > 1e308", {"t": 0.0, "d_rel": 5.0, "v_ego": 0.0, "v_lead": 1.0})
+@settings(max_examples=200, deadline=None)
+@given(CONDITIONS, st.lists(OBSERVED, min_size=1, max_size=6))
+def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, float]]) -> None:
+    """Over a whole trace a condition holds in those steps in which it holds alone."""
+    try:
+        canonical = check_condition(text, variables=VARIABLES)
+    except MutatorError as error:
+        assert "characters" in str(error)
+        return
+    columns = {name: np.array([step[name] for step in steps]) for name in VARIABLES}
+    if not {"min", "max"} & set(re.findall(r"\w+", text)):  # these two answer NaN by their order
+        assert holds(canonical, columns).tolist() == [evaluate(canonical, step) for step in steps]
+
+
+def test_formulas_over_a_trace() -> None:
+    """A number for each step, worked out by hand: a choice, division by 0, the rate of change."""
+    trace = {
+        "t": np.array([0.0, 0.5, 1.5]),
+        "gap": np.array([3.0, 2.0, -1.0]),
+        "v": np.array([0.0, 1.0, 2.0]),
+    }
+    headway = check_formula("gap / v if v > 0 else inf", trace)
+    assert numbers(headway, trace).tolist() == [np.inf, 2.0, -0.5]
+    assert numbers(check_formula("gap / v", trace), trace).tolist() == [np.inf, 2.0, -0.5]
+    rate = numbers(check_formula("rate(gap)", trace, over_time=True), trace)
+    assert np.isnan(rate[0])
+    assert rate[1:].tolist() == [-2.0, -3.0]
+    past = check_condition("ever(v >= 1) and gap < 2", variables=trace, over_time=True)
+    assert holds(past, trace).tolist() == [False, False, True]

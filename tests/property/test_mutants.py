@@ -17,11 +17,11 @@ from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed
 from mutator.mutants.building import Mutant, build, build_directly
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import VARIABLES
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 READINGS = Workspace.find(root=ROOT).readings().names
+VARIABLES = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
 NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 35.0, 1e22, 5e-324, math.nan, math.inf])
 CONDITIONS = st.one_of(
     st.floats(-1e3, 1e9).map(lambda t: f"t >= {t!r}"),

@@ -11,7 +11,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.figures.run_plot import Mark, MarkKind, draw_run, marks_of, save
 from mutator.model import Activation, Outcome, Record, Status
-from mutator.targets.manifest import Channel
+from mutator.targets.channels import Channel
 
 TIME = np.arange(300) * 0.01
 

@@ -91,7 +91,7 @@ def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: 
     """A hazard whose columns exist already is refused at its line of the manifest."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: {hazards}"))
-    with pytest.raises(MutatorError, match=rf"{Path(path).name}:23: '{at}'; expected a name whose columns"):
+    with pytest.raises(MutatorError, match=rf"{Path(path).name}:26: '{at}'; expected a name whose columns"):
         toy.manifest("toy")
 
 

@@ -11,13 +11,18 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.outcomes.fault_free import fault_free_runs, fault_free_table, own_alerts
 from mutator.store.run_folder import RunFolder
-from mutator.targets.manifest import Channel
+from mutator.targets.channels import Channel
+from mutator.targets.judging import Hazard
 
 MANIFEST: Any = SimpleNamespace(
     trace_file="trace.npz",
     record_file="record.json",
     time_channel="t",
-    hazards=("H1",),
+    rules=(Hazard(name="H1"),),
+    metrics=(),
+    judged=(),
+    channels=(),
+    observation=SimpleNamespace(derived=()),
     alerts=("fcw", "late"),
     plotted=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
 )

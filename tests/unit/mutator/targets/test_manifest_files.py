@@ -39,9 +39,15 @@ def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
     before, text = toy.manifest("toy").observation, path.read_text()
     head, _, rest = text.partition("  time: now.time")
     tail = rest.partition("hazards:")[2]
+    channels = "trace: {file: trace.npz, time: time}\nrecord: record.json\nchannels:\n"
+    files = "trace_file: trace.npz\ntime_channel: time\nrecord_file: record.json\ncompare:\n"
+    head = head.replace(channels, files).replace(", role: actuator", "")
     old = "  t: now.time\n  d_rel: now.gap\n  v_ego: now.speed\n  v_lead: now.lead_speed\nhazards:"
     path.write_text(head.replace("target/2", "target/1") + old + tail)
-    after = toy.manifest("toy").observation
+    manifest = toy.manifest("toy")
+    after = manifest.observation
+    assert (manifest.outputs, manifest.time_channel) == (("trace.npz", "record.json"), "time")
+    assert [(c.name, c.tolerance) for c in manifest.compared] == [("speed", 0.5)]
     assert after.expressions == before.expressions
     assert [(v.name, v.text, v.unit) for v in after.derived] == [
         (v.name, v.text, v.unit) for v in before.derived
@@ -134,26 +140,26 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("package: toycar", "package: toy-car", "4: 'toy-car'; expected a Python package's name"),
         ("module: toycar.run", "module: toycar/run", "9: 'toycar/run'; expected a dotted module name"),
         (
-            "trace_file: trace.npz",
-            "trace_file: ../trace.npz",
+            "file: trace.npz",
+            "file: ../trace.npz",
             "12: '../trace.npz'; expected a bare file name",
         ),
         ("step_s: 0.1", "step_s: 0", "7: 0 for 'step_s'; expected greater than or equal to 0.000001"),
         ("step_s: 0.1", "step_s: .inf", "7: inf for 'step_s'; expected a finite number"),
-        ("tolerance: 0.5", "tolerance: -1", "16: -1 for 'tolerance'"),
-        ("time: now.time", "time: now.time()", "19: 'now.time()'; expected names, attributes"),
-        ("time: now.time", "time: '[0][0]'", "19: '[0][0]'; expected names, attributes"),
-        ("time: now.time", "time: _fi.x", "19: '_fi.x'; expected names, attributes"),
-        ("is: now.gap", "is: 'now[i]'", "21: 'now[i]'; expected names, attributes, items with constant keys"),
-        ("is: now.gap", "is: 'open(\"x\")'", "21: 'open(\"x\")'; expected names, attributes"),
-        ("    d_rel:", "    t:", "21: 't'; expected a name of letters, digits and _, once, none of"),
-        ("    hwt:", "    d_rel:", "25: 'd_rel'; expected a name of letters, digits and _, once"),
-        ("is: v_ego - v_lead", "is: v_ego - v_leed", "26: unknown name 'v_leed' in 'v_ego - v_leed'"),
-        ("file: toycar/world.py", "file: ../world.py", "18: path '../world.py' leads out of the target"),
-        ("hazards: [H1]", "hazards: [H1, alert]", "27: 'alert'; expected a name"),
-        ("hazards: [H1]", "hazards: [H1, h1]", "27: 'h1'; expected a name"),
-        ("alerts: [beep]", "alerts: [beep;boop]", "28: 'beep;boop'; expected a name"),
-        ("  derived:", "  deriven:", "24: unknown key 'deriven'; expected one of at, time, values, derived"),
+        ("tolerance: 0.5", "tolerance: -1", "15: -1 for 'tolerance'"),
+        ("time: now.time", "time: now.time()", "18: 'now.time()'; expected names, attributes"),
+        ("time: now.time", "time: '[0][0]'", "18: '[0][0]'; expected names, attributes"),
+        ("time: now.time", "time: _fi.x", "18: '_fi.x'; expected names, attributes"),
+        ("is: now.gap", "is: 'now[i]'", "20: 'now[i]'; expected names, attributes, items with constant keys"),
+        ("is: now.gap", "is: 'open(\"x\")'", "20: 'open(\"x\")'; expected names, attributes"),
+        ("    d_rel:", "    t:", "20: 't'; expected a name of letters, digits and _, once, none of"),
+        ("    hwt:", "    d_rel:", "24: 'd_rel'; expected a name of letters, digits and _, once"),
+        ("is: v_ego - v_lead", "is: v_ego - v_leed", "25: unknown name 'v_leed' in 'v_ego - v_leed'"),
+        ("file: toycar/world.py", "file: ../world.py", "17: path '../world.py' leads out of the target"),
+        ("hazards: [H1]", "hazards: [H1, alert]", "26: 'alert'; expected a name"),
+        ("hazards: [H1]", "hazards: [H1, h1]", "26: 'h1'; expected a name"),
+        ("alerts: [beep]", "alerts: [beep;boop]", "27: 'beep;boop'; expected a name"),
+        ("  derived:", "  deriven:", "23: unknown key 'deriven'; expected one of at, time, values, derived"),
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:

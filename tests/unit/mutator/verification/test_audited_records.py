@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mutator.model import Activation, Outcome, Record, Status
-from mutator.targets.manifest import Channel
+from mutator.targets.channels import Channel
 from mutator.verification.audited_records import Recorded, verdicts
 
 HEAD = {"hazards": ["H1", "H3"], "compared": ["gas", "brake"]}

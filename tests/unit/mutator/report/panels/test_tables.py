@@ -63,12 +63,14 @@ def test_files_are_the_same_each_time(run: RunFolder) -> None:
 def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolder) -> None:
     """One that the fault-free run raises is named wherever alerts are counted, with how it drove."""
     golden = run.path / "golden" / "S1"
-    np.savez(golden / "trace.npz", t=np.arange(3000) / 100, lateral_offset=np.linspace(-0.25, 0.5, 3000))
+    drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt")}
+    drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
+    np.savez(golden / "trace.npz", **drive)
     record = {"hazards": {"H1": None}, "alerts": [{"name": "steer_saturated", "t": 12.29}]}
     (golden / "record.json").write_text(json.dumps(record))
     panel = tables_panel(ReportedRun.open(run, HERE))
     note = "Not every alert is a fault's doing: fault-free runs raise steer_saturated in S1."
     assert panel.html.count(str(escape(note))) == panel.markdown.count(note) >= 6
-    assert "| S1 | steer_saturated at 12.29 s | none | -0.25 to 0.5 |" in panel.markdown
+    assert "| S1 | steer_saturated at 12.29 s | none | 1 to 1 |" in panel.markdown
     assert note in (run.path / "report" / "tables" / "summary_guided.md").read_text()
     assert note not in (run.path / "report" / "tables" / "hazard_orders.md").read_text()

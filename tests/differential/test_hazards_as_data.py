@@ -1,0 +1,59 @@
+"""The hazards of the shipped target's manifest are those that its own checker finds, at the same times."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from selfdrive.sim.hazards import HazardMonitor
+from selfdrive.sim.truth import GroundTruth
+
+from mutator.outcomes.judging import judge_run
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+# values at which the checker decides, and both sides of them
+NEAR = [0.0, 0.3, 0.5 * (3.7 - 1.8), 0.5 * (3.7 + 1.8), 100.0, 200.0]
+NUMBERS = st.one_of(
+    *(st.sampled_from([at, np.nextafter(at, -np.inf), np.nextafter(at, np.inf), -at]) for at in NEAR)
+)
+STEPS = st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=40)
+
+
+@pytest.fixture(scope="module")
+def manifest() -> TargetManifest:
+    return Workspace.find(root=Path(__file__).parents[2]).manifest("openpilot")
+
+
+@settings(max_examples=1000, deadline=None)
+@given(steps=STEPS)
+def test_the_manifest_finds_what_the_checker_finds(
+    manifest: TargetManifest, steps: list[tuple[float, float, float]]
+) -> None:
+    """Whatever the distances, speeds and offsets: each hazard comes in the same step, or in none."""
+    monitor = HazardMonitor()
+    t = np.arange(len(steps)) * 0.01
+    for at, (d_rel, v_ego, offset) in zip(t, steps, strict=True):
+        monitor.update(
+            GroundTruth(
+                t=float(at),
+                d_rel=d_rel,
+                v_ego=v_ego,
+                v_lead=0.0,
+                a_ego=0.0,
+                lateral_offset=offset,
+                heading=0.0,
+                steer_angle=0.0,
+                steer_rate=0.0,
+                position=0.0,
+                hwt=0.0,
+                free_road=d_rel == 200.0,
+            )
+        )
+    columns = np.array(steps).T
+    names = [channel.name for channel in manifest.judged]
+    trace = dict.fromkeys(names, np.zeros(len(steps))) | {"t": t}
+    trace |= dict(zip(("d_rel", "v_ego", "lateral_offset"), columns, strict=True))
+    found = dict(judge_run(manifest, trace, {"hazards": {}}).hazards)
+    assert found == {name: time for name, time in monitor.first.items() if time is not None}

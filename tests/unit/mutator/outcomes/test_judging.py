@@ -1,0 +1,257 @@
+"""Hazards, ends of drives and metrics, against runs worked out by hand."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.outcomes.golden import load_record, load_trace
+from mutator.outcomes.judging import Judged, judge_run, load_judged
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.manifest_files import load_manifest
+
+# a cart that rolls towards a wall, backs off, hits it, and goes on through it
+T = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+GAP = np.array([3.0, 1.0, 2.0, 0.0, -1.0, 4.0])
+SPEED = np.array([1.0, 2.0, -1.0, 2.0, 1.0, 0.0])
+HEAD = """\
+schema: target/2
+name: cart
+root: .
+package: cart
+files: ["cart/*.py"]
+step_s: 1
+entry: {module: cart.go, args: []}
+trace: {file: trace.npz, time: time}
+channels:
+  force: {unit: N, role: actuator}
+  gap: {unit: m, role: truth}
+  speed: {unit: m/s, role: truth}
+observation:
+  at: {file: cart/go.py, function: step, after_assign: now}
+  values:
+    gap: {is: now.gap, unit: m, about: to the wall}
+    speed: {is: now.speed, unit: m/s, about: towards it}
+  derived:
+    left: {is: gap / speed if speed > 0 else inf, unit: s, about: until contact}
+"""
+Write = Callable[..., TargetManifest]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Writes a manifest with these last lines; `old: new` replace in what comes before."""
+
+    def manifest(rest: str, **replaced: str) -> TargetManifest:
+        text = HEAD
+        for old, new in replaced.items():
+            text = text.replace(f"{old}:", f"{new}")
+        (tmp_path / "cart.yaml").write_text(text + rest)
+        return load_manifest(tmp_path / "cart.yaml")
+
+    return manifest
+
+
+def judged(manifest: TargetManifest, **channels: Any) -> Judged:
+    trace = {"time": T, "gap": GAP, "speed": SPEED, "force": SPEED} | channels
+    return judge_run(manifest, trace, {"hazards": {}})
+
+
+@pytest.mark.parametrize(
+    ("rule", "first"),
+    [
+        ("when: gap <= 1", 1.0),
+        ("when: gap < 1", 3.0),
+        ("when: gap < -5", None),
+        ("{when: gap <= 2, for_s: 2}", 3.0),  # from 1 s to 4 s
+        ("{when: gap <= 1, for_s: 1}", 4.0),  # from 3 s: the stretch before is too short
+        ("{when: gap <= 1, for_s: 2}", None),
+        ("when: left < 1", 1.0),  # 1 m at 2 m/s: a derived value
+        ("when: rate(gap) > 3", 5.0),
+        ("when: ever(gap <= 0) and speed <= 0", 5.0),
+        ("when: t >= 2 and not gap > 1", 3.0),
+        ("when: hypot(gap, speed) >= abs(-4)", 5.0),
+        ("when: min(gap, speed) < 0", 2.0),
+    ],
+)
+def test_when_a_hazard_comes(write: Write, rule: str, first: float | None) -> None:
+    """A hazard comes in the first step in which its condition has held for as long as it must."""
+    rule = rule if rule.startswith("{") else f"{{{rule.replace(': ', ': ', 1)}}}"
+    key, _, value = rule.strip("{}").partition(": ")
+    condition, _, more = value.partition(", for_s")
+    more = f", for_s{more}" if more else ""
+    found = judged(write(f'hazards: {{HIT: {{{key}: "{condition}"{more}}}}}\n'))
+    assert found.hazards == (() if first is None else (("HIT", first),))
+    assert found.t_end is None
+
+
+@pytest.mark.parametrize(
+    ("metric", "value"),
+    [
+        ("min: gap", 0.0),  # at contact, not -1 behind it
+        ("max: gap", 3.0),  # not 4, after the end
+        ("mean: speed", 1.0),
+        ("last: speed", 2.0),
+        ("integral: speed", 4.0),  # 1 + 2 - 1 + 2: each value lasts until the next step
+        ('duration: "speed > 0"', 3.0),
+        ("at_end: speed", 2.0),
+        ("min: left", 0.0),
+        ('{min: gap, where: "speed < 0"}', 2.0),
+        ('{min: gap, where: "speed > 9"}', None),
+        ("max: rate(speed)", 3.0),
+        ("max: gap / (speed - speed)", None),  # NaN and infinities tell nothing
+    ],
+)
+def test_metrics_count_up_to_the_end_of_the_drive(write: Write, metric: str, value: float | None) -> None:
+    """An aggregate is taken over the steps up to the first terminal hazard, that step included."""
+    what = metric.strip("{}")
+    found = judged(
+        write(
+            'hazards: {HIT: {when: "gap <= 0", terminal: true}}\n'
+            f'metrics: {{it: {{{what}, unit: m, worse: lower, about: "x"}}}}\n'
+        )
+    )
+    assert found.t_end == 3.0
+    assert dict(found.metrics).get("it") == value
+
+
+def test_a_drive_without_an_end(write: Write) -> None:
+    """Without a terminal hazard the whole run counts, and there is nothing at its end."""
+    found = judged(
+        write(
+            "hazards: {}\nmetrics:\n"
+            "  least: {min: gap, unit: m, worse: lower, about: x}\n"
+            "  final: {at_end: gap, unit: m, worse: lower, about: x}\n"
+        )
+    )
+    assert (found.t_end, dict(found.metrics)) == (None, {"least": -1.0})
+
+
+def test_a_condition_may_end_the_drive(write: Write) -> None:
+    """A hazard may come before what ends the drive: too close at 1 s, contact at 3 s."""
+    found = judged(write('hazards: {NEAR: {when: "gap <= 1", terminal: "gap <= 0", unit: m}}\n'))
+    assert (found.hazards, found.t_end) == ((("NEAR", 1.0),), 3.0)
+    assert dict(found.metrics) == {"margin_near": -1.0}  # gap - 1, at contact
+
+
+@pytest.mark.parametrize(
+    ("rule", "margin"),
+    [
+        ('{when: "gap <= 1"}', -2.0),  # gap - 1
+        ('{when: "abs(speed) > 1.5"}', -0.5),  # 1.5 - abs(speed)
+        ('{when: "gap <= 1 and speed > 0"}', None),  # of which of the two?
+        ('{when: "gap <= 1 and speed > 0", margin: gap - 1}', -2.0),
+    ],
+)
+def test_margins(write: Write, rule: str, margin: float | None) -> None:
+    """The least margin of a run is a metric; that of a single comparison needs no words."""
+    assert dict(judged(write(f"hazards: {{HIT: {rule}}}\n")).metrics).get("margin_hit") == margin
+
+
+def test_what_the_target_judges_itself(write: Write) -> None:
+    """A hazard without a condition is taken from the record; others of the record do not count."""
+    manifest = write('record: record.json\nhazards: {HIT: {terminal: true}, NEAR: {when: "gap < 0.5"}}\n')
+    trace = {"time": T, "gap": GAP, "speed": SPEED}
+    found = judge_run(manifest, trace, {"hazards": {"HIT": 2.5, "OTHER": 1.0}})
+    assert (found.hazards, found.t_end) == ((("HIT", 2.5), ("NEAR", 3.0)), 2.5)
+    listed = judge_run(write("record: record.json\nhazards: [HIT]\n"), trace, {"hazards": {"HIT": None}})
+    assert listed.hazards == ()
+
+
+def test_channels_with_times_of_their_own(write: Write) -> None:
+    """A slow channel keeps its newest value for the steps; before its first it has none."""
+    manifest = write(
+        'hazards: {SEEN: {when: "seen < 2"}}\n',
+        observation="  seen: {unit: m, role: internal, time: t_seen}\nobservation:",
+    )
+    trace = {"time": T, "seen": np.array([5.0, 1.0]), "seen@": np.array([0.5, 3.5])}
+    assert judge_run(manifest, trace, {}).hazards == (("SEEN", 4.0),)
+
+
+def test_steps_of_any_length(write: Write) -> None:
+    """Time is the trace's own: conditions last and integrals weigh by it."""
+    manifest = write(
+        'hazards: {HIT: {when: "gap < 2", for_s: 0.5}}\n'
+        "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
+    )
+    trace = {"time": np.array([0, 0.1, 0.2, 1.0]), "gap": np.array([3, 1, 1, 1.0]), "speed": np.ones(4)}
+    found = judge_run(manifest, trace, {})
+    assert found.hazards == (("HIT", 1.0),)
+    assert dict(found.metrics)["way"] == pytest.approx(1.0)
+
+
+def test_a_formula_of_temporal_logic(write: Write) -> None:
+    """It is violated where the trace so far violates it; its robustness is the margin."""
+    pytest.importorskip("rtamt")
+    found = judged(write('hazards: {LATE: {stl: "(gap < 2) implies eventually[0:2](gap > 3)", unit: m}}\n'))
+    assert found.hazards == (("LATE", 3.0),)  # below 2 m at 1 s, and not above 3 m by 3 s
+    assert "margin_late" in dict(found.metrics)
+    with pytest.raises(MutatorError, match=r"cart.yaml:20: unknown name 'speeed' in"):
+        write('hazards: {LATE: {stl: "historically(speeed < 3)"}}\n')
+    with pytest.raises(MutatorError, match="unbounded always"):
+        write('hazards: {LATE: {stl: "always(speed < 3)"}}\n')
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
+def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
+    """The same run, recorded in any of the formats, with a channel at a rate of its own."""
+    import pandas as pd
+
+    places = ("/cart:force", "/cart:state.gap", "/cam:d") if kind == "mcap" else ("force", "gap", "seen")
+    force, gap, seen_at = (f"from: '{place}'" for place in places)
+    own_times = "" if kind == "mcap" else ", time: t_seen"
+    channels = (
+        f"  force: {{unit: N, role: actuator, {force}}}\n"
+        f"  gap: {{unit: m, {gap}}}\n"
+        f"  seen: {{unit: m, {seen_at}{own_times}}}\n"
+    )
+    head, _, rest = HEAD.partition("trace:")
+    _, _, rest = rest.partition("observation:")
+    steps = "/cart" if kind == "mcap" else "time"
+    trace_and_channels = f"trace: {{file: trace.{kind}, time: {steps}}}\nchannels:\n{channels}"
+    (tmp_path / "cart.yaml").write_text(
+        f"{head}{trace_and_channels}observation:{rest}"
+        'hazards: {HIT: {when: "gap <= 0", terminal: true}, SEEN: {when: "seen < 2"}}\n'
+    )
+    manifest = load_manifest(tmp_path / "cart.yaml")
+    path = tmp_path / manifest.trace_file
+    t_seen, seen = np.array([0.5, 3.5]), np.array([5.0, 1.0])
+    if kind == "npz":
+        np.savez(path, time=T, gap=GAP, force=SPEED, t_seen=t_seen, seen=seen)
+    elif kind == "mcap":
+        _write_mcap(path, t_seen, seen)
+    else:
+        frame = pd.DataFrame({"time": T, "gap": GAP, "force": SPEED})
+        frame = frame.join(pd.DataFrame({"t_seen": t_seen, "seen": seen}))
+        frame.to_csv(path, index=False) if kind == "csv" else frame.to_parquet(path)
+    found = load_judged(manifest, tmp_path)
+    assert found.hazards == (("HIT", 3.0), ("SEEN", 4.0))
+    trace = load_trace(manifest, tmp_path, manifest.channels)
+    assert trace["gap"].tolist() == GAP.tolist()
+    assert trace["seen@"].tolist() == t_seen.tolist()
+    assert load_record(manifest, tmp_path) == {"hazards": {}, "alerts": []}
+
+
+def _write_mcap(path: Path, t_seen: np.ndarray, seen: np.ndarray) -> None:
+    import json
+
+    writer_of = pytest.importorskip("mcap.writer")
+    with path.open("wb") as file:
+        writer = writer_of.Writer(file)
+        writer.start()
+        schema = writer.register_schema(name="any", encoding="jsonschema", data=b"{}")
+        cart, cam = (
+            writer.register_channel(topic=t, message_encoding="json", schema_id=schema)
+            for t in ("/cart", "/cam")
+        )
+        rows = [(t, cart, {"force": f, "state": {"gap": g}}) for t, f, g in zip(T, SPEED, GAP, strict=True)]
+        rows += [(t, cam, {"d": d}) for t, d in zip(t_seen, seen, strict=True)]
+        for t, channel, data in sorted(rows, key=lambda row: row[0]):
+            ns = int(t * 1e9)
+            writer.add_message(
+                channel_id=channel, log_time=ns, publish_time=ns, data=json.dumps(data).encode()
+            )
+        writer.finish()
