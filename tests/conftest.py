@@ -113,6 +113,15 @@ def copy_toycar() -> Callable[[Path], Workspace]:
 
 
 @pytest.fixture
+def pole(tmp_path: Path) -> Workspace:
+    """A copy of the pole's library and tree, with the project's templates."""
+    root = tmp_path / "pole"
+    shutil.copytree(_TESTS / "pole", root, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(_TESTS.parent / "templates", root / "templates")
+    return Workspace(library=root / "fault_library", templates=root / "templates")
+
+
+@pytest.fixture
 def experiment() -> Callable[..., Experiment]:
     """Makes an experiment that differs from the others made in what is given."""
 

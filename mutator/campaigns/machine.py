@@ -16,7 +16,8 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from mutator.engines.processes import THREADS, environment
+from mutator.engines.processes import environment
+from mutator.targets.environment import THREADS
 
 _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
 

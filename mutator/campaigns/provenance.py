@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from packaging.utils import canonicalize_name
+
 from mutator._common.files import json_bytes
 from mutator._common.hashing import digest, plain
 from mutator._common.version import VERSION
@@ -80,24 +82,26 @@ def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
     )
 
 
-def _packages(folder: RunFolder) -> dict[str, str | None]:
-    """Versions here of what the harness requires, and of what the golden runs of a folder loaded."""
+def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
+    """Versions here of what the harness requires, of what the golden runs of a folder loaded, and of more."""
     before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
-    return machine.versions({*machine.required(), *loaded_packages(folder), *before})
+    return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
 def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, accept: bool) -> None:
     """Note in run.json what this session runs with, once its checks have passed and before it drives any
     experiment. `records` is the glob of its files. MutatorError as `check_versions`."""
-    target = workspace.manifest(folder.head["target"]).root
-    places = {"library": workspace.library, "templates": workspace.templates, "target": target}
+    manifest = workspace.manifest(folder.head["target"])
+    places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
+    places |= {"overlay": manifest.overlay} if manifest.overlay else {}
+    packages = _packages(folder, (canonicalize_name(wanted.name) for wanted in manifest.requires))
     states = {name: machine.clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
     add_stretch(
         folder,
         Stretch(
             accepted=check_versions(folder, accept=accept),
             python=machine.python(),
-            packages={name: version for name, version in _packages(folder).items() if version},
+            packages={name: version for name, version in packages.items() if version},
             platform=platform.platform(),
             cpu=machine.cpu(),
             blas=machine.blas(),

@@ -211,4 +211,6 @@ def generate(
         terminal.emit(index)
     terminal.say(f"{counted(len(index), 'mutant')} in {out}; the list of them is {out / 'index.csv'}")
     first = out / index[0]["patch"]
-    terminal.say(f"apply one: patch -p1 -d {short_path(mutants.bench.manifest.root)} < {first}")
+    root = mutants.bench.manifest.root
+    if mutants.bench.manifest.overlay is None:  # else a patch is of two folders
+        terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}")

@@ -118,9 +118,9 @@ def _targets(workspace: "Workspace") -> Table:
     rows = []
     for name in workspace.targets:
         manifest = workspace.manifest(name)
-        row = {"name": name, "root": short_path(manifest.root), "package": manifest.package}
+        row = {"name": name, "root": short_path(manifest.root), "packages": ", ".join(manifest.packages)}
         rows.append(row | {"files": len(manifest.tree.files)})
-    return ["name", "root", "package", "files"], rows
+    return ["name", "root", "packages", "files"], rows
 
 
 LISTS: dict[Kind, Callable[["Workspace"], Table]] = {

@@ -193,7 +193,7 @@ class ForkEngine:
         if report["ended"] == "swap refused":
             raise Refused(str(report.get("why")))
         if report["outside"]:
-            raise Refused(f"the package was also imported from {', '.join(report['outside'])}")
+            raise Refused(f"the target was also imported from {', '.join(report['outside'])}")
         if report["threads"] != 1:
             raise Refused("it leaves threads behind")
         if report["ended"] == "ok" and (problem := job.problem_of(report["probe"])):

@@ -121,7 +121,7 @@ class Pool:
         start = {
             "tree": str(self.tree),
             "home": str(home),
-            "package": manifest.package,
+            "packages": list(manifest.import_names),
             "module": manifest.entry_module,
             "stepwise": manifest.stepwise,
         }
@@ -133,7 +133,7 @@ class Pool:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env=environment(0, home),
+                env=environment(0, home, manifest.env),
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )

@@ -6,6 +6,7 @@ import re
 import resource
 import signal
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -16,6 +17,7 @@ from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
+from mutator.targets.environment import FIXED, KEPT
 
 LOST = "lost"  # nobody is left to say how it ended
 PATIENCE_S = 60.0  # beyond the wall limit of a run, until who guards it must have said how it ended
@@ -25,7 +27,6 @@ _NAMES = ("outside", "modules", "libraries")  # in a report: texts
 _LOG_TAIL = 4000
 _LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
 _TRIAL = 1 << 20  # nor one where so much cannot be written
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
@@ -107,17 +108,11 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
     return Raised(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
 
 
-def environment(hash_seed: int, folder: Path) -> dict[str, str]:
-    """The whole environment of a run: nothing of the user's but what starting Python needs."""
-    kept = {name: os.environ[name] for name in ("PATH", "LD_LIBRARY_PATH", "HOME") if name in os.environ}
-    return kept | {
-        "LC_ALL": "C.UTF-8",
-        "PYTHONUTF8": "1",
-        "PYTHONHASHSEED": str(hash_seed),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "TMPDIR": str(folder),
-        **dict.fromkeys(THREADS, "1"),
-    }
+def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
+    """The whole environment of a run: nothing of the user's but what starting Python needs, and `more`."""
+    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
+    own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
+    return {**kept, **(more or {}), **own}
 
 
 def end(guarding: subprocess.Popen[bytes]) -> None:

@@ -124,7 +124,7 @@ class ReferenceEngine:
         request = {
             "home": str(folder),
             "tree": str(tree),
-            "package": self.manifest.package,
+            "packages": list(self.manifest.import_names),
             "module": self.manifest.entry_module,
             "args": list(arguments),
             "probe": probe_module(self.manifest.package) if job.mutant is not None else None,
@@ -152,7 +152,7 @@ class ReferenceEngine:
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
-                    env=environment(hash_seed, folder),
+                    env=environment(hash_seed, folder, self.manifest.env),
                     pass_fds=[theirs.fileno()],
                     start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
                 )
@@ -189,7 +189,7 @@ class ReferenceEngine:
     def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
         """What is wrong with the tree that ran; empty if it was the job's."""
         if report["outside"]:
-            return f"the package was also imported from {', '.join(report['outside'])}"
+            return f"the target was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
         more = {path for path in report["files"] if path.endswith(".py")}  # a cache of data may be left there
         for path in sorted(expected.keys() | more):

@@ -1,6 +1,5 @@
 """From experiments to records: build each mutant, have an engine run it, compare with golden, judge."""
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -121,7 +120,7 @@ class Runner:
 
     def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
         status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
-        place = f"{err.where.removeprefix(str(self.manifest.root) + os.sep)}: " if err.where else ""
+        place = f"{self.manifest.tree.named(err.where)}: " if err.where else ""
         return Finished(experiment=experiment, record=_bare(experiment, status, place + err.got, None))
 
     def _finish(self, experiment: Experiment, built: Mutant, execution: Execution) -> Finished:

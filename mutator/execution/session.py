@@ -31,6 +31,7 @@ from mutator.outcomes import results
 from mutator.store import digests
 from mutator.store.records import Progress, label
 from mutator.store.run_folder import RunFolder
+from mutator.targets.requirements import check_requirements
 from mutator.verification import equivalence
 from mutator.verification.preflight import are_there, run_checks
 from mutator.verification.seal import seal_of
@@ -105,6 +106,7 @@ class Session:
             equivalence.begin(self.folder.path)
         self.proof = equivalence.left(self.folder)
         if left or self.proof or not are_there(self.folder):
+            check_requirements(self._manifest)
             check_versions(self.folder, accept=self._accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             prepare_base(self._manifest, self.folder.base)

@@ -16,6 +16,7 @@ from mutator.mutants.building import Mutant
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.requirements import check_requirements
 from mutator.workspace import Workspace
 
 
@@ -45,6 +46,7 @@ def run_single(
     `faulty` is an empty folder when the mutant was refused, and holds what the run left when it did not end
     well. CheckFailed when the golden run does not end well.
     """
+    check_requirements(manifest)
     make_folder(out)
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")

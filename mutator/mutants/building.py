@@ -121,10 +121,10 @@ def _probe(
     hold: Hold,
     ids: tuple[str, ...],
 ) -> str:
-    path = probe_path(manifest.package)
-    if path in manifest.tree.files:
+    own = probe_path(manifest.package).removesuffix("py")
+    if taken := [path for path in manifest.tree.files if path.startswith((own, f"{own[:-1]}/"))]:
         raise MutatorError(
-            f"the target has a file {path}",
+            f"the target has a file {taken[0]}",
             where=manifest.root,
             expected="that name free for the probe",
             remedy="rename the target's file, or point the manifest at the original tree",

@@ -44,14 +44,14 @@ _SETTING = re.compile(
 )
 
 
-def probe_path(package: str) -> str:
-    """Path of the probe in a mutated tree, relative to the tree's root."""
-    return f"{package}/{PROBE_NAME}.py"
+def probe_path(package: str | None) -> str:
+    """Path of the probe in a mutated tree, relative to the tree's root; None: it lies in no package."""
+    return f"{package}/{PROBE_NAME}.py" if package else f"{PROBE_NAME}.py"
 
 
-def probe_module(package: str) -> str:
+def probe_module(package: str | None) -> str:
     """The probe's module name."""
-    return f"{package}.{PROBE_NAME}"
+    return f"{package}.{PROBE_NAME}" if package else PROBE_NAME
 
 
 def is_probe(path: str) -> bool:
@@ -136,9 +136,9 @@ def tag_words() -> dict[str, Any]:
     return {"mark": _MARK, "probe": [IMPORT_TAG, OBSERVE_TAG]}
 
 
-def import_statement(package: str) -> str:
+def import_statement(package: str | None) -> str:
     """The tagged line that imports the probe."""
-    return tagged(f"from {package} import {PROBE_NAME}", IMPORT_TAG)
+    return tagged(f"from {package} import {PROBE_NAME}" if package else f"import {PROBE_NAME}", IMPORT_TAG)
 
 
 def observe_call(expressions: Sequence[tuple[str, str]]) -> str:

@@ -68,7 +68,7 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
     )
 
 
-def probe_import(file: ParsedFile, package: str) -> Edit:
+def probe_import(file: ParsedFile, package: str | None) -> Edit:
     """The edit that imports the probe: after docstring and `__future__` imports."""
     if file.import_line == 0 and file.data.startswith(BOM_UTF8):
         raise MutatorError(

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import ScratchFolder, make_folder
+from mutator.engines import bytecode
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.figures.run_plot import marks_of
 from mutator.model import Record
 from mutator.targets.manifest import FILM, TargetManifest
+from mutator.targets.placeholders import filled
 from mutator.workspace import Workspace
 
 EVENTS_SCHEMA = "film-events/1"
@@ -50,12 +52,12 @@ def film_experiment(
         events = folder / "events.json"
         events.write_text(json.dumps(_events(single.record, title, _hazards(workspace))), encoding="utf-8")
         places = {
-            "{golden}": str(single.golden / FILM),
-            "{faulty}": str(single.faulty / FILM),
-            "{events}": str(events),
+            "golden": str(single.golden / FILM),
+            "faulty": str(single.faulty / FILM),
+            "events": str(events),
         }
         for shot in shots:
-            _show(manifest, places, shot)
+            _show(manifest, folder, places, shot)
     return same
 
 
@@ -77,16 +79,20 @@ def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, o
     }
 
 
-def _show(manifest: TargetManifest, places: Mapping[str, str], shot: Shot) -> None:
-    """Have the target's command write one file."""
+def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], shot: Shot) -> None:
+    """Have the target's command write one file; `folder` is for scratch."""
     film = manifest.film
     assert film is not None  # it has been taken
-    here = {**places, "{out}": str(shot.out.absolute()), "{t}": str(shot.t)}
+    tree = manifest.root
+    if manifest.overlay is not None:
+        tree = folder / "tree"
+        bytecode.put(manifest.tree.files, tree)
+    here = {**places, "out": str(shot.out.absolute()), "t": str(shot.t)}
     make_folder(shot.out.absolute().parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
     done = subprocess.run(
-        [sys.executable, "-P", "-s", "-m", film.module, *(here.get(a, a) for a in arguments)],
-        env=os.environ | {"PYTHONPATH": str(manifest.root), "PYTHONDONTWRITEBYTECODE": "1"},
+        [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)],
+        env={**os.environ, **manifest.env, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
         check=False,

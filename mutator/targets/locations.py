@@ -9,12 +9,18 @@ from mutator.targets.source_tree import matches
 
 def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
     """MutatorError (without place) unless a fault may be injected into the location's file."""
-    path = inside(manifest.root, location.path)
+    path = inside(location.path)
     if path != location.path or not path.endswith(".py") or path not in manifest.tree.files:
         raise MutatorError(
             f"no Python file '{location.path}' in target {manifest.name}",
             expected="a path relative to the target's root, among the manifest's files",
             remedy=f"correct the path, or the `files` of {manifest.path.name}",
+        )
+    if path in manifest.tree.overlaid:
+        raise MutatorError(
+            f"file '{path}' is in the overlay of target {manifest.name}",
+            expected="a file of the controller: glue is no place for a fault",
+            remedy="inject somewhere else",
         )
     if matches(path, manifest.forbid):
         raise MutatorError(

@@ -6,12 +6,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
+from packaging.requirements import Requirement
+
 from mutator._common import caches
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.observation import Observation
+from mutator.targets.placeholders import filled
 from mutator.targets.scene import Scene
 from mutator.targets.source_tree import SourceTree, matches, read_tree
 from mutator.triggers.conditions import names_in
@@ -40,9 +43,12 @@ class TargetManifest:
     name: str
     path: Path  # the manifest file
     root: Path  # absolute source root: goes on sys.path
-    package: str  # the import package in it, to which mutants add the probe
+    packages: tuple[str, ...]  # import packages (`pkg`) and flat modules (`b.py`) in it
     files: tuple[str, ...]  # globs, relative to root: what makes up the tree
+    overlay: Path | None  # absolute: a folder of glue that is laid over the root
     forbid: tuple[str, ...]  # globs: no fault may be injected there
+    env: Mapping[str, str]  # variables of every process that runs the target
+    requires: tuple[Requirement, ...]  # installed packages that the target needs
     entry_module: str  # run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}
     stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
@@ -65,16 +71,32 @@ class TargetManifest:
     # change -> scenarios that it makes the same: their traffic, say, is all they differ in, and it is gone
     same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def package(self) -> str | None:
+        """The package to which mutants add the probe; None: it is a module of its own beside several."""
+        first, *others = self.packages
+        return None if others or first.endswith(".py") else first
+
+    @property
+    def import_names(self) -> tuple[str, ...]:
+        """The top-level names of its modules: a run must import them from its own tree."""
+        laid_over = sorted(path for path in self.tree.overlaid if path.endswith(".py"))
+        names = (*self.packages, *(path.partition("/")[0] for path in laid_over))
+        return tuple(dict.fromkeys(name.removesuffix(".py") for name in names))
+
     @cached_property
     def tree(self) -> SourceTree:
         """The target's files, read once."""
-        tree = read_tree(self.root, self.files)
-        if not any(path.startswith(f"{self.package}/") for path in tree.files):
-            raise MutatorError(
-                f"no file of package '{self.package}' under {self.root}",
-                where=self.path,
-                remedy="correct `root`, `package` or `files`",
-            )
+        tree = read_tree(self.root, self.files, self.overlay)
+        for name in self.packages:
+            if name not in tree.files and not any(path.startswith(f"{name}/") for path in tree.files):
+                raise MutatorError(
+                    f"no module '{name}' under {self.root}"
+                    if name.endswith(".py")
+                    else f"no file of package '{name}' under {self.root}",
+                    where=self.path,
+                    remedy="correct `root`, `package`, `packages` or `files`",
+                )
         return tree
 
     @cached_property
@@ -122,8 +144,8 @@ class TargetManifest:
         independent: bool = False,
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
-        places = {"{scenario}": str(scenario), "{seed}": str(seed), "{out}": str(out)}
-        places |= {"{film}": str(out / FILM), "{cache}": str(caches.of_target(self.name))}
+        values = {"scenario": str(scenario), "seed": str(seed), "out": str(out)}
+        values |= {"film": str(out / FILM), "cache": str(caches.of_target(self.name))}
         extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:
@@ -134,8 +156,7 @@ class TargetManifest:
                     remedy="add it to the manifest's `changes`, or correct the spec",
                 )
             extra += self.changes[change]
-        filled = [places.get(argument, argument) for argument in self.entry_args]
-        return (*filled, *extra)
+        return tuple(filled((*self.entry_args, *extra), values))
 
     def filming(self) -> "TargetManifest":
         """The same target, whose runs leave a film; MutatorError for a target that cannot be filmed."""

@@ -4,12 +4,17 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
+from mutator._common.shipped import SHIPPED_TARGET
+from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.targets.channels import ChannelModel, TraceModel, read_channels
+from mutator.targets.environment import check_environment
 from mutator.targets.judging import HazardModel, MetricModel, read_hazards, read_metrics
 from mutator.targets.manifest import Film, TargetManifest
 from mutator.targets.observation import ObservationModel, read_observation
+from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
+from mutator.targets.requirements import read_requirements
+from mutator.targets.roots import INSTALLED, check_installed, find_root
 from mutator.targets.scene import SceneModel, read_scene
 from mutator.targets.upgrade import OLD, upgraded
 
@@ -26,12 +31,15 @@ class _ChangeModel(StrictModel, title="A change"):
 
 
 class _EntryModel(StrictModel, title="The entry"):
-    """In the arguments, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for trace
-    and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable or
-    damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
+    """Anywhere in an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for
+    trace and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable
+    or damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
 
     module: str = Field(description="Run as `python -m`, from the root.")
-    args: list[str] = Field(description="Its arguments.")
+    args: list[str] = Field(
+        default_factory=lambda: ["--scenario", "{scenario}", "--seed", "{seed}", "--out", "{out}"],
+        description="Its arguments; without them `--scenario {scenario} --seed {seed} --out {out}`.",
+    )
     stepwise: str | None = Field(
         None,
         description="A function of the module that takes these arguments and gives a run that is driven "
@@ -49,8 +57,9 @@ class _EntryModel(StrictModel, title="The entry"):
 
 
 class _FilmModel(StrictModel, title="Films"):
-    """What `mutator show --video` and `--still` need. `{film}`, `{golden}`, `{faulty}`, `{events}`, `{out}`
-    and `{t}` in the arguments are filled in."""
+    """What `mutator show --video` and `--still` need. In `run`, `{film}` is the folder for the film. In
+    `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of what happened,
+    `{out}` the file to write, and `{t}` the time in s of a still picture."""
 
     run: list[str] = Field(description="More arguments of the entry, which make a run leave a film.")
     module: str = Field(description="Run as `python -m` to show two films.")
@@ -65,17 +74,45 @@ class ManifestModel(StrictModel, title="The file"):
     about: str = Field("", description="What the target is.")
     root: str = Field(
         description="The folder that goes on `sys.path`, relative to this file; or `shipped:target`, the "
-        "controller that ships with mutator. `--target` overrides it."
+        "controller that ships with mutator; or `installed:NAME`, the folder in which pip put the import "
+        "package `NAME`, of which nothing else is part of the tree. `--target` overrides it."
     )
-    package: str = Field(description="The import package in it. The probe is added to it as `_fi.py`.")
-    files: list[str] = Field(
-        description="Globs, relative to the root: what makes up the tree. `**` stands for any folders."
+    package: str | None = Field(
+        None, description="The import package in it. The probe is added to it as `_fi.py`."
+    )
+    packages: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="Instead of `package`: several import packages, or modules that lie in no package "
+        "(`drive.py`). The probe is then a module of its own beside them, `_fi.py`.",
+    )
+    files: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="Globs, relative to the root: what makes up the tree. `**` stands for any folders. "
+        "Without it, all `.py` files of the packages and modules. Links count as what they lead to.",
+    )
+    overlay: str | None = Field(
+        None,
+        description="A folder of glue, relative to this file or to the library, that is laid over the root: "
+        "all its files are part of the tree, and no fault may be injected there. The entry module and the "
+        "observation may lie in it.",
     )
     forbid: list[str] = Field(default_factory=list, description="Globs: no fault may be injected there.")
     reads_itself: list[str] = Field(
         default_factory=list,
         description="Globs: files that a run reads while it runs, as what it caches follows from them. A "
         "mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
+    )
+    env: dict[str, str] = Field(
+        default_factory=dict,
+        description="Environment variables of every process that runs the target, beside the few that the "
+        "harness sets; nothing else of the user's environment gets there.",
+    )
+    requires: list[str] = Field(
+        default_factory=list,
+        description="Installed packages that the target needs, as pip takes them: `gymnasium>=1.0`. One "
+        "that is missing or of another version is told by `check`, `doctor`, and before a run.",
     )
     step_s: float = Field(ge=1e-6, allow_inf_nan=False, description="The length of a step of simulation.")
     armed_after_s: float = Field(
@@ -111,27 +148,36 @@ class ManifestModel(StrictModel, title="The file"):
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
     model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
-    folder = (root or _root(path, model.root)).resolve()
+    requires = read_requirements(model.requires, source)
+    folder = (root or find_root(model.root, source, requires)).resolve()
     if not folder.is_dir():
         raise source.error(
             ("root",),
             f"no folder {folder}",
-            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET}",
+            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET}, or "
+            f"{INSTALLED}NAME",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
     _check_names(model, source)
+    _check_placeholders(model, source)
     _check_events(model, source)
+    check_environment(model.env, source)
+    packages = _packages(model, source)
+    check_installed(model.root, packages, model.files or (), source)
     changes = model.entry.changes
     channels = read_channels(model.channels, model.trace, source)
-    observation = read_observation(model.observation, source, folder)
+    observation = read_observation(model.observation, source)
     known = observation.judgeable(channel.name for channel in channels)
     return TargetManifest(
         name=model.name,
         path=path,
         root=folder,
-        package=model.package,
-        files=tuple(model.files),
+        packages=packages,
+        files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**/*.py" for p in packages)),
+        overlay=_overlay(path, model, source),
         forbid=tuple(model.forbid),
+        env=model.env,
+        requires=requires,
         entry_module=model.entry.module,
         entry_args=tuple(model.entry.args),
         stepwise=model.entry.stepwise,
@@ -155,13 +201,49 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     )
 
 
-def _root(path: Path, root: str) -> Path:
-    return shipped_folder() / "target" if root == SHIPPED_TARGET else path.parent / root
+def _overlay(path: Path, model: ManifestModel, source: Source) -> Path | None:
+    if model.overlay is None:
+        return None
+    for folder in (path.parent / model.overlay, path.parent.parent / model.overlay):
+        if folder.is_dir():
+            return folder.resolve()
+    raise source.error(
+        ("overlay",),
+        f"no folder {path.parent / model.overlay}",
+        expected="a folder of glue, relative to this file or to the library",
+        remedy="correct `overlay`, or make the folder",
+    )
+
+
+def _packages(model: ManifestModel, source: Source) -> tuple[str, ...]:
+    """The target's packages and modules, each once."""
+    if (model.package is None) == (model.packages is None):
+        raise source.error(
+            ("packages",),
+            "neither `package` nor `packages`" if model.package is None else "both `package` and `packages`",
+            expected="one of them",
+            remedy="name the import package under `package`; several, and modules, under `packages`",
+        )
+    if model.package is not None:
+        if not model.package.isidentifier():
+            raise source.error(("package",), f"'{model.package}'", expected="a Python package's name")
+        return (model.package,)
+    names = tuple(model.packages or ())
+    seen = {PROBE_NAME}
+    for i, name in enumerate(names):
+        stem = name.removesuffix(".py")
+        if not stem.isidentifier() or stem in seen:
+            raise source.error(
+                ("packages", i),
+                f"'{name}'",
+                expected=f"a package, or a module's file such as drive.py, each once, none {PROBE_NAME}",
+                remedy="correct it; what is inside a package needs no mention",
+            )
+        seen.add(stem)
+    return names
 
 
 def _check_names(model: ManifestModel, source: Source) -> None:
-    if not model.package.isidentifier():
-        raise source.error(("package",), f"'{model.package}'", expected="a Python package's name")
     for key, command in (("entry", model.entry), ("film", model.film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error((key, "module"), f"'{command.module}'", expected="a dotted module name")
@@ -169,6 +251,22 @@ def _check_names(model: ManifestModel, source: Source) -> None:
         raise source.error(("entry", "stepwise"), f"'{stepwise}'", expected="a function of the entry module")
     if model.record is not None and Path(model.record).name != model.record:
         raise source.error(("record",), f"'{model.record}'", expected="a bare file name, made in {out}")
+
+
+def _check_placeholders(model: ManifestModel, source: Source) -> None:
+    entry = ("entry",)
+    check_placeholders(model.entry.args, OF_RUNS, source, (*entry, "args"))
+    check_placeholders(model.entry.independent, OF_RUNS, source, (*entry, "independent"))
+    for name, change in model.entry.changes.items():
+        keys = (*entry, "changes", name)
+        if isinstance(change, list):
+            check_placeholders(change, OF_RUNS, source, keys)
+        else:
+            check_placeholders(change.args, OF_RUNS, source, (*keys, "args"))
+    if (film := model.film) is not None:
+        check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))
+        check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
+        check_placeholders(film.still, OF_FILMS, source, ("film", "still"))
 
 
 def _check_events(model: ManifestModel, source: Source) -> None:

@@ -5,7 +5,6 @@ import keyword
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 from pydantic import Field
 
@@ -105,11 +104,11 @@ class ObservationModel(StrictModel, title="The observation"):
     )
 
 
-def read_observation(model: ObservationModel, source: Source, root: Path) -> Observation:
+def read_observation(model: ObservationModel, source: Source) -> Observation:
     """The observation of a manifest; errors point into `source`."""
     location = model.at.location(source, ("observation", "at"))
     with source.placing(("observation", "at", "file")):
-        inside(root, location.path)
+        inside(location.path)
     _check_names(model, source)
     time = None if model.time is None else _read(model.time, source, ("observation", "time"))
     values = tuple(

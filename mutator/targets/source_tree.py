@@ -1,7 +1,8 @@
 """A target's files in memory: read once, digested once, and what others derive from each of them."""
 
+import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -12,22 +13,29 @@ from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
 
 T = TypeVar("T")
+_SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # in a glob
 
 
 @dataclass(frozen=True)
 class SourceTree:
-    """Snapshot of a target: path relative to the root -> bytes; `digest` identifies it."""
+    """Snapshot of a target: path relative to the root -> bytes; `digest` identifies it.
+
+    Files of the folder `overlay` are laid over those of the root: `overlaid` has their paths.
+    """
 
     root: Path
     files: Mapping[str, bytes]
     digest: str
     _entries: Mapping[str, str] = field(repr=False)  # what the digest is made of
+    overlay: Path | None = None
+    overlaid: frozenset[str] = frozenset()
     _derived: dict[tuple[str, Callable[..., Any]], Any] = field(
         default_factory=dict, repr=False, compare=False
     )
 
     def derived(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
-        """What `make(path, data, root)` returns for a file of the target; called once for each path.
+        """What `make(path, data, root)` returns for a file of the target; called once for each path. `root`
+        is the folder that it was read from.
 
         MutatorError when the target has no file at `path`; errors of `make` pass through.
         """
@@ -40,8 +48,15 @@ class SourceTree:
                     expected="a path relative to the target's root, among the manifest's files",
                     remedy="correct the path, or add the file to the manifest's `files`",
                 )
-            self._derived[key] = make(path, self.files[path], self.root)
+            root = self.overlay if self.overlay and path in self.overlaid else self.root
+            self._derived[key] = make(path, self.files[path], root)
         return cast("T", self._derived[key])
+
+    def named(self, where: str) -> str:
+        """A place in the target's folders as specs name it: relative to them."""
+        for folder in (self.root, self.overlay or self.root):
+            where = where.removeprefix(f"{folder}{os.sep}")
+        return where
 
     @property
     def digests(self) -> dict[str, str]:
@@ -63,22 +78,67 @@ def _digest(entries: Mapping[str, str]) -> str:
     return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
-def read_tree(root: Path, globs: Iterable[str]) -> SourceTree:
-    """Read the files of `root` that match; bytecode is never part of a tree."""
-    patterns = tuple(globs)
-    files = {}
-    for path in sorted(root.rglob("*")):
-        name = path.relative_to(root).as_posix()
-        if (
-            path.suffix != ".pyc"
-            and "__pycache__" not in path.parts
-            and path.is_file()
-            and matches(name, patterns)
-        ):
-            check_is_text(path)
-            files[name] = path.read_bytes()
+def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> SourceTree:
+    """Read the files of `root` that match, and all of `overlay`; bytecode is never part of a tree.
+
+    Links count as what they lead to. MutatorError for one that leads nowhere, and for a path that both
+    folders have.
+    """
+    files = _read(root, tuple(globs))
+    laid_over = _read(overlay, ("**",)) if overlay else {}
+    for path in laid_over:
+        if os.path.lexists(root / path):
+            raise MutatorError(
+                f"'{path}' is in the overlay and in {root}",
+                where=overlay,
+                expected="files that the root has not",
+                remedy="rename the overlay's file",
+            )
+    files |= laid_over
     entries = _entries(files)
-    return SourceTree(root=root, files=files, digest=_digest(entries), _entries=entries)
+    return SourceTree(
+        root=root,
+        files=files,
+        digest=_digest(entries),
+        _entries=entries,
+        overlay=overlay,
+        overlaid=frozenset(laid_over),
+    )
+
+
+def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
+    """The files of a folder that match, by their path in it, sorted."""
+    folders = {_SPECIAL.split(glob)[0].rpartition("/")[0] for glob in globs}
+    found = {path: path.relative_to(root).as_posix() for name in folders for path in _below(root / name)}
+    files = {}
+    for path in sorted(path for path, name in found.items() if matches(name, globs)):
+        check_is_text(path)
+        if path.is_symlink() and not path.exists():
+            raise MutatorError(
+                f"a link to {path.readlink()}, where nothing is",
+                where=path,
+                expected="a file",
+                remedy="mend or remove it, or leave it out of `files`",
+            )
+        if path.is_file():
+            files[found[path]] = path.read_bytes()
+    return files
+
+
+def _below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
+    """Everything below a folder that is no folder itself, but for bytecode; a link that leads back to a
+    folder above it is not followed."""
+    here = folder.resolve()
+    try:
+        inside = list(folder.iterdir()) if folder.is_dir() and here not in above else []
+    except PermissionError:
+        return
+    for path in inside:
+        if path.is_dir():
+            if path.name != "__pycache__":
+                yield from _below(path, (*above, here))
+        elif path.suffix != ".pyc":
+            yield path
 
 
 def matches(path: str, globs: Iterable[str]) -> bool:
@@ -88,6 +148,6 @@ def matches(path: str, globs: Iterable[str]) -> bool:
 
 @lru_cache(maxsize=1024)
 def _pattern(glob: str) -> re.Pattern[str]:
-    parts = re.split(r"(\*\*/|\*\*|\*|\?)", glob)
+    parts = _SPECIAL.split(glob)
     special = {"**/": r"(?:.*/)?", "**": r".*", "*": r"[^/]*", "?": r"[^/]"}
     return re.compile("".join(special.get(part, re.escape(part)) for part in parts) + r"\Z")

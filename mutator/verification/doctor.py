@@ -14,7 +14,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from packaging.requirements import Requirement
+
 from mutator.errors import MutatorError
+from mutator.targets.requirements import MISSING, check_requirements, shortcoming
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -65,23 +68,18 @@ def _python() -> Finding:
 
 def _packages() -> Iterator[Finding]:
     """Each package mutator itself requires (not its extras), present and of a version it may have."""
-    from packaging.requirements import Requirement  # comes with pytest
-
     for line in importlib.metadata.requires("mutator") or ():
         wanted = Requirement(line)
         if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
             continue
         remedy = f"pip install '{wanted.name}{wanted.specifier}'"
-        try:
-            version = importlib.metadata.version(wanted.name)
-        except importlib.metadata.PackageNotFoundError:
-            yield Finding(name=wanted.name, level=Level.FAIL, found="not installed", remedy=remedy)
-            continue
-        if wanted.specifier.contains(version, prereleases=True):
-            yield Finding(name=wanted.name, level=Level.OK, found=version)
+        problem = shortcoming(wanted)
+        if not problem:
+            found = importlib.metadata.version(wanted.name)
+            yield Finding(name=wanted.name, level=Level.OK, found=found)
         else:
-            found = f"{version}, wanted {wanted.specifier}"
-            yield Finding(name=wanted.name, level=Level.WARN, found=found, remedy=remedy)
+            level = Level.FAIL if problem == MISSING else Level.WARN
+            yield Finding(name=wanted.name, level=level, found=problem, remedy=remedy)
 
 
 def _cores() -> Finding:
@@ -146,7 +144,9 @@ def _library(workspace: "Workspace") -> Iterator[Finding]:
     for name in names:
         try:
             manifest = workspace.manifest(name)
-            found = f"{manifest.root}: {len(manifest.tree.files)} files"
+            check_requirements(manifest)
+            overlay = f" and {manifest.overlay}" if manifest.overlay else ""
+            found = f"{manifest.root}{overlay}: {len(manifest.tree.files)} files"
             yield Finding(name=f"target {name}", level=Level.OK, found=found)
         except MutatorError as e:
             yield Finding(name=f"target {name}", level=Level.FAIL, found=str(e), remedy=e.remedy or "")

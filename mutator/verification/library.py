@@ -1,6 +1,5 @@
 """Is everything in the library usable? What `mutator check` asks."""
 
-import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -23,6 +22,7 @@ from mutator.mutants.splicing import apply_edits, joined, unsplice
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.requirements import check_requirements
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
@@ -40,6 +40,8 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """
     found = _Found()
     manifest = found.tried(lambda: workspace.manifest(target))
+    if manifest:
+        found.tried(lambda: check_requirements(manifest))
     models = found.tried(workspace.fault_models)
     hazards = found.tried(workspace.hazards)
     tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
@@ -138,7 +140,7 @@ def _where(error: MutatorError, manifest: TargetManifest) -> str:
     """Where in the target an error is, as specs name its files: ` (pkg/radar.py:28)`."""
     if not error.where:
         return ""
-    path = error.where.removeprefix(f"{manifest.root}{os.sep}")
+    path = manifest.tree.named(error.where)
     return f" ({path})" if error.line is None else f" ({path}:{error.line})"
 
 

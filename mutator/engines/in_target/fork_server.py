@@ -69,7 +69,7 @@ class Process:
         self.connection = connection
         self.places = child.places(start["tree"])
         self.stamp = child.stamp(self.places)
-        self.outside: list[str] = []  # files of the package that were imported from elsewhere
+        self.outside: list[str] = []  # files of its packages that were imported from elsewhere
         self.begin: Any = None
         self.run: Any = None
         self.step = 0
@@ -190,8 +190,8 @@ class Process:
         os._exit(0)
 
     def elsewhere(self, names: Iterable[str]) -> Any:
-        """Files of the package that modules of these names were imported from, other than the tree's."""
-        return child.imported_elsewhere(self.start["package"], self.start["tree"], names)
+        """Files of its packages that modules of these names were imported from, other than the tree's."""
+        return child.imported_elsewhere(self.start["packages"], self.start["tree"], names)
 
     def touched(self) -> bool:
         """Whether the tree is another one than it was."""
@@ -221,7 +221,7 @@ class Process:
                 run.step()
             run.write(Path(job["out"]))
             if seen is not None:
-                report["libraries"] = child.libraries(known, self.start["package"])
+                report["libraries"] = child.libraries(known, self.start["packages"])
         except swap.SwapRefused as why:
             report |= {"ended": "swap refused", "why": str(why)}
         except BaseException as err:

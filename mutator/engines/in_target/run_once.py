@@ -3,7 +3,7 @@ only: no code of the harness may change what the target does.
 
 At its first moment it forks. The parent guards the run (see guard.py) and sends into the socket how it ended.
 The child limits itself, puts the tree first on sys.path, runs the entry module as `__main__`, and writes
-report.json: how the run ended, what the tree was (digests of its files), whether the package was also
+report.json: how the run ended, what the tree was (digests of its files), whether its packages were also
 imported from elsewhere, and what the probe counted.
 """
 
@@ -71,8 +71,8 @@ def run(job: dict[str, Any]) -> None:
     except BaseException as err:
         report |= describe(err, job["tree"], job["probe"])
     report |= asked(probe, job["tree"], job["probe"]) if probe else {"probe": None}
-    report["outside"] = imported_elsewhere(job["package"], job["tree"], sys.modules)
-    report["modules"] = third_party(known, job["package"])
+    report["outside"] = imported_elsewhere(job["packages"], job["tree"], sys.modules)
+    report["modules"] = third_party(known, job["packages"])
     report["files"] = tree_files(job["tree"])
     Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
 
@@ -172,10 +172,10 @@ def passed(err: BaseException, tree: str) -> list[tuple[str, int]]:
     return list(dict.fromkeys(reversed(places)))
 
 
-def imported_elsewhere(package: str, tree: str, names: Iterable[str]) -> list[str]:
-    """Files of the package that were imported from outside the tree, among the modules of these names."""
+def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str]) -> list[str]:
+    """Files of the packages that were imported from outside the tree, among the modules of these names."""
     found = []
-    for name in sorted(name for name in names if name.partition(".")[0] == package):
+    for name in sorted(name for name in names if name.partition(".")[0] in packages):
         file = getattr(sys.modules[name], "__file__", None)
         if file and not file.startswith(tree + os.sep):
             found.append(file)
@@ -192,15 +192,15 @@ def imported_since(name: str) -> list[str]:
     return names
 
 
-def libraries(known: set[str], package: str) -> list[str]:
-    """Modules that were imported beside the `known` ones, in that order, but for those of the package."""
-    return [name for name in sys.modules if name not in known and name.partition(".")[0] != package]
+def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
+    """Modules that were imported beside the `known` ones, in that order, but for those of the packages."""
+    return [name for name in sys.modules if name not in known and name.partition(".")[0] not in packages]
 
 
-def third_party(known: set[str], package: str) -> list[str]:
-    """Top-level names of what was imported beside the `known` modules, but for those of the package and the
+def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
+    """Top-level names of what was imported beside the `known` modules, but for those of the packages and the
     standard library."""
-    return sorted({name.partition(".")[0] for name in libraries(known, package)} - sys.stdlib_module_names)
+    return sorted({name.partition(".")[0] for name in libraries(known, packages)} - sys.stdlib_module_names)
 
 
 def tree_files(tree: str) -> dict[str, str]:

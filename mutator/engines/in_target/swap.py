@@ -24,7 +24,8 @@ def install(name: str, code: types.CodeType) -> Any:
     module.__file__, module.__package__ = code.co_filename, package
     sys.modules[name] = module
     exec(code, vars(module))
-    setattr(sys.modules[package], own, module)
+    if package:
+        setattr(sys.modules[package], own, module)
     return module
 
 

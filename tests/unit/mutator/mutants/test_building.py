@@ -81,6 +81,16 @@ def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
             assert unsplice(data) == manifest.tree.files[path]
 
 
+@pytest.mark.parametrize("name", ["toycar/_fi.py", "toycar/_fi/__init__.py"])
+def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
+    """A module or package of the target that is called as the probe is refused by its path."""
+    path = toy.manifest("toy").root / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("x = 1\n")
+    with pytest.raises(MutatorError, match=rf"the target has a file {name}; expected that name free"):
+        build(toy, None)
+
+
 def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
     """The patched copy, the written tree and the digest agree, and the target itself is untouched."""
     manifest = toy.manifest("toy")

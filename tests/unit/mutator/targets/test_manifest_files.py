@@ -8,9 +8,13 @@ from mutator._common import caches
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
+from mutator.mutants.building import build
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.source_tree import matches, read_tree
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
+
+FILM = 'film: {run: ["x={film}"], module: show, args: ["{out}"], still: ["{film}"]}'
 
 
 def test_a_manifest_is_read(toy: Workspace) -> None:
@@ -64,6 +68,28 @@ def test_arguments(toy: Workspace) -> None:
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
     with pytest.raises(MutatorError, match="change 'no_lead'; expected one of alone"):
         manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
+
+
+def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
+    """Each is filled in once, in arguments of the entry, of changes and of independent runs; other braces
+    stay."""
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
+    text = text.replace("  changes:", '  independent: ["--log={out}:{seed}"]\n  changes:')
+    path.write_text(text)
+    given = toy.manifest("toy").arguments(
+        scenario=Path("s{seed}.yaml"), seed=3, out=Path("o"), changes=("alone",), independent=True
+    )
+    assert given == ("s{seed}.yaml", "--seed", "3", "--out", "o", "--log=o:3", "--in=o/x", '{"a": {}}')
+
+
+def test_arguments_may_be_left_out(toy: Workspace) -> None:
+    """An entry without arguments has scenario, seed and output folder as options."""
+    path = toy.library / "targets" / "toy.yaml"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if not line.startswith("  args:")))
+    given = toy.manifest("toy").arguments(scenario=Path("s"), seed=3, out=Path("o"))
+    assert given == ("--scenario", "s", "--seed", "3", "--out", "o")
 
 
 def test_the_harness_names_the_cache(toy: Workspace) -> None:
@@ -156,6 +182,14 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("    hwt:", "    d_rel:", "24: 'd_rel'; expected a name of letters, digits and _, once"),
         ("is: v_ego - v_lead", "is: v_ego - v_leed", "25: unknown name 'v_leed' in 'v_ego - v_leed'"),
         ("file: toycar/world.py", "file: ../world.py", "17: path '../world.py' leads out of the target"),
+        ('"{seed}"', '"{sed}"', "10: '{sed}' in '{sed}'; expected one of {scenario}, {seed}, {out}, {cache}"),
+        ('"{out}"', '"--out={film}"', "10: '{film}' in '--out={film}'; expected one of {scenario}"),
+        ("[--alone,", "['{outt}',", "'{outt}' in '{outt}'; expected one of {scenario}"),
+        (
+            "alerts: [beep]",
+            f"{FILM}\nalerts: [beep]",
+            "27: '{film}' in '{film}'; expected one of {golden}",
+        ),
         ("hazards: [H1]", "hazards: [H1, alert]", "26: 'alert'; expected a name"),
         ("hazards: [H1]", "hazards: [H1, h1]", "26: 'h1'; expected a name"),
         ("alerts: [beep]", "alerts: [beep;boop]", "27: 'beep;boop'; expected a name"),
@@ -166,6 +200,68 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
     """A manifest is as strict as any other file."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        toy.manifest("toy")
+    assert said in str(caught.value).replace(f"{path}:", "")
+
+
+@pytest.mark.parametrize(
+    ("packages", "package", "names"),
+    [
+        ("package: toycar", "toycar", ("toycar",)),
+        ("packages: [toycar]", "toycar", ("toycar",)),
+        ("packages: [toycar, drive.py]", None, ("toycar", "drive")),
+        ("packages: [drive.py]", None, ("drive",)),
+    ],
+)
+def test_packages_and_modules(
+    toy: Workspace, packages: str, package: str | None, names: tuple[str, ...]
+) -> None:
+    """The probe lies in the only package, and in none where there are several or a module in no package."""
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text().replace("package: toycar", packages)
+    path.write_text(text.replace('"toycar/**/*.py"', '"**/*.py"'))
+    root = toy.library.parent / "target"
+    (root / "drive.py").write_text("x = 1\n")
+    manifest = toy.manifest("toy")
+    assert (manifest.package, manifest.import_names) == (package, names)
+    assert "drive.py" in manifest.tree.files
+    (root / "drive.py").unlink()
+    if "drive" in names:
+        with pytest.raises(MutatorError, match=r"no module 'drive.py' under .*correct `root`, `package`"):
+            _ = toy.manifest("toy").tree
+
+
+def test_files_may_be_left_out(toy: Workspace) -> None:
+    """The tree is then every Python file of the packages and modules, and nothing else."""
+    path = toy.library / "targets" / "toy.yaml"
+    lines = path.read_text().replace("package: toycar", "packages: [toycar, drive.py]").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith("files:")))
+    root = toy.library.parent / "target"
+    (root / "toycar" / "deep").mkdir()
+    for name in ("drive.py", "other.py", "toycar/deep/x.py", "toycar/deep/x.txt"):
+        (root / name).write_text("x = 1\n")
+    found = {name for name in toy.manifest("toy").tree.files if not name.startswith("toycar/")}
+    assert found == {"drive.py"}
+    assert {"toycar/deep/x.py", "toycar/world.py"} <= toy.manifest("toy").tree.files.keys()
+    assert "toycar/deep/x.txt" not in toy.manifest("toy").tree.files
+
+
+@pytest.mark.parametrize(
+    ("packages", "said"),
+    [
+        ("packages: [toycar, toycar.py]", "4: 'toycar.py'; expected a package, or a module's file"),
+        ("packages: [a/b.py]", "4: 'a/b.py'; expected a package, or a module's file"),
+        ("packages: [toycar, _fi.py]", "4: '_fi.py'; expected a package, or a module's file"),
+        ("packages: []", "4: "),
+        ("about: none", "neither `package` nor `packages`; expected one of them"),
+        ("package: toycar\npackages: [toycar]", "5: both `package` and `packages`; expected one of them"),
+    ],
+)
+def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> None:
+    """Names are import names or module files at the root, each once; one of the two keys is given."""
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace("package: toycar", packages))
     with pytest.raises(MutatorError) as caught:
         toy.manifest("toy")
     assert said in str(caught.value).replace(f"{path}:", "")
@@ -197,16 +293,33 @@ def test_globs(glob: str, hits: set[str]) -> None:
     assert {p for p in paths if matches(p, [glob])} == hits
 
 
-def test_a_link_does_not_lead_out(toy: Workspace, tmp_path: Path) -> None:
-    """A symbolic link to a file outside is no place for a fault."""
-    outside = tmp_path / "outside.py"
-    outside.write_text("x = 1\n")
-    link = toy.manifest("toy").root / "toycar" / "link.py"
-    link.symlink_to(outside)
+def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> None:
+    """A linked file or folder is part of the tree, and a place for a fault like any other; the mutant is a
+    copy of it."""
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    root = toy.manifest("toy").root / "toycar"
+    (root / "sensor.py").rename(outside / "sensor.py")
+    (root / "linked").symlink_to(outside)
+    (root / "sensor.py").symlink_to(outside / "sensor.py")
+    (outside / "back").symlink_to(outside)
+    manifest = toy.manifest("toy")
+    assert {"toycar/sensor.py", "toycar/linked/sensor.py"} <= manifest.tree.files.keys()
+    assert not any("back" in path for path in manifest.tree.files)
+    before = (outside / "sensor.py").read_bytes()
     spec = toy.library / "faults" / "sensor" / "distance.yaml"
-    spec.write_text(spec.read_text().replace("toycar/sensor.py", "toycar/link.py"))
-    with pytest.raises(MutatorError, match=r"'toycar/link.py' leads out of the target"):
-        expand(toy.spec(spec), 0, models=toy.fault_models(), manifest=toy.manifest("toy"))
+    spec.write_text(spec.read_text().replace("toycar/sensor.py", "toycar/linked/sensor.py"))
+    (fault, *_) = expand(toy.spec(spec), 0, models=toy.fault_models(), manifest=manifest)
+    assert "toycar/linked/sensor.py" in build(manifest, toy.fault_models(), fault, always()).files
+    assert (outside / "sensor.py").read_bytes() == before
+
+
+def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
+    """It is named with what it should lead to, not taken for a file that is not there."""
+    link = toy.manifest("toy").root / "toycar" / "glue.py"
+    link.symlink_to("/nowhere/glue.py")
+    with pytest.raises(MutatorError, match=r"toycar/glue.py: a link to /nowhere/glue.py, where nothing is"):
+        _ = toy.manifest("toy").tree
 
 
 def test_digests_do_not_depend_on_order(tmp_path: Path) -> None:

@@ -1,0 +1,38 @@
+"""The environment of a target's processes: what the harness sets, and what a manifest adds to it."""
+
+import re
+from collections.abc import Mapping
+
+from mutator.config.yaml_files import Source
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's: starting Python needs them
+FIXED = {
+    "LC_ALL": "C.UTF-8",
+    "PYTHONUTF8": "1",
+    "PYTHONDONTWRITEBYTECODE": "1",
+    **dict.fromkeys(THREADS, "1"),
+}
+_PREFIXES = ("PYTHON", "LD_")  # of variables that change what an interpreter is, or what it loads
+_OWN = ("TMPDIR", *KEPT, *FIXED)
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+
+
+def check_environment(env: Mapping[str, str], source: Source) -> None:
+    """MutatorError for a variable of a manifest's `env` that cannot be set, or is the harness's to set; one
+    that has the harness's own value may be there."""
+    for name, value in env.items():
+        if FIXED.get(name) == value:
+            continue
+        if not _NAME.match(name):
+            raise source.error(("env", name), f"'{name}'", expected="a name of letters, digits and _")
+        if name in _OWN or name.startswith(_PREFIXES):
+            fixed = f" to '{FIXED[name]}'" if name in FIXED else ""
+            raise source.error(
+                ("env", name),
+                f"variable {name}",
+                expected=f"one that the harness does not set itself{fixed}",
+                remedy="leave it out",
+            )
+        if "\0" in value or value != value.encode("utf-8", "ignore").decode():
+            raise source.error(("env", name), f"{value!a} for '{name}'", expected="text without NUL")

@@ -1,0 +1,62 @@
+"""The installed packages that a target needs: PEP 508 requirements, and what of them is not there."""
+
+from collections.abc import Iterable, Sequence
+from importlib import metadata
+from typing import TYPE_CHECKING
+
+from packaging.requirements import InvalidRequirement, Requirement
+
+from mutator.config.yaml_files import Source
+
+if TYPE_CHECKING:
+    from mutator.targets.manifest import TargetManifest
+
+MISSING = "not installed"
+
+
+def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement, ...]:
+    """A manifest's `requires`; MutatorError with the line of what is no requirement."""
+    found = []
+    for i, text in enumerate(texts):
+        try:
+            found.append(Requirement(text))
+        except InvalidRequirement as error:
+            raise source.error(
+                ("requires", i),
+                f"'{text}'",
+                expected="a requirement as pip takes it, such as gymnasium>=1.0",
+                remedy=f"correct it: {str(error).splitlines()[0]}",
+            ) from None
+    return tuple(found)
+
+
+def shortcoming(wanted: Requirement) -> str:
+    """What is wrong with the installed version of a package: `not installed`, or which version there is;
+    empty if nothing is, or if it is not wanted on this machine."""
+    if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
+        return ""
+    try:
+        version = metadata.version(wanted.name)
+    except metadata.PackageNotFoundError:
+        return MISSING
+    fits = wanted.specifier.contains(version, prereleases=True)
+    return "" if fits else f"{version}, wanted {wanted.specifier}"
+
+
+def check_requirements(manifest: "TargetManifest") -> None:
+    """MutatorError that names every package that the target needs and that is missing or of another version,
+    with the command that installs them."""
+    found = {wanted: problem for wanted in manifest.requires if (problem := shortcoming(wanted))}
+    if found:
+        first = manifest.requires.index(next(iter(found)))
+        raise manifest.source.error(
+            ("requires", first),
+            "; ".join(f"{wanted.name}: {problem}" for wanted, problem in found.items()),
+            expected=f"the packages that target {manifest.name} requires",
+            remedy=pip_install(found),
+        )
+
+
+def pip_install(wanted: Iterable[Requirement]) -> str:
+    """The command that installs these."""
+    return " ".join(["pip install", *(f"'{one}'" for one in wanted)])

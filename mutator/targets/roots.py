@@ -1,0 +1,68 @@
+"""Where the root of a target is: a folder, the shipped controller, or where a package is installed."""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
+from mutator.config.yaml_files import Source
+from mutator.targets.requirements import pip_install
+
+INSTALLED = "installed:"  # before the name of an import package, as `root` of a manifest
+
+
+def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
+    """The folder that `root` of a manifest means, whether there is one or not. An installed package is found,
+    not imported; where it is missing, the error says to install `requires`, or what it is called."""
+    if root == SHIPPED_TARGET:
+        return shipped_folder() / "target"
+    if not root.startswith(INSTALLED):
+        return source.path.parent / root
+    name = root.removeprefix(INSTALLED)
+    if not name.isidentifier():
+        raise source.error(("root",), f"'{root}'", expected=f"{INSTALLED} and the name of an import package")
+    place = _place(name)
+    if place is None:
+        raise source.error(
+            ("root",),
+            f"no package or module '{name}' is installed here",
+            expected="one that this Python can import, in a folder of its own name or a .py file",
+            remedy=pip_install(requires or [Requirement(name)]),
+        )
+    return place.parent
+
+
+def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: Source) -> None:
+    """MutatorError if the tree would have more of the folder of an installed package than the package."""
+    name = root.removeprefix(INSTALLED)
+    if name == root:
+        return
+    for package in packages:
+        if package.removesuffix(".py") != name:
+            raise source.error(
+                ("packages",) if "packages" in source.data else ("package",),
+                f"'{package}' beside {root}",
+                expected=f"'{name}' alone: what lies beside it is other people's",
+                remedy="leave it out; what is yours goes into an `overlay`",
+            )
+    for i, glob in enumerate(files):
+        if glob != f"{name}.py" and not glob.startswith(f"{name}/"):
+            raise source.error(
+                ("files", i), f"'{glob}' beside {root}", expected=f"globs that begin with {name}/"
+            )
+
+
+def _place(name: str) -> Path | None:
+    """The folder or the file of an import package or module; None where there is no one such place."""
+    try:
+        found = find_spec(name)
+    except (ImportError, ValueError):
+        return None
+    if found is None:
+        return None
+    folders = list(found.submodule_search_locations or ())
+    places = [Path(place) for place in folders or [found.origin or ""]]
+    own = [place for place in places if place.name in (name, f"{name}.py") and place.exists()]
+    return own[0] if len(own) == len(places) == 1 else None

@@ -1,0 +1,3 @@
+from filters.low_pass import LowPass
+
+__all__ = ["LowPass"]

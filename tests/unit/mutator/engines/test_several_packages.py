@@ -1,0 +1,58 @@
+"""Targets of several packages and flat modules: the probe is a module of its own, by either engine."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.jobs import Job, RunMode
+from mutator.model import Status
+from mutator.triggers.kinds import at_time
+
+from ..fork_on_toy import Edit, Fork
+
+MANIFEST = "fault_library/targets/toycar.yaml"
+
+
+@pytest.fixture
+def several(fork: Fork, edit: Edit) -> Fork:
+    """The toy, whose sensor uses a module in no package."""
+    tree = fork.toy.library.parent / "tree"
+    (tree / "margin.py").write_text("def wider(gap):\n    gap = gap + 0.0\n    return gap\n")
+    edit("tree/toycar/sensing.py", 'world."""\n', 'world."""\n\nimport margin\n')
+    edit("tree/toycar/sensing.py", "gap = world.gap", "gap = margin.wider(world.gap)")
+    edit(MANIFEST, "package: toycar", "packages: [toycar, margin.py]")
+    edit(MANIFEST, '"toycar/**/*.py"', '"toycar/**/*.py", margin.py')
+    return fork
+
+
+def test_both_engines_drive_the_same(several: Fork) -> None:
+    """A mutant that imports the probe by its bare name comes to the same bytes by either engine."""
+    job = several.job(at_time(2.0))
+    assert {path for path in job.files if path.endswith("_fi.py")} == {"_fi.py"}
+    assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.files["toycar/sensing.py"]
+    forked = several.engine.execute(job, several.folder / "work" / "forked")
+    plain = several.engine.reference.execute(job, several.folder / "plain")
+    assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
+    assert plain.status is Status.OK
+    assert forked.probe == plain.probe is not None
+    assert plain.probe["triggered"]
+    for name in ("log.npz", "said.json"):
+        assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
+
+
+def test_a_flat_module_from_elsewhere_is_noticed(several: Fork, tmp_path: Path) -> None:
+    """A module of the target that a run takes from another folder makes the run a harness error."""
+    _ = several.engine
+    (tmp_path / "other").mkdir()
+    shutil.copy(several.manifest.root / "margin.py", tmp_path / "other")
+    body = f"import sys; sys.path.insert(0, {str(tmp_path / 'other')!r}); import margin"
+    job = Job(
+        name="elsewhere",
+        scenario=several.toy.scenario("A"),
+        seed=7,
+        files={"toycar/go.py": body.encode()},
+    )
+    found = several.engine.reference.execute(job, several.folder / "elsewhere")
+    assert found.status is Status.HARNESS_ERROR
+    assert "the target was also imported from" in found.detail and "margin.py" in found.detail

@@ -1,0 +1,72 @@
+"""Variables that a manifest sets in its target's processes."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.jobs import RunMode
+from mutator.errors import MutatorError
+from mutator.model import Status
+from mutator.report.film import Shot, _show
+from mutator.triggers.kinds import at_time
+from mutator.workspace import Workspace
+
+from ..fork_on_toy import Fork
+
+MANIFEST = "fault_library/targets/toycar.yaml"
+USE = "import os\nassert (os.environ['ROAD'], os.environ['PYTHONHASHSEED']) == ('wet', '0')\n"
+
+
+def with_env(workspace: Workspace, env: str) -> Path:
+    """The toy's manifest with `env`, in its third line."""
+    path = workspace.library.parent / MANIFEST
+    head, about, rest = path.read_text().split("\n", 2)
+    path.write_text(f"{head}\n{about}\nenv: {env}\n{rest}")
+    return path
+
+
+def test_both_engines_set_them(fork: Fork) -> None:
+    """Reference run and fork server have the variable, beside those of the harness."""
+    with_env(fork.toy, "{ROAD: wet, OMP_NUM_THREADS: '1'}")
+    (fork.toy.library.parent / "tree" / "toycar" / "__init__.py").write_text(USE)
+    job = fork.job(at_time(2.0))
+    forked = fork.run(job)
+    assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
+    plain = fork.engine.reference.execute(job, fork.folder / "plain")
+    assert plain.status is Status.OK, plain.detail
+
+
+def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
+    """So has the command that shows a film."""
+    with_env(toycar, "{ROAD: wet}")
+    show = toycar.library.parent / "tree" / "toycar" / "show.py"
+    show.write_text("import os, sys; open(sys.argv[4], 'w').write(os.environ['ROAD'])")
+    places = dict.fromkeys(("golden", "faulty", "events"), "")
+    _show(toycar.manifest("toycar"), tmp_path, places, Shot(out=tmp_path / "film.txt"))
+    assert (tmp_path / "film.txt").read_text() == "wet"
+
+
+@pytest.mark.parametrize(
+    ("env", "said"),
+    [
+        ("{PYTHONHASHSEED: '1'}", "3: variable PYTHONHASHSEED; expected one that the harness does not set"),
+        ("{PYTHONPATH: /x}", "3: variable PYTHONPATH; expected one that the harness does not set"),
+        ("{LD_PRELOAD: x.so}", "3: variable LD_PRELOAD; expected one that the harness does not set"),
+        ("{TMPDIR: /x}", "3: variable TMPDIR; expected one that the harness does not set"),
+        (
+            "{OMP_NUM_THREADS: '4'}",
+            "3: variable OMP_NUM_THREADS; expected one that .* itself to '1'; leave it",
+        ),
+        ("{A-B: x}", "3: 'A-B'; expected a name of letters"),
+        ("{ROAD: 1}", "3: 1 for 'env.ROAD'|3: 1 for 'ROAD'"),
+        ('{ROAD: "a\\0b"}', "3: .* for 'ROAD'; expected text without NUL"),
+    ],
+)
+def test_what_cannot_be_set(toycar: Workspace, env: str, said: str) -> None:
+    """Names are checked, values are texts, and what the harness sets is refused unless it is the same."""
+    path = with_env(toycar, env)
+    with pytest.raises(MutatorError) as caught:
+        toycar.manifest("toycar")
+    assert caught.value.where == str(path)
+    with pytest.raises(MutatorError, match=said):
+        toycar.manifest("toycar")

@@ -1,0 +1,130 @@
+"""Overlays: glue of the library, laid over a foreign tree."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.api.trials import try_fault
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.model import Outcome
+from mutator.mutants.building import build
+from mutator.report.film import Shot, _show
+from mutator.triggers.kinds import always
+from mutator.verification.doctor import examine
+from mutator.workspace import Workspace
+
+MANIFEST = "targets/pole.yaml"
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
+    """All its files are, under their paths in it, with the digest; its modules must come from the tree."""
+    before = pole.manifest("pole")
+    assert before.tree.overlaid == {"drive.py", "glue_parts/scenario.py"}
+    assert before.overlay == (pole.library / "overlays" / "pole").resolve()
+    assert set(before.import_names) == {"pole", "regulator", "filters", "drive", "glue_parts"}
+    overlay = pole.library / "overlays" / "pole"
+    (overlay / "gains.txt").write_text("1")
+    (overlay / "__pycache__").mkdir()
+    (overlay / "__pycache__" / "drive.pyc").write_text("x")
+    after = pole.manifest("pole").tree
+    assert after.files["gains.txt"] == b"1"
+    assert set(after.overlaid) == {*before.tree.overlaid, "gains.txt"}
+    assert after.digest != before.tree.digest
+    assert not (before.root / "drive.py").exists()
+
+
+def test_an_overlay_may_be_named_from_the_library(pole: Workspace) -> None:
+    """A path that is none beside the manifest is looked for in the library."""
+    edit(pole.library / MANIFEST, "../overlays/pole", "overlays/pole")
+    assert "drive.py" in pole.manifest("pole").tree.overlaid
+    edit(pole.library / MANIFEST, "overlays/pole", "overlays/none")
+    with pytest.raises(MutatorError, match=r"pole.yaml:5: no folder .*expected a folder of glue"):
+        pole.manifest("pole")
+
+
+def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
+    """Entry module and observation lie in the overlay; faults of the foreign modules do what they should."""
+    trial = try_fault("sensor/angle", "tilted", 1.0, value=60, workspace=pole)
+    assert trial.record.outcome is Outcome.HAZARD
+    assert trial.record.activation is not None and trial.record.activation.first == 1.0
+    trial = try_fault("filter/memory", "tilted", 1.0, workspace=pole)
+    assert trial.record.outcome is Outcome.HAZARD
+
+
+def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
+    """A place in the overlay is refused at the line of the spec, as glue."""
+    spec = pole.library / "faults" / "sensor" / "angle.yaml"
+    edit(
+        spec,
+        "file: regulator.py, function: Regulator.torque, after_assign: estimate",
+        "file: drive.py, function: Run.step, after_assign: torque",
+    )
+    with pytest.raises(
+        MutatorError, match=r"angle.yaml:\d+: file 'drive.py' is in the overlay of target pole"
+    ):
+        expand(pole.spec("sensor/angle"), 0, models=pole.fault_models(), manifest=pole.manifest("pole"))
+
+
+@pytest.mark.parametrize("name", ["regulator.py", "filters/low_pass.py", "notes.txt"])
+def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
+    """A file of the overlay that the root has, be it part of the tree or not, is refused."""
+    (pole.manifest("pole").root / "notes.txt").write_text("mine")
+    path = pole.library / "overlays" / "pole" / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("x = 1\n")
+    with pytest.raises(MutatorError, match=rf"'{name}' is in the overlay and in .*tree; .*rename"):
+        _ = pole.manifest("pole").tree
+
+
+def test_the_probes_name_in_an_overlay(pole: Workspace) -> None:
+    """An overlay has no module that is called as the probe."""
+    (pole.library / "overlays" / "pole" / "_fi.py").write_text("x = 1\n")
+    with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected that name free"):
+        build(pole.manifest("pole"), pole.fault_models(), None, always())
+
+
+def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
+    """Glue that is linked into the overlay, as a file, a folder or the overlay itself, drives the same."""
+    whole = pole.manifest("pole").tree
+    overlay, elsewhere = pole.library / "overlays" / "pole", tmp_path / "elsewhere"
+    shutil.move(overlay / "glue_parts", elsewhere / "glue_parts")
+    shutil.move(overlay / "drive.py", elsewhere / "drive.py")
+    for name in ("drive.py", "glue_parts"):
+        (overlay / name).symlink_to(elsewhere / name)
+    assert pole.manifest("pole").tree.digest == whole.digest
+    assert try_fault("sensor/angle", "tilted", 1.0, workspace=pole).record.activation is not None
+    shutil.rmtree(overlay)
+    overlay.symlink_to(elsewhere)
+    assert pole.manifest("pole").tree.digest == whole.digest
+
+
+def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
+    """What is wrong with glue is told at its own path; `doctor` names root and overlay."""
+    overlay = (pole.library / "overlays" / "pole").resolve()
+    edit(pole.library / MANIFEST, "after_assign: now", "after_assign: then")
+    with pytest.raises(MutatorError) as caught:
+        build(pole.manifest("pole"), pole.fault_models(), None, always())
+    assert caught.value.where == str(overlay / "drive.py")
+    assert pole.manifest("pole").tree.named(caught.value.where) == "drive.py"
+    (found,) = [finding for finding in examine(pole) if finding.name == "target pole"]
+    assert f"{pole.manifest('pole').root} and {overlay}: 6 files" in found.found
+
+
+def test_films_know_the_overlay(pole: Workspace, tmp_path: Path) -> None:
+    """The command that shows a film finds glue and foreign modules in one folder."""
+    body = "import sys, drive, pole; open(sys.argv[1], 'w').write(drive.__file__)"
+    (pole.library / "overlays" / "pole" / "show.py").write_text(body)
+    film = 'film: {run: [], module: show, args: ["{out}"], still: []}\n'
+    manifest = pole.library / MANIFEST
+    manifest.write_text(manifest.read_text() + film)
+    shot = Shot(out=tmp_path / "out.txt")
+    _show(pole.manifest("pole"), tmp_path / "scratch", {}, shot)
+    assert shot.out.read_text() == str(tmp_path / "scratch" / "tree" / "drive.py")

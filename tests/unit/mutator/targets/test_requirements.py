@@ -1,0 +1,73 @@
+"""The packages that a target needs: named where they are missing, noted where they are there."""
+
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.api.trials import try_fault
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.provenance import begin_stretch, check_versions
+from mutator.errors import MutatorError
+from mutator.store.run_folder import RunFolder
+from mutator.verification.doctor import Level, examine
+from mutator.verification.library import check_library
+from mutator.workspace import Workspace
+
+SAID = (
+    r"toycar.yaml:3: no-such-thing: not installed; numpy: \S+, wanted >=999; expected the packages that "
+    r"target toycar requires; pip install 'no-such-thing==1.0' 'numpy>=999'"
+)
+
+
+def requiring(workspace: Workspace, *requirements: str) -> Workspace:
+    """The toy, whose manifest has these in its third line."""
+    path = workspace.library / "targets" / "toycar.yaml"
+    head, about, rest = path.read_text().split("\n", 2)
+    path.write_text(f"{head}\n{about}\nrequires: {list(requirements)}\n{rest}")
+    return workspace
+
+
+@pytest.fixture
+def lacking(toycar: Workspace) -> Workspace:
+    wanted = ("no-such-thing==1.0", "numpy>=999", "pyyaml", "none; python_version < '3'")
+    return requiring(toycar, *wanted)
+
+
+def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_path: Path) -> None:
+    """A trial and a campaign name each package that is missing or of another version, with the remedy."""
+    with pytest.raises(MutatorError, match=SAID):
+        try_fault("sensor/lane", "A", 1.0, workspace=lacking)
+    with pytest.raises(MutatorError, match=SAID):
+        mutator.run("small", out=tmp_path / "run", workspace=lacking)
+    assert not (tmp_path / "run" / "checks.json").exists()
+
+
+def test_check_and_doctor_name_it(lacking: Workspace) -> None:
+    """So do the two commands that look at a library and at the machine."""
+    problem, *_ = check_library(lacking, "toycar")
+    with pytest.raises(MutatorError, match=SAID):
+        raise problem
+    (found,) = [finding for finding in examine(lacking) if finding.name == "target toycar"]
+    assert found.level is Level.FAIL
+    assert found.remedy == "pip install 'no-such-thing==1.0' 'numpy>=999'"
+
+
+def test_what_is_no_requirement(toycar: Workspace) -> None:
+    """A requirement that pip would not take is refused at its line."""
+    requiring(toycar, "numpy >> 2")
+    with pytest.raises(
+        MutatorError, match=r"toycar.yaml:3: 'numpy >> 2'; expected a requirement as pip takes"
+    ):
+        toycar.manifest("toycar")
+
+
+def test_versions_are_noted_with_the_run(toycar: Workspace, tmp_path: Path) -> None:
+    """A stretch of work has the versions of the packages that the target requires, used or not."""
+    requiring(toycar, "HypoThesis>=6")
+    folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    (stretch,) = RunFolder.open(folder.path).stretches
+    assert stretch.packages["hypothesis"] == metadata.version("hypothesis")
+    assert check_versions(RunFolder.open(folder.path)) == ()

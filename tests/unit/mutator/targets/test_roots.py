@@ -1,0 +1,101 @@
+"""Roots of targets: installed packages are found where pip put them, without being imported."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.api.trials import try_fault
+from mutator.errors import MutatorError
+from mutator.model import Outcome
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of installed packages; what is in it must not be imported here."""
+    folder = tmp_path / "site"
+    (folder / "filters_of_poles").mkdir(parents=True)
+    (folder / "filters_of_poles" / "__init__.py").write_text("raise RuntimeError('imported')\n")
+    (folder / "filters_of_poles" / "gains.txt").write_text("1\n")
+    (folder / "aside_of_poles.py").write_text("raise RuntimeError('imported')\n")
+    monkeypatch.syspath_prepend(str(folder))
+    return folder
+
+
+def installed(pole: Workspace, **keys: str) -> Workspace:
+    """The pole's library with other keys in its manifest."""
+    path = pole.library / "targets" / "pole.yaml"
+    lines = [line for line in path.read_text().splitlines() if line.partition(":")[0] not in keys]
+    path.write_text("\n".join([lines[0], *(f"{k}: {v}" for k, v in keys.items() if v), *lines[1:]]) + "\n")
+    return pole
+
+
+def test_an_installed_package(pole: Workspace, site: Path) -> None:
+    """Its own Python files and the overlay are the tree, and no neighbour; nothing is imported."""
+    manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
+        "pole"
+    )
+    assert manifest.root == site.resolve()
+    assert manifest.tree.files.keys() - manifest.tree.overlaid == {"filters_of_poles/__init__.py"}
+    assert manifest.package == "filters_of_poles"
+    assert "filters_of_poles" not in sys.modules
+    files = '["filters_of_poles/**"]'
+    manifest = installed(pole, files=files).manifest("pole")
+    assert "filters_of_poles/gains.txt" in manifest.tree.files
+
+
+def test_an_installed_module(pole: Workspace, site: Path) -> None:
+    """A module in no package is found, too."""
+    installed(pole, root="installed:aside_of_poles", packages="[aside_of_poles.py]")
+    manifest = pole.manifest("pole")
+    assert manifest.root == site.resolve()
+    assert manifest.tree.files.keys() - manifest.tree.overlaid == {"aside_of_poles.py"}
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            {"root": "installed:none_of_poles", "packages": "[none_of_poles]"},
+            "2: no package or module 'none_of_poles' is .*; pip install 'none_of_poles'",
+        ),
+        ({"root": "installed:sys", "packages": "[sys]"}, "2: no package or module 'sys' is installed"),
+        ({"root": "'installed:a.b'", "packages": "[a]"}, "2: 'installed:a.b'; expected installed: and the"),
+        (
+            {"root": "installed:filters_of_poles", "packages": "[filters_of_poles, aside_of_poles.py]"},
+            "3: 'aside_of_poles.py' beside installed:filters_of_poles; expected 'filters_of_poles' alone",
+        ),
+        (
+            {
+                "root": "installed:filters_of_poles",
+                "packages": "[filters_of_poles]",
+                "files": '["**/*.py"]',
+            },
+            r"4: '\*\*/\*.py' beside installed:filters_of_poles; expected globs that begin with",
+        ),
+    ],
+)
+def test_what_is_not_installed(pole: Workspace, site: Path, keys: dict[str, str], said: str) -> None:
+    """A package that is missing, or has no source, and a tree that would have its neighbours, are refused."""
+    with pytest.raises(MutatorError, match=f"pole.yaml:{said}"):
+        installed(pole, **keys).manifest("pole")
+
+
+def test_an_installed_package_is_driven(
+    pole: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The mutant of an installed package runs from its own tree, and the installed one stays as it is."""
+    root, site = pole.manifest("pole").root, tmp_path / "site"
+    shutil.move(root / "filters", site / "filters")
+    for name in ("pole.py", "regulator.py"):  # glue may bring what it needs
+        shutil.move(root / name, pole.library / "overlays" / "pole" / name)
+    shutil.rmtree(pole.library / "faults" / "sensor")
+    monkeypatch.syspath_prepend(str(site))
+    before = (site / "filters" / "low_pass.py").read_bytes()
+    installed(pole, root="installed:filters", packages="", package="filters")
+    trial = try_fault("filter/memory", "tilted", 1.0, workspace=pole)
+    assert trial.record.outcome is Outcome.HAZARD
+    assert "from filters import _fi" in trial.patch
+    assert (site / "filters" / "low_pass.py").read_bytes() == before
