@@ -144,6 +144,11 @@ class Fault:
         """What tables and messages call it."""
         return fault_label(self.spec, self.value, self.unit)
 
+    @property
+    def size(self) -> float:
+        """How large its value is, whatever the sign; 0 for one that is no number."""
+        return float(abs(self.value)) if isinstance(self.value, int | float) else 0.0
+
 
 @dataclass(frozen=True)
 class Experiment:

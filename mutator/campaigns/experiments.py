@@ -58,9 +58,7 @@ class Expansion:
         faults = [fault for _, fault in self._library() if fault.spec == canary.spec]
         if not faults:
             raise self._unmatched(("canary", "spec"), canary.spec)
-        worst = max(
-            faults, key=lambda fault: abs(fault.value) if isinstance(fault.value, int | float) else 0.0
-        )
+        worst = max(faults, key=lambda fault: fault.size)
         trigger = at_time(canary.at_s, name="canary")
         return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
 

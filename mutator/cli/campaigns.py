@@ -192,6 +192,8 @@ def run(
 
 def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None:
     """The end of a run: table, report, and what is left to do."""
+    from mutator.execution.session import NO_PROOF
+
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = run.report() if summary.results else None
     report = (
@@ -202,7 +204,7 @@ def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") ->
         paths = {"run": str(out), "report": str(report[0]) if report else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
-        terminal.emit(counts | paths | found | {"seal": summary.seal})
+        terminal.emit(counts | paths | found | {"seal": summary.seal, "not_forked": summary.not_forked})
     if written:
         show_counts(terminal, run)
     terminal.say(
@@ -211,6 +213,8 @@ def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") ->
     )
     if summary.proof:
         terminal.say(f"proof: {summary.proof}")
+    if summary.not_forked:
+        terminal.say(f"{NO_PROOF}: {summary.not_forked}")
     if written:
         terminal.say(f"report: {report[0]} and {report[1]}")
     if summary.seal:

@@ -30,6 +30,7 @@ from mutator.engines.processes import (
     was_active,
 )
 from mutator.engines.reference import ReferenceEngine
+from mutator.engines.threads import too_many
 from mutator.model import Limits, Status
 from mutator.mutants.building import build
 from mutator.mutants.probe import probe_module, silent_report, state_after
@@ -158,8 +159,8 @@ class ForkEngine:
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
         said, _ = waiting.ask(asked, self._patience_s)
-        if said["threads"] != 1:
-            raise Refused(f"it has {said['threads']} threads, and only one can be forked")
+        if said["threads"]:
+            raise Refused(too_many(said["threads"]))
         if said["touched"]:
             self.close()
             raise Refused("it writes into its own tree")
@@ -168,7 +169,7 @@ class ForkEngine:
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
         """What came of a child; Refused where the reference engine is to say it."""
-        report = read_report(folder / "report.json", threads=int)
+        report = read_report(folder / "report.json", threads=list)
         if report is not None:
             self._check(job, report)
         status, detail = judge(self._limits, ended, report)
@@ -194,8 +195,8 @@ class ForkEngine:
             raise Refused(str(report.get("why")))
         if report["outside"]:
             raise Refused(f"the target was also imported from {', '.join(report['outside'])}")
-        if report["threads"] != 1:
-            raise Refused("it leaves threads behind")
+        if report["threads"]:
+            raise Refused(f"at its end {too_many(report['threads'])}")
         if report["ended"] == "ok" and (problem := job.problem_of(report["probe"])):
             raise Refused(problem)
 

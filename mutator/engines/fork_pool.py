@@ -19,6 +19,7 @@ from typing import Any
 from mutator._common.files import remove_folder
 from mutator._common.hashing import digest
 from mutator.engines.processes import end, environment, raised_in
+from mutator.engines.threads import too_many
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
@@ -148,8 +149,8 @@ class Pool:
         said, _ = self.first.reply(_START_S)
         if "failed" in said:
             raise Refused(f"it cannot be loaded: {_why(said['failed'])}")
-        if said["threads"] != 1:
-            raise Refused(f"it has {said['threads']} threads once it is loaded, and only one can be forked")
+        if said["threads"]:
+            raise Refused(f"once it is loaded, {too_many(said['threads'])}")
         pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
         loaded = {path: found for path, found in said["files"].items() if path in pristine}
         if loaded != pristine:
@@ -182,8 +183,8 @@ class Pool:
             self._waiting.remove(oldest)
             oldest.close()
         said, handles = source.ask({"do": "branch", "step": step, "args": arguments}, patience_s)
-        if said["threads"] != 1 or len(handles) != 1:
-            raise Refused(f"it has {said['threads']} threads, and only one can be forked")
+        if said["threads"] or len(handles) != 1:
+            raise Refused(too_many(said["threads"]))
         made = Waiting(socket.socket(fileno=handles[0]), self._parent, key)
         made.loaded |= source.loaded
         reply, _ = made.reply(patience_s)

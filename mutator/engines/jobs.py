@@ -21,6 +21,9 @@ class RunMode(StrEnum):
     GOLDEN = "golden"  # the trigger never held, so there was nothing to run
 
 
+FAST = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})  # what a proof is for
+
+
 @dataclass(frozen=True, kw_only=True)
 class Job:
     """One run of the target. `files` are the changed and new files of its tree (none: pristine)."""
@@ -34,6 +37,7 @@ class Job:
     injections: tuple[str, ...] = ()  # ids that it must report on
     hash_seed: int = 0
     golden: Path | None = None  # output folder of the run without the fault, where it is known
+    watch: bool = False  # note calls that keep a target from being deterministic, and what the probe observes
 
     def problem_of(self, report: object) -> str:
         """What is wrong with what its probe reported; empty if nothing is, or if it has no probe."""
@@ -78,7 +82,7 @@ class Execution:
     report if the tree has one; `log` the tail of what the run printed. `mode` says how it was carried out,
     and `why` another engine did it than the one that was asked; `start` is the step before which the golden
     run did its work. `modules` are the top-level modules that the run imported from neither its
-    package nor the standard library (of the reference engine alone).
+    package nor the standard library, `watched` what a watched one noted (of the reference engine alone).
     """
 
     status: Status
@@ -94,6 +98,7 @@ class Execution:
     why: str = ""
     start: int = 0
     modules: tuple[str, ...] = ()
+    watched: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Engine(Protocol):

@@ -33,7 +33,7 @@ from mutator.engines.processes import (
     was_active,
 )
 from mutator.model import Limits, Status
-from mutator.mutants.probe import probe_module
+from mutator.mutants.probe import probe_module, state_after
 from mutator.targets.manifest import TargetManifest
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
@@ -105,6 +105,7 @@ class ReferenceEngine:
             active=was_active(folder),
             log=log,
             modules=tuple(report["modules"]) if report else (),
+            watched=report.get("watched", {}) if report else {},
         )
 
     def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
@@ -136,10 +137,16 @@ class ReferenceEngine:
             "memory_mb": self.limits.memory_mb,
             "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
+            "watch": self._watch() if job.watch else None,
         }
         path = folder / "job.json"
         path.write_text(json.dumps(request), encoding="utf-8")
         return path
+
+    def _watch(self) -> tuple[str, list[str]]:
+        """Where a probe keeps what it observes, and the names of the observed values."""
+        holder, _ = state_after(0, None, None)
+        return holder, [value.name for value in self.manifest.observation.values]
 
     def _run(self, request: Path, folder: Path, hash_seed: int) -> Ended:
         """Run the job in a process that another one guards; both end when the connection is closed."""

@@ -38,6 +38,7 @@ from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
+NO_PROOF = "no proof is needed, as no experiment was forked"
 
 Notify = Callable[[Progress], None]
 
@@ -56,6 +57,9 @@ class Summary:
     results: Path | None  # results.csv; None when there was no room for it
     proof: equivalence.Proof | None  # None: nothing that the reference engine has not run
     seal: str | None  # of a finished run
+    not_forked: (
+        str  # why an engine that forks has forked nothing, so that nothing was proved; empty otherwise
+    )
     elapsed_s: float
 
     @property
@@ -149,6 +153,11 @@ class Session:
             self._close_segments()
             built = results.ensure(self.folder.path)
         proven = equivalence.judge(self.folder, records)
+        not_forked = ""
+        if proven and done == self.folder.planned and (why := equivalence.needless(self.folder)) is not None:
+            proven, not_forked = None, why
+            with self._noting_full_disk():
+                equivalence.drop(self.folder)
         if done == self.folder.planned and (proven is None or proven.whole):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
@@ -163,6 +172,7 @@ class Session:
             results=built,
             proof=proven,
             seal=seal_of(self.folder),
+            not_forked=not_forked,
             elapsed_s=time.monotonic() - self._began,
         )
 

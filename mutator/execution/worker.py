@@ -11,7 +11,7 @@ from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
 from mutator.engines.in_target import guard
-from mutator.engines.jobs import Engine, Setting
+from mutator.engines.jobs import FAST, Engine, Setting
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner
@@ -52,6 +52,7 @@ class Worker:
         self._runner = self._make_runner(self._engine(assignment.engine))
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
+        self._needs_proof: bool | None = None  # None: nothing that it ran itself says so
         self._planned: tuple[Experiment, ...] = ()
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
@@ -67,6 +68,8 @@ class Worker:
         errors = []
         for finished in self._runner.run([experiments[place] for place in pending.places]):
             self._keep(finished)
+            if finished.mode in FAST:
+                self._needs_proof = True
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
@@ -75,7 +78,12 @@ class Worker:
         """Run a piece of the proof's sample on the reference engine; harness errors as `run`.
 
         Each has a run of its own, which takes nothing from others: what they share is to be proved, too.
+        Where it is known that nothing was forked, none is run.
         """
+        if self._needs_proof is None:
+            self._needs_proof = equivalence.needless(self.folder) is None
+        if not self._needs_proof:
+            return []
         if self._prover is None or self._proofs is None:
             self._prover = self._make_runner(self._independent_engine())
             self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)

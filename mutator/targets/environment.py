@@ -12,6 +12,8 @@ FIXED = {
     "PYTHONUTF8": "1",
     "PYTHONDONTWRITEBYTECODE": "1",
     **dict.fromkeys(THREADS, "1"),
+    # pyarrow, which pandas brings, starts a thread for its allocator: a process with it cannot be forked
+    "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
 _PREFIXES = ("PYTHON", "LD_")  # of variables that change what an interpreter is, or what it loads
 _OWN = ("TMPDIR", *KEPT, *FIXED)

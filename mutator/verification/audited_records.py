@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.hashing import digest
-from mutator.engines.jobs import RunMode
+from mutator.engines.jobs import FAST
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Fault, Record, Status, Trigger
@@ -169,7 +169,7 @@ def proof(
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
         modes = {str(line.get("engine")) for line in folder.timings().values()}
-        if forked := sorted(modes & {RunMode.FORK.value, RunMode.WARM.value}):
+        if forked := sorted(modes & FAST):
             yield MutatorError("missing", where=place, expected=f"a proof of the engine `{forked[0]}`")
         return
     known = {one.record.experiment_id: one.record for one in records}

@@ -3,19 +3,21 @@
 Every record of the sample must be the same, trace digest included; one that is not fails the campaign. The
 proof's runs are independent: they take nothing from what other runs left behind (`entry.independent` of the
 manifest), so that whatever runs share is proved with the engine. What they found is kept in `proof/` of the
-run folder, as records.
+run folder, as records. Where no experiment was forked after all there is nothing to prove: the folder goes.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.files import raising_disk_full
+from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.hashing import digest
 from mutator.campaigns.sampling import pick
+from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
 from mutator.store.run_folder import RunFolder
 
 FOLDER = "proof"
@@ -72,12 +74,39 @@ def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
     yield (experiment.scenario,)
 
 
+def needless(folder: RunFolder) -> str | None:
+    """Why no experiment was forked, in most cases' words; None where one was, or may yet be.
+
+    Shards are proved each, as merged ones have a proof all or none.
+    """
+    if folder.shard is not None:
+        return None
+    told = folder.timings()
+    reasons = Counter[str]()
+    for name in folder.share():
+        line = told.get(name, {})
+        if line.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
+            return None
+        reasons[str(line.get("why", ""))] += 1
+    return next((why for why, _ in reasons.most_common() if why), "the reference engine ran them all")
+
+
+def drop(folder: RunFolder) -> None:
+    """Leave no proof behind where none is needed; a few runs of it may have been driven before that was
+    known."""
+    gone = {name: None for name in digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
+    with digests.rewriting(folder.path, gone):
+        remove_folder(folder.path / FOLDER)
+
+
 def left(folder: RunFolder) -> tuple[Sample, ...]:
     """What of the sample has no counting record in `proof/` yet; nothing where no proof is needed."""
     if not (folder.path / FOLDER).is_dir():
         return ()
     found = folder.records(FOLDER)
     ids = [name for name in sampled(folder) if name not in found or not _counts(found[name])]
+    if ids and needless(folder) is not None:
+        return ()
     pieces = range(0, len(ids), _PIECE)
     return tuple(Sample(number, tuple(ids[i : i + _PIECE])) for number, i in enumerate(pieces))
 

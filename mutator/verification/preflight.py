@@ -10,7 +10,6 @@ from typing import Any
 from mutator._common.files import (
     DiskFull,
     json_bytes,
-    no_pipe,
     raising_disk_full,
     read_json,
     remove_folder,
@@ -20,15 +19,11 @@ from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
 from mutator.campaigns.shared_runs import same_in
-from mutator.engines.jobs import Execution, Job
+from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Experiment, Status
+from mutator.model import Experiment
 from mutator.mutants.building import InvalidMutant, build
-from mutator.mutants.probe import was_triggered
-from mutator.outcomes import golden
-from mutator.outcomes.golden import BadOutput
-from mutator.outcomes.judging import load_judged
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.digests import Digest
@@ -36,8 +31,15 @@ from mutator.store.records import Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
-from mutator.verification import preflight_cache
-from mutator.verification.preflight_rules import CheckRun, judge_golden, judge_null, judge_same
+from mutator.verification import canary, preflight_cache
+from mutator.verification.preflight_rules import (
+    CheckRun,
+    digest_of,
+    judge_golden,
+    judge_null,
+    judge_same,
+    look,
+)
 from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242
@@ -130,7 +132,7 @@ class _Checks:
         if said is None or said["digest"] != self.digest:
             return None
         keys = [golden_key(*key) for key in self.keys]
-        if any(_digest_of(self.manifest, place / "golden" / key) != said["goldens"][key] for key in keys):
+        if any(digest_of(self.manifest, place / "golden" / key) != said["goldens"][key] for key in keys):
             return None
         results = tuple(CheckResult(**result) for result in said["results"])
         return results if all(result.passed for result in results) else None
@@ -180,7 +182,7 @@ class _Checks:
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
         """A run that has records must not go on with other golden runs (of another processor, say)."""
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
-        known = {key: before.get(key) or _digest_of(self.manifest, run / "golden" / key) for key in goldens}
+        known = {key: before.get(key) or digest_of(self.manifest, run / "golden" / key) for key in goldens}
         other = [key for key in goldens if known[key] not in ("", goldens[key])]
         if other and any((run / "records").glob("*.jsonl")):
             raise CheckFailed(
@@ -210,10 +212,21 @@ class _Checks:
                 name = futures[future]
                 runs[name] = future.result()
                 notify(Progress(stage="checks", detail=name[0], done=len(runs), total=len(jobs)))
+            self._judged_canary = self._judge_canary(engine, runs[_CANARY, self.canary.id])
         finally:
             pool.shutdown(cancel_futures=True)
             remove_folder(work)
         return runs
+
+    def _judge_canary(self, engine: ReferenceEngine, known: CheckRun) -> tuple[str, str]:
+        """As `canary.judge`; the first of its runs is `known`."""
+
+        def run(experiment: Experiment) -> CheckRun:
+            if experiment.id == self.canary.id:
+                return known
+            return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
+
+        return canary.judge(canary.tries(self.workspace, self.manifest, self.canary), run, self.hazard)
 
     def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
         null = build(self.manifest, self.models, None, always())
@@ -228,26 +241,13 @@ class _Checks:
             yield (_GOLDEN, key), Job(name=f"a-{name}", **common)
             yield (_AGAIN, key), Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
             yield (_NULL, key), Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
-        canary = self.canary
-        built = build(self.manifest, self.models, canary.fault, canary.trigger)
-        yield (
-            (_CANARY, None),
-            Job(
-                name="canary",
-                scenario=self.workspace.scenario(canary.scenario),
-                seed=canary.seed,
-                changes=canary.changes,
-                files=built.files,
-                mutant=built.id,
-                injections=built.injections,
-            ),
-        )
+        yield (_CANARY, self.canary.id), canary.job(self.workspace, self.manifest, self.canary)
 
     def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = engine.work / job.name
         try:
             execution = engine.execute(job, scratch)
-            run = self._look(execution)
+            run = look(self.manifest, execution)
             if name[0] == _GOLDEN and not run.problem:
                 place = self._kept / "golden" / golden_key(*name[1])
                 place.parent.mkdir(parents=True, exist_ok=True)
@@ -255,27 +255,6 @@ class _Checks:
             return run
         finally:
             remove_folder(scratch)
-
-    def _look(self, execution: Execution) -> CheckRun:
-        if execution.status is not Status.OK:
-            log = execution.log.strip()
-            last = f" ({log.splitlines()[-1]})" if log else ""
-            return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
-        try:
-            golden.load_trace(self.manifest, execution.out, self.manifest.compared)
-            judged = load_judged(self.manifest, execution.out)
-        except BadOutput as err:
-            return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
-        return CheckRun(
-            problem="",
-            digest=_digest_of(self.manifest, execution.out),
-            trace=golden.trace_digest(self.manifest, execution.out),
-            alerts=tuple(judged.alerts),
-            hazards=tuple(judged.hazards),
-            triggered=was_triggered(execution.probe),
-            cpu_s=execution.cpu_s,
-            modules=execution.modules,
-        )
 
     def _packages(self, runs: Mapping[tuple[str, Any], CheckRun]) -> list[str]:
         """What the golden runs loaded that is neither the target's nor the standard library's."""
@@ -292,11 +271,7 @@ class _Checks:
                 detail = judge_null(first, null)
                 yield _result(f"null mutant {golden_key(*key)}", detail, "the same bytes as golden")
         yield from self._judge_same(runs)
-        canary = runs[_CANARY, None]
-        problem = canary.problem or (
-            "" if self.hazard in dict(canary.hazards) else f"did not reach {self.hazard}"
-        )
-        yield _result("canary", problem, f"reached {self.hazard}")
+        yield _result("canary", *self._judged_canary)
 
     def _judge_same(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
         """Scenarios that a change makes the same, as the manifest has it, drive to the same bytes."""
@@ -323,11 +298,3 @@ class _Checks:
 
 def _result(name: str, problem: str, found: str) -> CheckResult:
     return CheckResult(name=name, passed=not problem, detail=problem or found)
-
-
-def _digest_of(manifest: TargetManifest, out: Path) -> str:
-    """Digest of trace and record in an output folder; empty when they are not there."""
-    try:
-        return digest([digest(no_pipe(out / name).read_bytes()) for name in manifest.outputs])
-    except OSError:
-        return ""

@@ -2,6 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+
+from mutator._common.files import no_pipe
+from mutator._common.hashing import digest
+from mutator.engines.jobs import Execution
+from mutator.model import Status
+from mutator.mutants.probe import was_triggered
+from mutator.outcomes import golden
+from mutator.outcomes.golden import BadOutput
+from mutator.outcomes.judging import load_judged
+from mutator.targets.manifest import TargetManifest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,6 +28,37 @@ class CheckRun:
     triggered: bool = False
     cpu_s: float = 0.0
     modules: tuple[str, ...] = ()
+
+
+def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
+    """What a check needs to know of a run that is over."""
+    if execution.status is not Status.OK:
+        log = execution.log.strip()
+        last = f" ({log.splitlines()[-1]})" if log else ""
+        return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
+    try:
+        golden.load_trace(manifest, execution.out, manifest.compared)
+        judged = load_judged(manifest, execution.out)
+    except BadOutput as err:
+        return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
+    return CheckRun(
+        problem="",
+        digest=digest_of(manifest, execution.out),
+        trace=golden.trace_digest(manifest, execution.out),
+        alerts=tuple(judged.alerts),
+        hazards=tuple(judged.hazards),
+        triggered=was_triggered(execution.probe),
+        cpu_s=execution.cpu_s,
+        modules=execution.modules,
+    )
+
+
+def digest_of(manifest: TargetManifest, out: Path) -> str:
+    """Digest of trace and record in an output folder; empty when they are not there."""
+    try:
+        return digest([digest(no_pipe(out / name).read_bytes()) for name in manifest.outputs])
+    except OSError:
+        return ""
 
 
 def judge_golden(first: CheckRun, again: CheckRun) -> str:

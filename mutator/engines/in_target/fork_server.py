@@ -28,7 +28,7 @@ _spec = importlib.util.spec_from_file_location("run_once", Path(__file__).with_n
 assert _spec and _spec.loader
 child: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(child)
-swap, guard = child.beside("swap"), child.guard
+swap, guard, threads = child.beside("swap"), child.guard, child.beside("threads")
 
 
 def main(connection: int, start_file: str) -> int:
@@ -53,7 +53,7 @@ def serve_first(connection: int, start: dict[str, Any]) -> None:
         server.send({"failed": child.describe(err, start["tree"], None)})
         return
     gc.collect()
-    server.send({"files": child.tree_files(start["tree"]), "threads": threads()})
+    server.send({"files": child.tree_files(start["tree"]), "threads": threads.others()})
     server.serve()
 
 
@@ -125,7 +125,7 @@ class Process:
             finally:
                 os._exit(0)
         ours.close()
-        self.send({"threads": threads()}, theirs.fileno())
+        self.send({"threads": threads.others()}, theirs.fileno())
         theirs.close()
 
     def go_on(self, step: int, args: list[str] | None) -> None:
@@ -155,13 +155,13 @@ class Process:
                 importlib.import_module(name)
         self.outside = self.elsewhere(sys.modules)
         gc.freeze()
-        return {"threads": threads()}
+        return {"threads": threads.others()}
 
     def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
         """Fork a child that goes on as a mutant, and guard it; how it ended. The child reads the job: what
         this process writes to, it must copy after each fork."""
-        if (count := threads()) != 1:
-            return {"threads": count}
+        if others := threads.others():
+            return {"threads": others}
         space = guard.Space(home, disk_mb)
         get_ready()
         ended = guard.fork(self.connection.fileno(), wall_s=wall_s, space=space)
@@ -169,7 +169,7 @@ class Process:
             self.become(marshal.loads(job))
         if ended["stopped"] == guard.ABANDONED:
             raise Abandoned
-        return {**ended, "threads": count, "touched": self.touched()}
+        return {**ended, "threads": [], "touched": self.touched()}
 
     def become(self, job: dict[str, Any]) -> NoReturn:
         """In a new child: be a mutant of the run so far, finish it, report."""
@@ -183,9 +183,9 @@ class Process:
         os.chdir(job["out"])
         report = self.finish(job)
         report["outside"] = self.outside + self.elsewhere(child.imported_since(job["probe_name"]))
-        report["threads"] = threads()
+        report["threads"] = threads.others()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
-        if report["threads"] == 1:  # with more it does not count
+        if not report["threads"]:  # with more it does not count
             end()
         os._exit(0)
 
@@ -250,11 +250,6 @@ def end() -> None:
                 thing.flush()
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
-
-
-def threads() -> int:
-    """Threads of this process, those of libraries included."""
-    return len(list(Path("/proc/self/task").iterdir()))
 
 
 def reap() -> None:

@@ -62,14 +62,22 @@ def run(job: dict[str, Any]) -> None:
     report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
     probe = None
     known = set(sys.modules)
+    watcher = beside("watch").Watcher(job["tree"]) if job["watch"] else None
+    seen: list[Any] = []
     try:
+        if watcher:
+            watcher.begin()
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
             note_activation(probe, job["inactive"])
+        if watcher and probe:
+            seen = beside("swap").keep_observations(probe, *job["watch"])
         run_module(job["module"], job["args"])
     except BaseException as err:
         report |= describe(err, job["tree"], job["probe"])
+    if watcher:
+        report["watched"] = {**watcher.found(), "seen": seen}
     report |= asked(probe, job["tree"], job["probe"]) if probe else {"probe": None}
     report["outside"] = imported_elsewhere(job["packages"], job["tree"], sys.modules)
     report["modules"] = third_party(known, job["packages"])

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from mutator.api.audits import verify
 from mutator.campaigns.plans import Choices
 from mutator.engines.registry import choose_engine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment
-from mutator.store.records import read_records
+from mutator.store import digests
+from mutator.store.lines import LineWriter, read_segment
+from mutator.store.records import SCHEMA, read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 from mutator.workspace import Workspace
@@ -136,3 +139,45 @@ def test_which_engine_runs(toycar: Workspace) -> None:
     for asked, told in (("fork", "names no `entry.stepwise`"), ("turbo", "engine 'turbo'")):
         with pytest.raises(MutatorError, match=told):
             choose_engine(asked, plain, 1000)
+
+
+@pytest.fixture
+def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
+    """A toy that starts a thread when it is loaded, so that nothing of it can be forked."""
+    go = tmp_path / "toy/tree/toycar/go.py"
+    wait = "wait = threading.Event().wait\nthreading.Thread(target=wait, name='poll', daemon=True).start()"
+    go.write_text(go.read_text().replace("class Drive:", f"import threading\n\n{wait}\n\n\nclass Drive:"))
+    return toycar
+
+
+def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_path: Path) -> None:
+    """The reference engine ran every experiment, so it proves nothing to run some again; the summary says
+    why nothing was forked, the folder is as one of the reference engine, and its audit finds nothing."""
+    summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
+    assert (summary.proof, summary.exit_code) == (None, 0)
+    assert summary.not_forked.endswith("only one can be forked: beside its own 'poll'")
+    assert not (tmp_path / "run" / "proof").exists()
+    assert verify(tmp_path / "run", workspace=threaded).passed
+    other = run_campaign(threaded, "small", tmp_path / "other", engine="reference", choices=Choices(limit=1))
+    assert summary.seal == other.seal
+
+
+@pytest.mark.slow
+def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path) -> None:
+    """Runs of the proof that were driven before it was known that nothing is forked leave nothing, so that
+    the seal does not depend on who was first."""
+    run = tmp_path / "run"
+    seal = run_campaign(threaded, "small", run, engine="fork", choices=Choices(limit=2)).seal
+    folder = RunFolder.open(run)
+    (path,) = (run / "records").iterdir()
+    (run / "proof").mkdir()
+    lines = list(read_segment(path).objects(SCHEMA))
+    writer = LineWriter(run / "proof" / path.name, {"schema": SCHEMA, "plan": folder.head["plan"]})
+    for _, line in lines[:1]:
+        writer.append(line)
+    writer.close()
+    digests.close_segments(run)
+    assert equivalence.left(folder) == ()
+    summary = run_campaign(threaded, "small", run, engine="fork")
+    assert (summary.proof, summary.seal) == (None, seal)
+    assert not (run / "proof").exists()

@@ -103,12 +103,29 @@ def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_pa
 
 
 def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """A canary that does not reach its hazard means that hazards would not be seen."""
+    """A canary that does not reach its hazard, whatever its value, means that hazards would not be seen; all
+    of the values that were tried are told."""
     path = toycar.campaign("small")
     path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
-    with pytest.raises(CheckFailed, match="canary: did not reach H3") as error:
-        run_checks(toycar, frozen(toycar, tmp_path))
+    folder = frozen(toycar, tmp_path)
+    with pytest.raises(CheckFailed, match="canary: did not reach H3 with any of its values: ") as error:
+        run_checks(toycar, folder)
     assert error.value.exit_code == 1
+    (spec,) = (spec for spec in toycar.specs() if spec.name == "sensor/lane")
+    faults = toycar.faults("sensor/lane", seed=3)
+    values = sorted((fault.value for fault in faults), reverse=True)
+    assert len(values) == spec.count == 4
+    assert error.value.got.endswith(", ".join(f"{value} m" for value in values))
+
+
+def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
+    """The largest value need not be the harmful one: the others are tried, and the result names both."""
+    change(toycar, "offset = world.offset", "shown = world.offset\n        offset = shown", "sensing")
+    change(toycar, "closing, offset))", "closing, shown if offset > 2.0 else offset))", "sensing")
+    results = run_checks(toycar, frozen(toycar, tmp_path))
+    (canary,) = (result for result in results if result.name == "canary")
+    assert canary.passed
+    assert re.fullmatch(r"reached H3 with 1\.\d+ m, and not with 2\.\d+ m", canary.detail)
 
 
 def test_an_anchor_that_is_gone_is_told_before_anything_runs(

@@ -1,0 +1,34 @@
+"""The threads of this process, by name. Standard library only."""
+
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+_TASKS = Path("/proc/self/task")
+
+
+def others() -> list[str]:
+    """Names of the threads beside the main one, those of libraries included; "" where one has no name.
+
+    Python's threads are called what the program calls them, others what the system knows of them.
+    """
+    threading: Any = sys.modules.get("threading")
+    known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
+    if not _TASKS.is_dir():  # not on Linux
+        return sorted(name for name in known.values() if name != threading.main_thread().name)
+    own = _system_name(os.getpid())
+    found = []
+    for task in _TASKS.iterdir():
+        number = int(task.name)
+        if number != os.getpid():
+            name = _system_name(number)
+            found.append(known.get(number) or ("" if name == own else name))
+    return sorted(found)
+
+
+def _system_name(number: int) -> str:
+    with suppress(OSError):  # it just ended
+        return (_TASKS / str(number) / "comm").read_text().strip()
+    return ""

@@ -1,0 +1,202 @@
+"""Notes which lines of a tree read a clock, draw without a seed or start a thread, while a run is driven.
+Standard library and numpy only.
+
+For runs that look for what keeps a target from being deterministic; their results count for nothing. What is
+watched is replaced where it lives before the target imports it. Noted is the innermost line of the tree on
+the stack: a library may stand in between, and is told. What a library does while it is imported is its own.
+"""
+
+import builtins
+import datetime
+import importlib.util
+import os
+import random
+import secrets
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+_spec = importlib.util.spec_from_file_location("threads", Path(__file__).with_name("threads.py"))
+assert _spec and _spec.loader
+threads: Any = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(threads)
+
+CLOCK, DRAW, THREAD, HASH, PROCESS = "clock", "draw", "thread", "hash", "process"
+_MOST = 200  # lines that are noted
+_CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
+_STILL = ("localtime", "gmtime", "strftime", "ctime")  # clocks, unless they are given a time
+_IMPORTING = "<frozen importlib"
+_INSTALLED = f"{os.sep}site-packages{os.sep}"
+
+
+class Watcher:
+    """Watches the tree at `tree` from `begin` on."""
+
+    def __init__(self, tree: str) -> None:
+        self._tree = tree + os.sep
+        self.noted: dict[tuple[str, int], dict[str, Any]] = {}
+        self._seeded: set[int] = set()  # ids of shared generators that were given a seed
+
+    def begin(self) -> None:
+        for name in _CLOCKS:
+            for one in (name, f"{name}_ns"):
+                self._watch(time, one, CLOCK, f"time.{one}() reads the clock")
+        for name in _STILL:
+            self._watch(time, name, CLOCK, f"time.{name}() reads the clock", _without_time)
+        self._watch_dates()
+        self._watch(os, "urandom", DRAW, "os.urandom() draws from the system")
+        setattr(random, "_urandom", os.urandom)  # noqa: B010
+        for name in ("uuid1", "uuid4"):
+            self._watch(uuid, name, DRAW, f"uuid.{name}() makes another id in each run")
+        for name in ("token_bytes", "token_hex", "token_urlsafe", "choice", "randbelow", "randbits"):
+            self._watch(secrets, name, DRAW, f"secrets.{name}() draws from the system")
+        self._watch(os, "getpid", PROCESS, "os.getpid() is another number in each run", direct=True)
+        self._watch(builtins, "hash", HASH, "hash() of texts follows PYTHONHASHSEED", _is_salted, direct=True)
+        self._watch(builtins, "id", PROCESS, "id() is an address, another one in each run", direct=True)
+        self._watch_threads()
+        self._watch_shared(random, random._inst, "random")
+        self._watch_seed(random.Random)
+        self._watch_numpy()
+
+    def note(self, kind: str, what: str, *, direct: bool = False) -> None:
+        """Note the innermost line of the tree on the stack; `direct`: only if it is the caller itself."""
+        frame: FrameType | None = sys._getframe(2)
+        via = ""
+        while frame is not None:
+            file = frame.f_code.co_filename
+            if file.startswith(self._tree):
+                break
+            if direct or file.startswith(_IMPORTING):
+                return
+            if _INSTALLED in file and not via:
+                via = f"{file.rpartition(_INSTALLED)[2]}:{frame.f_lineno}"
+            frame = frame.f_back
+        if frame is None or len(self.noted) >= _MOST:
+            return
+        place = (os.path.relpath(frame.f_code.co_filename, self._tree), frame.f_lineno)
+        told = {"kind": kind, "file": place[0], "line": place[1], "function": frame.f_code.co_qualname}
+        self.noted.setdefault(place, told | {"what": what, "via": via})
+
+    def found(self) -> dict[str, Any]:
+        """What was noted, in the order in which it came first, and the threads beside the main one."""
+        return {"noted": list(self.noted.values()), "threads": threads.others()}
+
+    def _watch(
+        self,
+        home: Any,
+        name: str,
+        kind: str,
+        what: str,
+        counts: Callable[..., bool] = lambda *_, **__: True,
+        *,
+        direct: bool = False,
+    ) -> None:
+        """Replace a function by one that notes who calls it, where the call `counts`."""
+        original = getattr(home, name, None)
+        if original is None:
+            return
+
+        def watched(*args: Any, **named: Any) -> Any:
+            if counts(*args, **named):
+                self.note(kind, what, direct=direct)
+            return original(*args, **named)
+
+        setattr(home, name, watched)
+
+    def _watch_dates(self) -> None:
+        """The classes cannot be changed: others that are like them stand in their place."""
+        for name, methods in (("date", ("today",)), ("datetime", ("today", "now", "utcnow"))):
+            original = getattr(datetime, name)
+            like = _Like(name, (original,), {"__module__": "datetime", "like": original})
+            for method in methods:
+                call = self._noting(getattr(original, method), f"datetime.{name}.{method}() reads the clock")
+                setattr(like, method, staticmethod(call))
+            setattr(datetime, name, like)
+
+    def _noting(self, original: Callable[..., Any], what: str) -> Callable[..., Any]:
+        def watched(*args: Any, **named: Any) -> Any:
+            self.note(CLOCK, what)
+            return original(*args, **named)
+
+        return watched
+
+    def _watch_threads(self) -> None:
+        original = threading.Thread.start
+
+        def start(thread: threading.Thread) -> None:
+            self.note(THREAD, f"starts the thread '{thread.name}'")
+            original(thread)
+
+        setattr(threading.Thread, "start", start)  # noqa: B010
+
+    def _watch_shared(self, module: Any, generator: Any, named: str) -> None:
+        """The functions of a module that draw from one generator that all share, until that has a seed."""
+        shared = f"draws from the generator that all of {named} share, which has no seed"
+        for name in dir(module):
+            original = getattr(module, name)
+            if name in ("seed", "setstate", "set_state"):
+                setattr(module, name, self._seeding(original, generator))
+            elif getattr(original, "__self__", None) is generator and "state" not in name:
+                unseeded = partial(self._is_unseeded, generator)
+                self._watch(module, name, DRAW, f"{named}.{name}() {shared}", unseeded)
+
+    def _is_unseeded(self, generator: Any, *_: Any, **__: Any) -> bool:
+        return id(generator) not in self._seeded
+
+    def _seeding(self, original: Callable[..., Any], generator: Any) -> Callable[..., Any]:
+        def seed(*args: Any, **named: Any) -> Any:
+            if any(value is not None for value in (*args[:1], *named.values())):
+                self._seeded.add(id(generator))
+            return original(*args, **named)
+
+        return seed
+
+    def _watch_seed(self, kind: Any) -> None:
+        """Generators of the standard library are seeded when they are made."""
+        original = kind.seed
+
+        def seed(generator: Any, a: Any = None, version: int = 2) -> None:
+            if a is None and not isinstance(generator, random.SystemRandom):
+                self.note(DRAW, "random.Random() is made without a seed")
+            original(generator, a, version)
+
+        kind.seed = seed
+
+    def _watch_numpy(self) -> None:
+        try:
+            from numpy import random as drawn
+            from numpy.random import bit_generator
+        except ImportError:
+            return
+        self._watch_shared(drawn, drawn.mtrand._rand, "numpy.random")
+        # whatever is made without a seed asks this function for one
+        what = "a generator of numpy.random is made without a seed"
+        self._watch(bit_generator, "randbits", DRAW, what)
+
+
+class _Like(type):
+    """Of a class that stands in another one's place: what is the other's is its own."""
+
+    like: type
+
+    def __instancecheck__(cls, instance: object) -> bool:
+        return isinstance(instance, cls.like)
+
+    def __subclasscheck__(cls, kind: type) -> bool:
+        return issubclass(kind, cls.like)
+
+
+def _is_salted(thing: object) -> bool:
+    """Whether the hash of a thing may follow PYTHONHASHSEED."""
+    return not isinstance(thing, int | float)
+
+
+def _without_time(*args: Any, **_: Any) -> bool:
+    """Whether `time.localtime` and the like are given no time."""
+    return not any(isinstance(one, int | float | tuple | time.struct_time) for one in args)

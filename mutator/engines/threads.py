@@ -1,0 +1,52 @@
+"""Threads that keep a process from being forked: told by name, with what turns them off."""
+
+from collections.abc import Sequence
+
+_LISTED = 4  # names; a pool may have dozens
+_NUMBERS = "OMP_NUM_THREADS, OPENBLAS_NUM_THREADS"
+_KNOWN = (  # how a thread's name begins, what it is, what turns it off
+    (
+        "jemalloc_bg_thd",
+        "of the memory allocator jemalloc",
+        'set `MALLOC_CONF: "background_thread:false"` under `env` of the manifest (that of pyarrow, '
+        "which comes with pandas, is off already)",
+    ),
+    (
+        "ThreadPoolExecutor",
+        "of a pool in Python",
+        "do that work in the step itself; `mutator check --drive` names the line that starts it",
+    ),
+)
+_UNNAMED = (
+    "of a library",
+    f'set {_NUMBERS} and the like to "1" under `env` of the manifest, as they are where it says nothing, '
+    "and have the library use no pool (`cv2.setNumThreads(0)`, `torch.set_num_threads(1)`, "
+    "`use_threads=False` of pyarrow)",
+)
+_OTHER = (
+    "",
+    "start it after the run, or not at all; `mutator check --drive` names the line that starts it",
+)
+
+
+def too_many(others: Sequence[str]) -> str:
+    """What is said of a process that has these threads beside its main one."""
+    told = [*dict.fromkeys(f"{_named(name)} {_about(name)[0]}".rstrip() for name in others)]
+    listed = [*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])]
+    return f"it has {len(others) + 1} threads, and only one can be forked: beside its own {', '.join(listed)}"
+
+
+def turned_off(others: Sequence[str]) -> str:
+    """What to do about these threads."""
+    return "; ".join(dict.fromkeys(_about(name)[1] for name in others))
+
+
+def _named(name: str) -> str:
+    return f"'{name}'" if name else "one without a name"
+
+
+def _about(name: str) -> tuple[str, str]:
+    """What a thread is, and what turns it off."""
+    if not name:
+        return _UNNAMED
+    return next(((what, remedy) for begin, what, remedy in _KNOWN if name.startswith(begin)), _OTHER)

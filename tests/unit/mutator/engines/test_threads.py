@@ -1,0 +1,42 @@
+"""Threads that prevent forking, in words."""
+
+import re
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from mutator.engines import threads
+from mutator.engines.in_target.threads import others
+
+
+def test_threads_are_found_by_name() -> None:
+    """The main thread is left out; every other one of the process is there, by its name in Python."""
+    before = others()
+    done = threading.Event()
+    started = [threading.Thread(target=done.wait, name=name) for name in ("poll", "radar")]
+    for one in started:
+        one.start()
+    try:
+        assert sorted([*before, "poll", "radar"]) == others()
+    finally:
+        done.set()
+        for one in started:
+            one.join()
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(int).result()
+        assert any(name.startswith("ThreadPoolExecutor") for name in others())
+
+
+@pytest.mark.parametrize(
+    ("names", "told", "remedy"),
+    [
+        (["jemalloc_bg_thd"], "2 threads, .* 'jemalloc_bg_thd' of the memory allocator", "MALLOC_CONF"),
+        (["", ""], "3 threads, .* beside its own one without a name of a library$", "OMP_NUM_THREADS"),
+        (["poll"], "2 threads, .* beside its own 'poll'$", "--drive"),
+    ],
+)
+def test_each_thread_is_told_with_what_turns_it_off(names: list[str], told: str, remedy: str) -> None:
+    """Number and names of the threads are said, and what is known to turn such a thread off."""
+    assert re.search(told, threads.too_many(names))
+    assert remedy in threads.turned_off(names)
