@@ -61,7 +61,7 @@ class Outcome(StrEnum):
 class Anchor:
     """A statement in a function: the `nth` (from 1) that assigns to, calls or returns `name`.
 
-    `name` is a dotted name as written in the source (`d_rel`, `self.angle`, `frames.append`), empty for
+    `name` is a dotted name as written in the source (`gap`, `self.angle`, `frames.append`), empty for
     `entry` and for a bare `before_return`. Without `nth` there must be exactly one hit.
     """
 
@@ -92,7 +92,7 @@ class Injection:
 class Trigger:
     """When a fault is active.
 
-    `condition` is a validated expression over the observed variables (`t, d_rel, v_ego, v_lead, hwt, rs`);
+    `condition` is a validated expression over time `t` and what the target observes;
     it can fire from `armed_after_s` on. A random time is the condition `t >= T` with hold `to_end`.
     """
 
@@ -104,7 +104,7 @@ class Trigger:
 
 
 def fault_label(spec: str, value: Value, unit: str) -> str:
-    """What tables and messages call a fault: `radar/chaff/distance 35 m`.
+    """What tables and messages call a fault: `sensor/offset/distance 35 m`.
 
     `value` and `unit` are as the spec states them, or as they stand in a table: None or '' for no value, `-`
     or '' for no unit.
@@ -121,7 +121,7 @@ class Fault:
     `value` and `unit` are as the spec states them (for tables); `injections` carry numbers in the unit of
     the variable they change.
     `hold` overrides the trigger's when the fault by its nature latches. `changes` are the changes
-    of the scenario that belong to the fault (`no_lead`).
+    of the scenario that belong to the fault (`alone`).
     """
 
     spec: str
@@ -174,7 +174,7 @@ class Experiment:
 
     @property
     def label(self) -> str:
-        """What reports call it: `radar/chaff/distance 35 m, S1, guided C1`."""
+        """What reports call it: `sensor/offset/distance 35 m, S1, guided C1`."""
         return f"{self.fault.label}, {self.drive_label}"
 
     @property

@@ -203,7 +203,7 @@ class Run:
     def golden(self, scenario: str, changes: tuple[str, ...] | None = None) -> "pd.DataFrame":
         """The fault-free run of a scenario: a column per channel, by time in s.
 
-        `changes` of the scenario tell apart what was driven in several ways, `("no_lead",)`; default: those
+        `changes` of the scenario tell apart what was driven in several ways, `("alone",)`; default: those
         of most experiments. MutatorError for one that was not driven.
         """
         driven = [e.changes for e in self.experiments.values() if e.scenario == scenario]

@@ -112,7 +112,7 @@ class _SelectionModel(StrictModel, title="A selection"):
     """Faults of the library, by the names of their specs."""
 
     spec: str = Field(
-        description="A glob over `<module>/<fault_type>/<variant>`: `radar/*`, `car_sensors/speed/low`."
+        description="A glob over `<module>/<fault_type>/<variant>`: `sensor/*`, `sensor/speed/low`."
     )
     values: int | None = Field(
         None, ge=1, description="How many of each variant's values, spread evenly; without it, all."

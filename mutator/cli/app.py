@@ -32,7 +32,7 @@ from mutator.cli import (
     reviews,
     run_folders,
 )
-from mutator.cli.console import Terminal, lead_nowhere, remarking, show_error
+from mutator.cli.console import Terminal, discard, remarking, show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
 from mutator.errors import (
     EXIT_CHECK_FAILED,
@@ -154,13 +154,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _answer(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()  # now, for at the interpreter's end a closed pipe would be an error
     except BrokenPipeError:  # who read the output has seen enough
-        lead_nowhere(sys.stdout)
+        discard(sys.stdout)
         return EXIT_OK
     return code
 
 
 def _open_streams() -> None:
-    """Have closed standard streams lead nowhere: else a file that is opened gets the number of one, and the
+    """Discard what goes to closed standard streams: else a file that is opened gets the number of one, and the
     words that were meant for it."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:

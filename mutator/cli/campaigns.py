@@ -192,8 +192,6 @@ def run(
 
 def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None:
     """The end of a run: table, report, and what is left to do."""
-    from mutator.execution.session import NO_PROOF
-
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = run.report() if summary.results else None
     report = (
@@ -213,8 +211,8 @@ def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") ->
     )
     if summary.proof:
         terminal.say(f"proof: {summary.proof}")
-    if summary.not_forked:
-        terminal.say(f"{NO_PROOF}: {summary.not_forked}")
+    if summary.no_proof:
+        terminal.say(summary.no_proof)
     if written:
         terminal.say(f"report: {report[0]} and {report[1]}")
     if summary.seal:

@@ -220,10 +220,10 @@ def remarking() -> Iterator[None]:
     try:
         yield
     except OSError:
-        lead_nowhere(sys.stderr)
+        discard(sys.stderr)
 
 
-def lead_nowhere(stream: TextIO) -> None:
+def discard(stream: TextIO) -> None:
     """Drop what is still buffered in a standard stream, and all that will be written to it."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())

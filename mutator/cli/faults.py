@@ -21,7 +21,7 @@ TriggerText = Annotated[
     typer.Option(
         "--trigger",
         metavar="WHEN",
-        help="A context (C1), a time in s (10), always, or a condition ('hwt <= 2 and rs > 0').",
+        help="A context (C1), a time in s (10), always, or a condition over what the target observes.",
     ),
 ]
 

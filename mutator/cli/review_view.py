@@ -63,7 +63,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
 
 
 def _short(injection: str) -> str:
-    """`radar.py RadarSensor.measure after_assign d_rel: offset(by)`: the file's name is enough in a table."""
+    """`sonar.py Sonar.measure after_assign gap: offset(by)`: the file's name is enough in a table."""
     path, space, rest = injection.partition(" ")
     return path.rpartition("/")[2] + space + rest
 

@@ -160,7 +160,7 @@ def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ..
 
 
 def ending_change(pair: Pair) -> str:
-    """What became of a pair: `sdc -> hazard (H1 7.10 s after activation)`."""
+    """What became of a pair: `sdc -> hazard (NEAR 7.10 s after activation)`."""
     return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
 
 

@@ -1,4 +1,4 @@
-"""A place in the target as YAML writes it: `{file: ..., function: ..., after_assign: d_rel}`."""
+"""A place in the target as YAML writes it: `{file: ..., function: ..., after_assign: gap}`."""
 
 import keyword
 
@@ -13,11 +13,11 @@ PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target d
 class AtModel(StrictModel, title="A place"):
     """Exactly one anchor is given. It must be found exactly once in the function, in statement position; if
     there are several, the error lists them and `nth` chooses one. Names are as written in the source
-    (`d_rel`, `self.angle`, `frames.extend`)."""
+    (`gap`, `self.angle`, `frames.extend`)."""
 
     file: str = Field(description="A file of the target, relative to its root.")
     function: str = Field(
-        description="A qualified name: `measure`, `RadarSensor.measure`, `outer.<locals>.inner`."
+        description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`."
     )
     after_assign: str | None = Field(None, description="After the statement that assigns to this name.")
     before_assign: str | None = Field(None, description="Before the statement that assigns to this name.")
@@ -39,7 +39,7 @@ class AtModel(StrictModel, title="A place"):
                 keys,
                 f"{len(given)} anchors" + (f" ({', '.join(given)})" if given else ""),
                 expected=f"exactly one of {', '.join(AnchorKind)}",
-                remedy="name one statement, e.g. `after_assign: d_rel`",
+                remedy="name one statement, e.g. `after_assign: gap`",
             )
         kind = given[0]
         name = "" if kind is AnchorKind.ENTRY else getattr(self, kind.value)

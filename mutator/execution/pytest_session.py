@@ -18,7 +18,7 @@ from mutator._common.shortages import Shortage, shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
-from mutator.execution.session import NO_PROOF, Session, Summary, open_session
+from mutator.execution.session import Session, Summary, open_session
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
@@ -272,7 +272,7 @@ def _lines(summary: Summary) -> list[str]:
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
         f"proof: {summary.proof}" if summary.proof else "",
-        f"{NO_PROOF}: {summary.not_forked}" if summary.not_forked else "",
+        summary.no_proof,
         f"results: {summary.results}" if summary.results else "",
         f"seal: {summary.seal}" if summary.seal else "",
     ]

@@ -38,7 +38,6 @@ from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
-NO_PROOF = "no proof is needed, as no experiment was forked"
 
 Notify = Callable[[Progress], None]
 
@@ -61,6 +60,12 @@ class Summary:
         str  # why an engine that forks has forked nothing, so that nothing was proved; empty otherwise
     )
     elapsed_s: float
+
+    @property
+    def no_proof(self) -> str:
+        """Why nothing was proved, as a sentence; empty otherwise."""
+        why = self.not_forked
+        return f"no proof is needed, as no experiment was forked: {why}" if why else ""
 
     @property
     def exit_code(self) -> int:

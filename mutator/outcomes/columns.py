@@ -110,7 +110,7 @@ def is_text(column: str) -> bool:
 
 
 def hazard_columns(hazard: str) -> tuple[Column, Column]:
-    """The flag and the time of a hazard: `h1` and `t_h1` of H1."""
+    """The flag and the time of a hazard: `near` and `t_near` of NEAR."""
     name = hazard.lower()
     return (
         Column(name, "flag", "", f"whether hazard {hazard} came"),

@@ -131,10 +131,10 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
         counts &= over_time.holds(metric.where, values)
     if metric.aggregate in ("integral", "duration"):
         lengths = np.diff(time, append=time[-1:])  # each value lasts until the next step
-        return math.fsum((numbers * lengths)[counts])
+        return math.fsum((numbers * lengths)[counts].tolist())
     kept = numbers[counts]
     if not kept.size:
         return None
     if metric.aggregate == "mean":
-        return math.fsum(kept) / kept.size
+        return math.fsum(kept.tolist()) / int(kept.size)
     return float({"min": kept.min(), "max": kept.max()}.get(metric.aggregate, kept[-1]))

@@ -95,7 +95,7 @@ _COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None], Arrays]] = {
 def _read_mcap(path: Path, steps: str, channels: Iterable[Channel]) -> Arrays:
     """Of JSON messages: `/topic:field.of.field`. Log times are the simulation's, in ns."""
     try:
-        from mcap.reader import make_reader  # type: ignore[import-not-found]
+        from mcap.reader import make_reader
     except ImportError:
         raise BadTrace("an .mcap file, and no package mcap", "pip install 'mutator[mcap]'") from None
     places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}

@@ -27,7 +27,7 @@ _SAME = (
 
 def fault_spec(workspace: Workspace) -> str:
     """docs/reference/fault-spec.md."""
-    example = (workspace.library / "faults" / "radar" / "chaff.yaml").read_text(encoding="utf-8")
+    example = min((workspace.library / "faults").rglob("*.yaml")).read_text(encoding="utf-8")
     return _page(
         generated("Fault specs"),
         "A fault spec is one YAML file: a fault type of a module, in one or more variants. The "

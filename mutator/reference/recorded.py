@@ -81,18 +81,21 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
         f"A trace is an array for each channel in `{manifest.trace_file}`, with a value for each step of "
         f"{manifest.step_s:g} s; `{manifest.time_channel}` is the time in s.\n"
     )
-    rows = map(_channel, manifest.channels)
-    heads = ("channel", "unit", "role", "component", "meaning")
-    yield Table(heads=heads, rows=rows).as_markdown(escape=False)
+    rows = [_channel(channel) for channel in manifest.channels]
+    yield Table(heads=("channel", "unit", "role", "component", "meaning"), rows=rows).as_markdown(
+        escape=False
+    )
     yield ""
     hazards = [_hazard(hazard) for hazard in manifest.rules]
-    heads = ("hazard", "comes when", "ends the drive", "meaning")
-    yield Table(heads=heads, rows=hazards).as_markdown(escape=False)
+    yield Table(heads=("hazard", "comes when", "ends the drive", "meaning"), rows=hazards).as_markdown(
+        escape=False
+    )
     yield ""
     metrics = [_metric(metric) for metric in manifest.measures]
     if metrics:
-        heads = ("metric", "unit", "is", "worse", "meaning")
-        yield Table(heads=heads, rows=metrics).as_markdown(escape=False)
+        yield Table(heads=("metric", "unit", "is", "worse", "meaning"), rows=metrics).as_markdown(
+            escape=False
+        )
         yield ""
     yield f"Alerts that count: {', '.join(manifest.alerts) or 'none'}.\n"
     changes = [(f"`{name}`", f"`{' '.join(words)}`") for name, words in manifest.changes.items()]

@@ -88,5 +88,5 @@ def _planned(folder: RunFolder) -> str:
         return f"{text}; each is a run of its own."
     return (
         f"{text}; all of them take {runs} runs, for an experiment that is the same run in several scenarios "
-        "(without a lead, as one that aims at H2 is driven) is run once and counted in each."
+        "is run once and counted in each."
     )

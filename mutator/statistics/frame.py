@@ -1,6 +1,6 @@
 """The results of a run as a pandas frame, a row per usable experiment.
 
-Beside the columns of results.csv it has `kind` (`radar/chaff`), `row` (the context row whose trigger or whose
+Beside the columns of results.csv it has `kind` (`sensor/offset`), `row` (the context row whose trigger or whose
 random partner it is), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
 is_alert`. Times are s of simulation, NaN: did not happen.
 """
@@ -45,5 +45,5 @@ def prepare(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
-    """Hazards that the table has a flag and a time for, sorted: `H1`, with columns `h1` and `t_h1`."""
+    """Hazards that the table has a flag and a time for, sorted: `NEAR`, with columns `near` and `t_near`."""
     return tuple(sorted(hazards_in(frame.columns)))

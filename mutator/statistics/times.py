@@ -156,7 +156,7 @@ def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], 
 
 
 def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
-    """How many runs had which hazards, in the order in which they came: `H3`, `H3 then H1`, `H1 with H3`."""
+    """How many runs had which hazards, in the order in which they came: `A`, `A then B`, `A with B`."""
     times = {hazard: frame[f"t_{hazard.lower()}"] for hazard in hazard_names(frame)}
     orders = [
         _order({hazard: float(column.iloc[i]) for hazard, column in times.items()}) for i in range(len(frame))

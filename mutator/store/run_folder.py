@@ -56,7 +56,7 @@ CONTENT = (  # all that may be in a run folder; * stands for any text, folders i
 
 
 def golden_key(scenario: str, changes: Sequence[str]) -> str:
-    """Name of a golden run: `S1`, `S1+no_lead`."""
+    """Name of a golden run: `S1`, `S1+alone`."""
     return "+".join((scenario, *changes))
 
 

@@ -122,7 +122,7 @@ class ManifestModel(StrictModel, title="The file"):
         description="When `mutator try` arms triggers, where nothing else is said.",
     )
     entry: _EntryModel = Field(description="How a run is started.")
-    trace: TraceModel = Field(TraceModel(), description="The numbers that a run records.")
+    trace: TraceModel = Field(TraceModel.model_construct(), description="The numbers that a run records.")
     record: str | None = Field(
         None,
         description="The record's name in `{out}`: a JSON file in which the target tells of hazards and "

@@ -72,7 +72,7 @@ class SceneModel(StrictModel, title="The scene"):
     """How a drive looks from above: SI units, x ahead, y to the left."""
 
     actors: dict[str, _ActorModel] = Field(min_length=1, description="What moves, by name.")
-    lines: dict[str, _LineModel] = Field(default_factory=dict, description="Lanes and other lines, by name.")
+    lines: dict[str, _LineModel] = Field(default_factory=dict, description="Lines on the ground, by name.")
     follow: str | None = Field(None, description="The actor that the view stays with.")
 
 

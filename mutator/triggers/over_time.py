@@ -1,13 +1,13 @@
 """Conditions and formulas over a whole trace: a truth value or a number for each of its steps."""
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from mutator.triggers.conditions import TIME, parse
 
-_COMPARE: Mapping[type[ast.cmpop], Callable[..., np.ndarray]] = {
+_COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
     ast.Lt: np.less,
     ast.LtE: np.less_equal,
     ast.Gt: np.greater,
@@ -15,14 +15,14 @@ _COMPARE: Mapping[type[ast.cmpop], Callable[..., np.ndarray]] = {
     ast.Eq: np.equal,
     ast.NotEq: np.not_equal,
 }
-_ARITHMETIC: Mapping[type[ast.operator], Callable[..., np.ndarray]] = {
+_ARITHMETIC: Mapping[type[ast.operator], np.ufunc] = {
     ast.Add: np.add,
     ast.Sub: np.subtract,
     ast.Mult: np.multiply,
     ast.Div: np.divide,
 }
-_FUNCTIONS: Mapping[str, Callable[..., np.ndarray]] = {"abs": np.abs, "hypot": np.hypot}
-_OF_MANY: Mapping[str, Callable[..., np.ndarray]] = {"min": np.minimum, "max": np.maximum}
+_FUNCTIONS: Mapping[str, np.ufunc] = {"abs": np.abs, "hypot": np.hypot}
+_OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maximum}
 
 
 def holds(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -47,15 +47,15 @@ class _Evaluation:
             return np.full(self._time.shape, bool(node.value))
         if isinstance(node, ast.BoolOp):
             both = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
-            return both.reduce([self.boolean(value) for value in node.values])
+            return np.asarray(both.reduce([self.boolean(value) for value in node.values]))
         if isinstance(node, ast.UnaryOp):
-            return np.logical_not(self.boolean(node.operand))
+            return np.asarray(np.logical_not(self.boolean(node.operand)))
         if isinstance(node, ast.Call):  # ever
-            return np.logical_or.accumulate(self.boolean(node.args[0]))
+            return np.asarray(np.logical_or.accumulate(self.boolean(node.args[0])))
         assert isinstance(node, ast.Compare)
         terms = [self.number(part) for part in (node.left, *node.comparators)]
         found = [_COMPARE[type(op)](*terms[i : i + 2]) for i, op in enumerate(node.ops)]
-        return np.logical_and.reduce(found)
+        return np.asarray(np.logical_and.reduce(found))
 
     def number(self, node: ast.expr) -> np.ndarray:
         with np.errstate(all="ignore"):
@@ -70,7 +70,7 @@ class _Evaluation:
             operand = self.number(node.operand)
             return -operand if isinstance(node.op, ast.USub) else operand
         if isinstance(node, ast.BinOp):
-            return _ARITHMETIC[type(node.op)](self.number(node.left), self.number(node.right))
+            return np.asarray(_ARITHMETIC[type(node.op)](self.number(node.left), self.number(node.right)))
         if isinstance(node, ast.IfExp):
             return np.where(self.boolean(node.test), self.number(node.body), self.number(node.orelse))
         assert isinstance(node, ast.Call)
@@ -78,8 +78,8 @@ class _Evaluation:
 
     def _call(self, name: str, arguments: list[np.ndarray]) -> np.ndarray:
         if name in _OF_MANY:
-            return _OF_MANY[name].reduce(arguments)
+            return np.asarray(_OF_MANY[name].reduce(arguments))
         if name == "rate":
             (values,) = arguments
             return np.concatenate(([np.nan], np.diff(values) / np.diff(self._time)))[: len(values)]
-        return _FUNCTIONS[name](*arguments)
+        return np.asarray(_FUNCTIONS[name](*arguments))

@@ -39,7 +39,7 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
 
 def _parsed(formula: str, variables: Collection[str], step_s: float) -> Any:
     try:
-        import rtamt  # type: ignore[import-not-found]
+        import rtamt  # type: ignore[import-untyped]
     except ImportError:
         raise MutatorError(
             "a formula of signal temporal logic, and no rtamt to read it",

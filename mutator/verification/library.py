@@ -137,7 +137,7 @@ def _unbuildable(
 
 
 def _where(error: MutatorError, manifest: TargetManifest) -> str:
-    """Where in the target an error is, as specs name its files: ` (pkg/radar.py:28)`."""
+    """Where in the target an error is, as specs name its files: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
     path = manifest.tree.named(error.where)
