@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         doctor,
         draw_control_structure,
         init_library,
+        upgrade_manifest,
     )
     from mutator.api.mutant_files import MutantSet
     from mutator.api.mutants import BuiltMutant, build_mutant
@@ -52,6 +53,7 @@ _HOMES = {
         "doctor",
         "draw_control_structure",
         "init_library",
+        "upgrade_manifest",
     ),
     "mutator.api.mutant_files": ("MutantSet",),
     "mutator.api.mutants": ("BuiltMutant", "build_mutant"),
@@ -116,6 +118,7 @@ __all__ = [
     "prune_caches",
     "run",
     "try_fault",
+    "upgrade_manifest",
     "verify",
 ]
 

@@ -104,7 +104,7 @@ class Trigger:
 
 
 def fault_label(spec: str, value: Value, unit: str) -> str:
-    """What tables and messages call a fault: `sensor/offset/distance 35 m`.
+    """What tables and messages call a fault: `sensor/bias/distance 35 m`.
 
     `value` and `unit` are as the spec states them, or as they stand in a table: None or '' for no value, `-`
     or '' for no unit.
@@ -174,7 +174,7 @@ class Experiment:
 
     @property
     def label(self) -> str:
-        """What reports call it: `sensor/offset/distance 35 m, S1, guided C1`."""
+        """What reports call it: `sensor/bias/distance 35 m, S1, guided C1`."""
         return f"{self.fault.label}, {self.drive_label}"
 
     @property

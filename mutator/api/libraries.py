@@ -3,12 +3,15 @@
 from os import PathLike
 from pathlib import Path
 
+from mutator._common.files import write_atomic
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
+from mutator.targets import manifest_files
+from mutator.targets.upgrade import Upgrade
 from mutator.verification import library
 from mutator.verification.doctor import Finding, examine
 from mutator.workspace import Workspace
@@ -21,6 +24,18 @@ def init_library(folder: str | Path) -> Path:
     """
     write_library(Path(folder))
     return Path(folder)
+
+
+def upgrade_manifest(path: str | Path) -> Upgrade | None:
+    """Write a target's manifest of an older schema anew, as one of today's; all that did not change stays.
+
+    None for a manifest of today's schema, which is left alone. `lost` of the answer are comments within what
+    had to be written anew. MutatorError for a file that is no manifest.
+    """
+    upgrade = manifest_files.upgrade_manifest(Path(path))
+    if upgrade is not None:
+        write_atomic(Path(path), upgrade.text.encode())
+    return upgrade
 
 
 def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:

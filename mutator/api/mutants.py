@@ -72,9 +72,9 @@ def build_mutant(
 ) -> BuiltMutant:
     """Build a fault into the target's source; nothing is run or written.
 
-    `fault` is a Fault, a spec (`sensor/offset`), one of its variants (`sensor/offset/distance`), or a spec file;
+    `fault` is a Fault, a spec (`sensor/bias`), one of its variants (`sensor/bias/distance`), or a spec file;
     of several values the middle one is taken, or `value` in the spec's unit. `trigger` is a Trigger, a
-    context (`C2`), a time in s, `always`, or a condition (`gap <= 2 and closing > 0`). `target` names a manifest;
+    context (`C2`), a time in s, `always`, or a condition (`gap <= 2`). `target` names a manifest;
     default: the library's only one. MutatorError for a mistake in any of them, and for a place in the source
     that is not found; InvalidMutant (a MutatorError) when the mutant does not compile.
     """

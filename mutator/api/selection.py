@@ -155,7 +155,7 @@ def find_trigger(
 
 
 def _split(name: str) -> tuple[str, str | None]:
-    """`sensor/offset/distance` is a variant of the spec `sensor/offset`; a file is a spec."""
+    """`sensor/bias/distance` is a variant of the spec `sensor/bias`; a file is a spec."""
     parts = name.split("/")
     if len(parts) == 3 and not name.endswith((".yaml", ".yml")):
         return "/".join(parts[:2]), parts[2]

@@ -160,8 +160,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Discard what goes to closed standard streams: else a file that is opened gets the number of one, and the
-    words that were meant for it."""
+    """Discard what goes to closed standard streams: else a file that is opened gets the number of one, and
+    the words that were meant for it."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             file = os.open(os.devnull, os.O_RDWR)

@@ -23,7 +23,7 @@ TIMES = ("activation to manifest", "activation to alert", "activation to hazard"
 def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
     """A row for each pair in which both runs say something about the fault.
 
-    `kind` (`sensor/offset`), `fault` (what is resampled: variant and value), flags `activated_a`, `activated_b`
+    `kind` (`sensor/bias`), `fault` (what is resampled: variant and value), flags `activated_a`, `activated_b`
     and so on, times `activation to hazard_a` and so on, s, NaN: not both of them came.
     """
     rows = [

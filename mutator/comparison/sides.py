@@ -20,7 +20,7 @@ class Key(NamedTuple):
     Ids will not do: drawn times, the reading, the setting and the scenario's text are in them, too.
     """
 
-    spec: str  # with its variant: sensor/offset/distance
+    spec: str  # with its variant: sensor/bias/distance
     value: Value
     scenario: str
     method: str

@@ -16,9 +16,7 @@ class AtModel(StrictModel, title="A place"):
     (`gap`, `self.angle`, `frames.extend`)."""
 
     file: str = Field(description="A file of the target, relative to its root.")
-    function: str = Field(
-        description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`."
-    )
+    function: str = Field(description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`.")
     after_assign: str | None = Field(None, description="After the statement that assigns to this name.")
     before_assign: str | None = Field(None, description="Before the statement that assigns to this name.")
     after_call: str | None = Field(None, description="After the statement that calls this name.")

@@ -116,7 +116,7 @@ class Results:
         """A frame of all columns, typed, by experiment id.
 
         Names are categories (`outcome` and `status` in their order), flags nullable booleans (NA: the run did
-        not end well), times floats in s of simulation (NaN: did not happen). `kind` (`sensor/offset`), `hazard`
+        not end well), times floats in s of simulation (NaN: did not happen). `kind` (`sensor/bias`), `hazard`
         and `t_hazard` (any, the first) are added. `frame.attrs["units"]` has the unit of each number.
         """
         import pandas as pd

@@ -1,6 +1,6 @@
 """The results of a run as a pandas frame, a row per usable experiment.
 
-Beside the columns of results.csv it has `kind` (`sensor/offset`), `row` (the context row whose trigger or whose
+Beside the columns of results.csv it has `kind` (`sensor/bias`), `row` (the context row whose trigger or whose
 random partner it is), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
 is_alert`. Times are s of simulation, NaN: did not happen.
 """

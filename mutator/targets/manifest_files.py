@@ -6,7 +6,7 @@ from pydantic import Field
 
 from mutator._common.shipped import SHIPPED_TARGET
 from mutator.config.locations import PROBE_NAME
-from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.config.yaml_files import Source, StrictModel, load, read
 from mutator.targets.channels import ChannelModel, TraceModel, read_channels
 from mutator.targets.environment import check_environment
 from mutator.targets.judging import HazardModel, MetricModel, read_hazards, read_metrics
@@ -16,9 +16,9 @@ from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, chec
 from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_root
 from mutator.targets.scene import SceneModel, read_scene
-from mutator.targets.upgrade import OLD, upgraded
+from mutator.targets.upgrade import NEW, OLD, Upgrade, upgraded, upgraded_text
 
-SCHEMA = "target/2"
+SCHEMA = NEW
 
 
 class _ChangeModel(StrictModel, title="A change"):
@@ -143,6 +143,17 @@ class ManifestModel(StrictModel, title="The file"):
         description="Names of the alerts that count; others that a record has are left out.",
     )
     film: _FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
+
+
+def upgrade_manifest(path: Path) -> Upgrade | None:
+    """A manifest of the older schema as one of today's; None for one that is. MutatorError for a file that is
+    neither."""
+    source = load(path)
+    if not isinstance(source.data, dict) or source.data.get("schema") != OLD:
+        read(path, ManifestModel, SCHEMA)
+        return None
+    read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
+    return upgraded_text(source)
 
 
 def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:

@@ -1,11 +1,26 @@
 """Manifests of the schema target/1, whose observed values were the same four for every target."""
 
-from dataclasses import replace
+import re
+from dataclasses import dataclass, replace
 from typing import Any
 
+import yaml
+
+from mutator._common.files import no_pipe
 from mutator.config.yaml_files import Keys, Source
 
-OLD = "target/1"
+OLD, NEW = "target/1", "target/2"
+# key of target/1 -> keys of target/2 that are written in its place
+_REPLACED: dict[str, tuple[str, ...]] = {
+    "schema": ("schema",),
+    "observation": ("observation",),
+    "trace_file": ("trace",),
+    "time_channel": ("trace",),
+    "record_file": ("record",),
+    "compare": ("channels",),
+    "plot": ("channels",),
+}
+_COMMENT = re.compile(r"(?:^|\s)#")
 _OBSERVED = {
     "d_rel": ("m", "distance to the vehicle ahead"),
     "v_ego": ("m/s", "the car's own speed"),
@@ -43,7 +58,10 @@ def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
         if name in old:
             new["values"][name] = {"is": old[name], "unit": unit, "about": about}
             lines["observation", "values", name] = lines["observation", name]
-    return new | {"derived": derived()}
+    formulas = {
+        name: {"is": text, "unit": unit, "about": about} for name, (text, unit, about) in _DERIVED.items()
+    }
+    return new | {"derived": formulas}
 
 
 def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
@@ -58,8 +76,50 @@ def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
     return channels
 
 
-def derived() -> dict[str, dict[str, Any]]:
-    """What followed from the observed values of every target."""
-    return {
-        name: {"is": text, "unit": unit, "about": about} for name, (text, unit, about) in _DERIVED.items()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Upgrade:
+    """A manifest as text of target/2; `lost` are comments within what had to be written anew."""
+
+    text: str
+    lost: tuple[str, ...]
+
+
+def upgraded_text(source: Source) -> Upgrade:
+    """The file of a target/1 manifest with what changed written anew, and all else as it is."""
+    lines = no_pipe(source.path).read_text(encoding="utf-8").splitlines(keepends=True)
+    begins = sorted((line - 1, keys[0]) for keys, line in source.lines.items() if len(keys) == 1)
+    ends = [_end_of(lines, begin) for begin, _ in begins[1:]] + [len(lines)]
+    new = {"schema": NEW} | {
+        key: value
+        for key, value in upgraded(source).data.items()
+        if key not in source.data or key == "observation"
     }
+    text, lost = ["".join(lines[: _end_of(lines, begins[0][0])])], list[str]()
+    for (begin, key), end in zip(begins, ends, strict=True):
+        replaced = _REPLACED.get(str(key), ())
+        above = begin - _end_of(lines, begin)
+        text.append("".join(lines[begin - above : begin]))
+        if not replaced:
+            text.append("".join(lines[begin:end]))
+            continue
+        text += [_dumped(name, new.pop(name)) for name in replaced if name in new]
+        lost += [line[line.index("#") :].strip() for line in lines[begin:end] if _COMMENT.search(line)]
+    return Upgrade(text="".join(text), lost=tuple(lost))
+
+
+def _end_of(lines: list[str], begin: int) -> int:
+    """Where what comes before line `begin` ends: comments right above a key belong to it."""
+    while begin and lines[begin - 1].startswith("#"):
+        begin -= 1
+    return begin
+
+
+def _dumped(key: str, value: Any) -> str:
+    text: str = yaml.safe_dump(
+        {key: value},
+        sort_keys=False,
+        allow_unicode=True,
+        width=110,
+        default_flow_style=None if isinstance(value, dict) else False,  # short mappings in one line
+    )
+    return text
