@@ -211,9 +211,10 @@ class Workspace:
         """The context table `name`, or the table of that path."""
         return load_context_table(self._file("stpa/contexts", name, "context table"))
 
-    def hazards(self) -> HazardList:
-        """Accidents and hazards of fault_library/stpa/hazards.yaml."""
-        return load_hazards(self.library / "stpa" / "hazards.yaml")
+    def hazards(self) -> HazardList | None:
+        """Accidents and hazards of fault_library/stpa/hazards.yaml; None where there is no such file."""
+        path = self.library / "stpa" / "hazards.yaml"
+        return load_hazards(path) if os.path.lexists(path) else None
 
     def analysis(self) -> Analysis | None:
         """The hazard analysis of fault_library/stpa/; None where there is no control structure in it."""

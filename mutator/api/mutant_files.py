@@ -14,6 +14,7 @@ from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.building import write_tree
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 COLUMNS = (
@@ -43,12 +44,14 @@ def pairs_of_specs(
     seed: int | None = None,
     reading: str | None = None,
 ) -> list[Pair]:
-    """Every fault of the specs (names, globs over them, files) under every trigger; default: all contexts."""
+    """Every fault of the specs (names, globs over them, files) under every trigger; default: all contexts, or
+    `always` in a library without any."""
     made = [bench.trigger(text) for text in triggers]
     if not made:
         armed_after_s = bench.manifest.armed_after_s
         tables = context_tables(bench.workspace)
         made = [trigger for table in tables for trigger in table.triggers(armed_after_s=armed_after_s)]
+        made = made or [always(armed_after_s=armed_after_s)]
     pairs: list[Pair] = []
     for name in _spec_names(bench.workspace, specs):
         faults = bench.faults(FaultChoice(spec=name, seed=seed, reading=reading))

@@ -183,7 +183,7 @@ class Run:
         """How the experiments of each fault type ended."""
         hazards = tables.hazard_names(self._rows)
         counts = tables.counts_by(self._rows, tables.by_fault_type)
-        heads, rows = tables.count_table(counts, "fault type", hazards)
+        heads, rows = tables.count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:

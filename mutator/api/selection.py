@@ -148,10 +148,9 @@ def find_trigger(
     try:
         return read_trigger(text, armed_after_s, variables)
     except MutatorError as e:
-        contexts = ", ".join(row.id for table in tables for row in table.rows)
-        raise MutatorError(
-            e.got, argument="trigger", expected=f"a context ({contexts}), {TYPED}", remedy=e.remedy
-        ) from e
+        names = ", ".join(row.id for table in tables for row in table.rows)
+        contexts = f"a context ({names}), " if names else ""
+        raise MutatorError(e.got, argument="trigger", expected=f"{contexts}{TYPED}", remedy=e.remedy) from e
 
 
 def _split(name: str) -> tuple[str, str | None]:

@@ -3,20 +3,27 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from mutator.campaigns.studies import Study, find_study
+from mutator.campaigns.trigger_choice import (
+    EVERY_READING,
+    MOST,
+    ListedTrigger,
+    Triggers,
+    by_reading,
+    or_by_reading,
+    with_list,
+)
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.readings import FILE, Readings
 from mutator.model import Limits, Method
 
 SCHEMA = "campaign/1"
-EVERY_READING = "*"  # what holds in all of them, where a file does not tell them apart
 _Told = TypeVar("_Told")
-_MOST = 1_000_000_000  # of a limit or a time: no machine has more, and no run takes longer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +60,8 @@ class Campaign:
     `study` names the published work that reports of the campaign stand beside (None: none).
     `setting_in(reading)` names changes of the manifest that every run of the campaign is made with.
     `reading` is None for the library's default. Before `armed_after(reading)` no trigger fires and no random
-    time is drawn.
+    time is drawn; None: as the target's manifest says. Triggers are those of the context table `table`, or
+    `listed`.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
     random time to the end).
     """
@@ -69,10 +77,11 @@ class Campaign:
     faults: tuple[Selection, ...]
     reading: str | None
     methods: tuple[Method, ...]
-    table: str
+    table: str | None
     rows: tuple[str, ...] | None
+    listed: tuple[ListedTrigger, ...]
     armed_after_s: Mapping[str, float]
-    random_until_s: float
+    random_until_s: float | None
     hold_s: float | None
     sample: int | None
     proportional: bool
@@ -82,9 +91,9 @@ class Campaign:
     chunk: int
     yaml: Source
 
-    def armed_after(self, reading: str) -> float:
-        """When triggers are armed under a reading."""
-        return _in(self.armed_after_s, reading)
+    def armed_after(self, reading: str) -> float | None:
+        """When triggers are armed under a reading; None: the campaign does not say."""
+        return _in(self.armed_after_s, reading) if self.armed_after_s else None
 
     def setting_in(self, reading: str) -> tuple[str, ...]:
         """The changes of the manifest under a reading."""
@@ -103,11 +112,6 @@ def _in(told: Mapping[str, _Told], reading: str) -> _Told:
     return told[reading] if reading in told else told[EVERY_READING]
 
 
-def _by_reading(given: object) -> object:
-    """What is told of each reading; what is told once is told of all."""
-    return given if isinstance(given, dict) else {EVERY_READING: given}
-
-
 class _SelectionModel(StrictModel, title="A selection"):
     """Faults of the library, by the names of their specs."""
 
@@ -119,46 +123,7 @@ class _SelectionModel(StrictModel, title="A selection"):
     )
 
 
-_Seconds = Annotated[float, Field(ge=0.0, le=_MOST, allow_inf_nan=False)]
-_SECONDS = {"type": "number", "minimum": 0.0, "maximum": _MOST}
 _NAMES = {"type": "array", "items": {"type": "string"}}
-
-
-def _or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
-    return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
-
-
-class _TriggersModel(StrictModel, title="Triggers"):
-    """Guided experiments wait for the contexts of a table, random ones for a time that is drawn."""
-
-    table: str = Field(description="A context table, by its name.")
-    rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
-    armed_after_s: Annotated[
-        dict[str, _Seconds], BeforeValidator(_by_reading), WithJsonSchema(_or_by_reading(_SECONDS))
-    ] = Field(
-        min_length=1,
-        description="Before that time no trigger fires and no random time is drawn, in s since the start "
-        "of a run: one number, or one for each reading by its name.",
-    )
-    random_until_s: float = Field(
-        gt=0.0,
-        le=_MOST,
-        allow_inf_nan=False,
-        description="The latest random time. One past the end of a scenario never comes.",
-    )
-    hold_s: float | None = Field(
-        None,
-        gt=0.0,
-        allow_inf_nan=False,
-        description="How long a fault stays active once triggered; without it, while its context holds, or "
-        "from its random time to the end.",
-    )
-
-    @model_validator(mode="after")
-    def _check(self) -> "_TriggersModel":
-        if self.random_until_s <= max(self.armed_after_s.values()):
-            raise ValueError("random_until_s must be later than armed_after_s")
-        return self
 
 
 class _CanaryModel(StrictModel, title="The canary"):
@@ -175,14 +140,14 @@ class _CanaryModel(StrictModel, title="The canary"):
 class _LimitsModel(StrictModel, title="Limits"):
     """What one run may use before it is stopped."""
 
-    cpu_s: int = Field(default=60, ge=1, le=_MOST, description="Seconds of CPU.")
-    wall_s: int = Field(default=300, ge=1, le=_MOST, description="Seconds of wall time.")
-    memory_mb: int = Field(default=4096, ge=256, le=_MOST, description="MiB of address space.")
-    steps: int = Field(default=20_000, ge=1, le=_MOST, description="Steps of simulation.")
+    cpu_s: int = Field(default=60, ge=1, le=MOST, description="Seconds of CPU.")
+    wall_s: int = Field(default=300, ge=1, le=MOST, description="Seconds of wall time.")
+    memory_mb: int = Field(default=4096, ge=256, le=MOST, description="MiB of address space.")
+    steps: int = Field(default=20_000, ge=1, le=MOST, description="Steps of simulation.")
     disk_mb: int = Field(
         default=1024,
         ge=1,
-        le=_MOST,
+        le=MOST,
         description="MiB in its output folder and TMPDIR together, and in any single file that it writes.",
     )
 
@@ -198,7 +163,7 @@ class CampaignModel(StrictModel, title="The file"):
     target: str = Field(description="The target, by the name of its manifest.")
     scenarios: list[str] = Field(min_length=1, description="Names of scenarios, each once.")
     setting: Annotated[
-        dict[str, list[str]], BeforeValidator(_by_reading), WithJsonSchema(_or_by_reading(_NAMES))
+        dict[str, list[str]], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_NAMES))
     ] = Field(
         {EVERY_READING: []},
         description="Changes of the manifest that every run is made with, fault-free ones included: one "
@@ -211,9 +176,11 @@ class CampaignModel(StrictModel, title="The file"):
         "`--reading` overrides it.",
     )
     methods: list[Annotated[Method, Field(strict=False)]] = Field(
-        min_length=1, description="`guided`, `random` or both."
+        default_factory=lambda: [Method.GUIDED],
+        min_length=1,
+        description="`guided`, `random` or both; without it, `guided`.",
     )
-    triggers: _TriggersModel = Field(description="When faults become active.")
+    triggers: Triggers = Field(description="When faults become active.")
     sample: int | None = Field(
         None,
         ge=1,
@@ -238,6 +205,8 @@ class CampaignModel(StrictModel, title="The file"):
     def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
             raise ValueError("proportional without sample: say how many")
+        if Method.RANDOM in self.methods and self.triggers.random_until_s is None:
+            raise ValueError("`random_until_s` in `triggers` for random times")
         return self
 
 
@@ -246,7 +215,7 @@ def load_campaign(path: Path) -> Campaign:
 
     Whether its study can be had is asked by `load_study` alone: old runs open without it.
     """
-    model, source = read(path, CampaignModel, SCHEMA)
+    model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     settings: dict[Keys, Sequence[str]] = {
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
@@ -275,6 +244,7 @@ def load_campaign(path: Path) -> Campaign:
         methods=tuple(Method(name) for name in model.methods),
         table=triggers.table,
         rows=tuple(triggers.rows) if triggers.rows else None,
+        listed=triggers.triggers(),
         armed_after_s=triggers.armed_after_s,
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
@@ -314,7 +284,7 @@ def check_readings(campaign: Campaign, readings: Readings) -> None:
         ("setting",): ("setting", campaign.setting),
     }
     for keys, (what, told) in places.items():
-        if EVERY_READING in told:
+        if EVERY_READING in told or not told:
             continue
         for name in told:
             if name not in readings.names:

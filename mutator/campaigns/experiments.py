@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.sampling import spread
+from mutator.campaigns.trigger_choice import listed_triggers
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
@@ -29,7 +30,8 @@ class Expansion:
         self.manifest = manifest
         self.seed = seed
         self.reading = reading
-        self.armed_after_s = campaign.armed_after(reading)
+        armed_after_s = campaign.armed_after(reading)
+        self.armed_after_s = manifest.armed_after_s if armed_after_s is None else armed_after_s
         self._digests: dict[str, str] = {}
 
     def experiments(self) -> tuple[Experiment, ...]:
@@ -111,7 +113,16 @@ class Expansion:
         )
 
     def _triggers(self) -> tuple[Trigger, ...]:
-        """One for each row of the context table; random times are drawn for the same rows, as their pairs."""
+        """One for each row of the context table, or those listed; random times are drawn for the same ones,
+        as their pairs."""
+        if self.campaign.table is None:
+            return listed_triggers(
+                self.campaign.listed,
+                self.campaign.yaml,
+                self.manifest,
+                armed_after_s=self.armed_after_s,
+                hold_s=self.campaign.hold_s,
+            )
         with self._placed(("triggers", "table")):
             table = self.workspace.context_table(self.campaign.table)
             table.check(self.manifest.observation.variables)
@@ -137,6 +148,7 @@ class Expansion:
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
         """The random partner of a row's trigger, the same in every reading but for when times begin."""
+        assert self.campaign.random_until_s is not None  # the file has it where times are random
         time = draw_time(
             self.seed,
             f"{scenario}/{fault.spec}/{number}/{row.name}",

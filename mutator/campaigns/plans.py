@@ -309,6 +309,7 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "runs": plan.runs,
         "limits": plain(plan.campaign.limits),
         "hazards": list(manifest.hazards),
+        "alerts": list(manifest.alerts),
         "compared": [channel.name for channel in manifest.compared],
         "metrics": metric_columns(manifest),
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],

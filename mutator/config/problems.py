@@ -1,7 +1,7 @@
 """Words for what pydantic found wrong with a file: value shown, what was expected, a remedy."""
 
 import types
-from typing import Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -63,7 +63,9 @@ def _fields_at(model: type[BaseModel], keys: tuple[str | int, ...]) -> list[str]
 
 
 def _inner(annotation: Any) -> Any:
-    """`X` of `X | None`; anything else as it is."""
+    """`X` of `X | None` and of `Annotated[X, ...]`; anything else as it is."""
+    if get_origin(annotation) is Annotated:
+        return _inner(get_args(annotation)[0])
     if get_origin(annotation) in (Union, types.UnionType):
         return next(a for a in get_args(annotation) if a is not type(None))
     return annotation

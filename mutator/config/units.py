@@ -14,30 +14,61 @@ class Unit:
     factor: float
 
 
+_DEG = math.pi / 180
+
+# A unit is a factor and no more: degC and K differ by an offset, too, so neither is converted into the other.
 UNITS = {
-    unit.suffix: unit
-    for unit in (
-        Unit(suffix="m", symbol="m", dimension="length", factor=1.0),
-        Unit(suffix="mps", symbol="m/s", dimension="speed", factor=1.0),
-        Unit(suffix="kph", symbol="km/h", dimension="speed", factor=1 / 3.6),
-        Unit(suffix="mph", symbol="mph", dimension="speed", factor=0.44704),
-        Unit(suffix="mps2", symbol="m/s^2", dimension="acceleration", factor=1.0),
-        Unit(suffix="rad", symbol="rad", dimension="angle", factor=1.0),
-        Unit(suffix="deg", symbol="deg", dimension="angle", factor=math.pi / 180),
-        Unit(suffix="s", symbol="s", dimension="time", factor=1.0),
-        Unit(suffix="ms", symbol="ms", dimension="time", factor=0.001),
-        Unit(suffix="mmph", symbol="mm/h", dimension="precipitation", factor=1.0),
-        Unit(suffix="lx", symbol="lx", dimension="illuminance", factor=1.0),
-        Unit(suffix="px", symbol="px", dimension="picture", factor=1.0),
+    suffix: Unit(suffix=suffix, symbol=symbol, dimension=dimension, factor=factor)
+    for suffix, symbol, dimension, factor in (
+        ("m", "m", "length", 1.0),
+        ("mm", "mm", "length", 0.001),
+        ("cm", "cm", "length", 0.01),
+        ("km", "km", "length", 1000.0),
+        ("per_m", "1/m", "curvature", 1.0),
+        ("mps", "m/s", "speed", 1.0),
+        ("kph", "km/h", "speed", 1 / 3.6),
+        ("mph", "mph", "speed", 0.44704),
+        ("mps2", "m/s^2", "acceleration", 1.0),
+        ("rad", "rad", "angle", 1.0),
+        ("deg", "deg", "angle", _DEG),
+        ("radps", "rad/s", "angular speed", 1.0),
+        ("degps", "deg/s", "angular speed", _DEG),
+        ("radps2", "rad/s^2", "angular acceleration", 1.0),
+        ("s", "s", "time", 1.0),
+        ("ms", "ms", "time", 0.001),
+        ("us", "us", "time", 1e-6),
+        ("min", "min", "time", 60.0),
+        ("hz", "Hz", "frequency", 1.0),
+        ("kg", "kg", "mass", 1.0),
+        ("n", "N", "force", 1.0),
+        ("nm", "N m", "torque", 1.0),
+        ("pa", "Pa", "pressure", 1.0),
+        ("bar", "bar", "pressure", 1e5),
+        ("w", "W", "power", 1.0),
+        ("v", "V", "voltage", 1.0),
+        ("a", "A", "current", 1.0),
+        ("degc", "degC", "temperature in degrees Celsius", 1.0),
+        ("k", "K", "temperature in kelvin", 1.0),
+        ("mmph", "mm/h", "precipitation", 1.0),
+        ("lx", "lx", "illuminance", 1.0),
+        ("px", "px", "picture", 1.0),
+        ("counts", "counts", "counts", 1.0),
+        ("percent", "%", "share", 1.0),
     )
 }
 KNOWN = ", ".join(UNITS)
+_WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # that the longest suffix has
 
 
 def split(key: str) -> tuple[str, Unit | None]:
-    """`offset_m` -> (`offset`, metre); a key that ends in no unit is returned whole, with None."""
-    stem, _, suffix = key.rpartition("_")
-    return (stem, UNITS[suffix]) if stem and suffix in UNITS else (key, None)
+    """`offset_m` -> (`offset`, metre), `offset_per_m` -> (`offset`, 1/m): the longest suffix counts. A key
+    that ends in no unit is returned whole, with None."""
+    for words in range(_WORDS, 0, -1):
+        stem, *parts = key.rsplit("_", words)
+        suffix = "_".join(parts)
+        if stem and suffix in UNITS:
+            return stem, UNITS[suffix]
+    return key, None
 
 
 def convert(number: float, source: Unit, target: Unit) -> float:

@@ -108,11 +108,11 @@ class _Resolver:
         if unit is None:
             return [schema.name]
         fitting = [u.suffix for u in units.UNITS.values() if u.dimension == unit.dimension]
-        return [f"{schema.name}_{suffix}" for suffix in fitting]
+        return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
 
     def key(self, schema: ParamSchema) -> str:
-        """`keys` in an error."""
-        return " or ".join(f"`{key}`" for key in self.keys(schema))
+        """How an error writes it: in the unit that the template takes, the first of `keys`."""
+        return f"`{self.keys(schema)[0]}`"
 
     def unit(self, schema: ParamSchema) -> units.Unit | None:
         """The unit in which the template takes the parameter."""

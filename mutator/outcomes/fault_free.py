@@ -44,17 +44,18 @@ def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultF
     return tuple(found)
 
 
-def fault_free_table(runs: Sequence[FaultFreeRun]) -> Table:
-    """A line for each run: its alerts and hazards with their first times, and the range of each channel."""
+def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Table:
+    """A line for each run: its alerts, if the target has some, and hazards with their first times, and the
+    range of each channel."""
     channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
     rows = []
     for run in runs:
         ranges = {name: f"{least:.4g} to {largest:.4g}" for name, least, largest in run.ranges}
         key = golden_key(run.scenario, run.changes)
-        rows.append(
-            [key, _told(run.alerts), _told(run.hazards), *(ranges.get(name, "") for name in channels)]
-        )
-    return Table(heads=["fault-free run", "alerts", "hazards", *channels], rows=rows)
+        events = [_told(run.alerts), _told(run.hazards)] if alerts else [_told(run.hazards)]
+        rows.append([key, *events, *(ranges.get(name, "") for name in channels)])
+    events = ["alerts", "hazards"] if alerts else ["hazards"]
+    return Table(heads=["fault-free run", *events, *channels], rows=rows)
 
 
 def own_alerts(runs: Iterable[FaultFreeRun]) -> str:

@@ -118,14 +118,15 @@ def by_method(row: Row) -> str:
 
 
 def count_table(
-    counts: Sequence[Count], head: str, hazards: Sequence[str]
+    counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
 ) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of a table of counts; crashes, timeouts and unusable runs only if there are any."""
+    """Heads and rows of a table of counts; crashes, timeouts and unusable runs only if there are any, and
+    `alerts` if the target has some."""
     heads = [head, "injected", "activated", "manifested", *hazards]
-    heads += ["any hazard", "alerts", "hazard, no alert"]
-    table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards] for c in counts]
+    heads += ["any hazard", "alerts", "hazard, no alert"] if alerts else ["any hazard"]
+    table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards, c.any_hazard] for c in counts]
     for line, c in zip(table, counts, strict=True):
-        line += [c.any_hazard, c.alerts, c.hazards_without_alert]
+        line += [c.alerts, c.hazards_without_alert] if alerts else []
     for name in ("crashed", "timeout", "unusable"):
         column = [getattr(c, name) for c in counts]
         if any(column):

@@ -119,6 +119,11 @@ def _units() -> Iterator[str]:
     rows = [(f"`_{unit.suffix}`", unit.symbol, unit.dimension) for unit in units.UNITS.values()]
     yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
+    yield (
+        "The longest suffix counts: `by_per_m` is `by` in 1/m. A number is converted between units of one "
+        "quantity, by a factor.\ndegC and K also differ by an offset, so they are two quantities: give a "
+        "number in the unit that the variable has.\n"
+    )
 
 
 def _page(*parts: str) -> str:

@@ -62,8 +62,9 @@ def film_experiment(
 
 
 def _hazards(workspace: Workspace) -> dict[str, str]:
-    """Each hazard in a few words: what its description says before the first bracket."""
-    about = workspace.hazards().hazards
+    """Each hazard in a few words, if the library describes any: what is before the first bracket."""
+    known = workspace.hazards()
+    about = known.hazards if known else {}
     return {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
 
 

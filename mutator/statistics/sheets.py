@@ -15,18 +15,25 @@ _DRIVER_S = 1.8  # a driver's reaction to a warning that is seen, where nothing 
 
 
 def run_sheets(
-    frame: pd.DataFrame, published: Published | None, alerts: Alerts, ends: Mapping[str, float] | None
+    frame: pd.DataFrame,
+    published: Published | None,
+    alerts: Alerts | None,
+    ends: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
     """The tables of a frame; none if they would say no more than counts: one method, nothing published.
 
-    `alerts` of each run are needed to say which came before a hazard, `ends` (s of simulation at which a run
-    of each scenario ends) for censored times; tables that lack what they need are left out.
+    `alerts` of each run (None: the target has none) are needed to say which came before a hazard, `ends` (s
+    of simulation at which a run of each scenario ends) for censored times; tables that lack what they need
+    are left out.
     """
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):
         return ()
     scenarios, kinds = by_scenario(frame), by_kind(frame)
     methods = sorted({method for method, _ in scenarios})
-    made = [summary_tables.summary_sheet(method, scenarios, published) for method in methods]
+    has_alerts = alerts is not None
+    made = [
+        summary_tables.summary_sheet(method, scenarios, published, alerts=has_alerts) for method in methods
+    ]
     made += [summary_tables.coverage_sheet(method, kinds, published) for method in methods]
     if {GUIDED, RANDOM} <= set(methods):
         made += [
@@ -34,11 +41,11 @@ def run_sheets(
             compare_tables.kinds_sheet(frame, published),
             compare_tables.pairs_sheet(frame),
         ]
-    made.append(time_tables.propagation_sheet(frame, published))
-    if ends is not None:
+    made.append(time_tables.propagation_sheet(frame, published, alerts=has_alerts))
+    if ends is not None and has_alerts:
         driver_s = published.driver_s if published else _DRIVER_S
         made.append(time_tables.reaction_sheet(frame, ends, driver_s))
-    if alerts.keys() >= set(frame["experiment_id"]):
+    if alerts is not None and alerts.keys() >= set(frame["experiment_id"]):
         made.append(time_tables.alerts_sheet(frame, alerts))
     made.append(time_tables.orders_sheet(frame))
     return tuple(sheet for sheet in made if sheet.lines)

@@ -22,13 +22,16 @@ _WORDS = {"hazards_no_alerts": "hazards without alert", "alerts_no_hazards": "al
 _NOTE = "95 % Wilson intervals; in brackets count/whole."
 
 
-def summary_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
-    """By scenario, of one method: a column for each scenario of ours, and one for all of them together."""
+def summary_sheet(method: str, ours: Counts, published: Published | None, *, alerts: bool = True) -> Sheet:
+    """By scenario, of one method: a column for each scenario of ours, and one for all of them together;
+    `alerts` if the target has some."""
     scenarios = sorted({scenario for how, scenario in ours if how == method})
     theirs = published.by_scenario if published else {}
     sources = _sources(method, ours, published, theirs, scenarios)
     lines: list[tuple[Cell, ...]] = []
     for part, whole in _MEASURES:
+        if "alerts" in part and not alerts:
+            continue
         for source, tallies in sources.items():
             cells = [_share(one, part, whole) for one in (*tallies.values(), _total(tallies.values()))]
             lines.append((_WORDS.get(part, part), whole, source, *cells))

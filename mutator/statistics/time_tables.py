@@ -9,19 +9,25 @@ from mutator.statistics import times
 from mutator.statistics.published import Published
 from mutator.statistics.sheet import Cell, Sheet
 
+_ALERT_NOTE = (
+    " Alert to hazard: where the alert came first; what did not happen before the end of the run is left out "
+    "here, see alert to hazard, censored."
+)
 
-def propagation_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """How fast faults get through, by method and scenario."""
+
+def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alerts: bool = True) -> Sheet:
+    """How fast faults get through, by method and scenario; `alerts` if the target has some."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         for step, spread in times.propagation(group).items():
-            lines.append((method, scenario, step, *astuple(spread)))
+            if alerts or "alert" not in step:
+                lines.append((method, scenario, step, *astuple(spread)))
     return Sheet(
         name="propagation",
         title="Propagation times by scenario",
         note="s from one event to the other, in the N runs that had both. Manifest: first difference of an "
-        "actuator output from the fault-free run. Alert to hazard: where the alert came first; what did not "
-        "happen before the end of the run is left out here, see alert to hazard, censored."
+        "actuator output from the fault-free run."
+        + (_ALERT_NOTE if alerts else "")
         + (f" {published.times_note}" if published else ""),
         heads=(
             "method",

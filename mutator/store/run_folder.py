@@ -173,6 +173,11 @@ class RunFolder:
         """Limits of each run."""
         return Limits(**self.head["limits"])
 
+    @property
+    def has_alerts(self) -> bool:
+        """Whether the target has alerts; of an old folder that is not known, and taken for granted."""
+        return bool(self.head.get("alerts", True))
+
     def golden(self, scenario: str, changes: tuple[str, ...] = ()) -> Path:
         """Folder with trace and record of the fault-free run."""
         return self.path / "golden" / golden_key(scenario, changes)

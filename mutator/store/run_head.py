@@ -39,6 +39,7 @@ _SHAPES: dict[str, Any] = {
     "runs": int,
     "limits": {str: int},
     "hazards": [str],
+    "alerts": [str],
     "compared": [str],
     "metrics": [[str]],
     "goldens": [list],

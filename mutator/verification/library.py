@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.studies import study_problems
+from mutator.campaigns.trigger_choice import listed_triggers
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
@@ -73,12 +74,20 @@ def check_campaigns(workspace: Workspace, readings: Readings) -> list[MutatorErr
         if campaign is None:
             continue
         found.tried(partial(check_readings, campaign, readings))
+        if campaign.listed and campaign.target in workspace.targets:
+            found.tried(partial(_check_triggers, campaign, workspace))
         study = found.tried(partial(load_study, campaign))
         if study and campaign.study and campaign.study not in asked:
             asked.add(campaign.study)
             problems = study_problems(campaign.study, study, workspace)
             found.problems += [_placed(problem, campaign) for problem in problems]
     return found.problems
+
+
+def _check_triggers(campaign: Campaign, workspace: Workspace) -> None:
+    """MutatorError for a trigger of a campaign's list that its target does not know."""
+    manifest = workspace.manifest(campaign.target)
+    listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
 
 
 def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:

@@ -64,7 +64,7 @@ def tables_panel(run: ReportedRun) -> Panel:
     parts = [NOTES]
     for title, table in counts:
         parts += filter(None, (f"## {title}", note, table.as_markdown()))
-    fault_free = fault_free_table(runs) if runs else None
+    fault_free = fault_free_table(runs, alerts=run.folder.has_alerts) if runs else None
     if fault_free:
         parts += ["## Fault-free runs", FAULT_FREE, fault_free.as_markdown()]
     parts += [sheet.markdown().rstrip() for sheet in sheets]
@@ -76,7 +76,7 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
     hazards = hazard_names(run.rows)
     made = []
     for title, head, key in _GROUPS:
-        heads, lines = count_table(counts_by(run.rows, key), head, hazards)
+        heads, lines = count_table(counts_by(run.rows, key), head, hazards, alerts=run.folder.has_alerts)
         made.append((title, Table(heads=heads, rows=lines, right=range(1, len(heads)))))
     return made
 
@@ -85,7 +85,7 @@ def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     """The statistics of a run, beside published counts if its study has some of its fault types."""
     published = run.study.published(run) if run.study else None
     alerts = {name: record.alerts for name, record in run.folder.records().items()}
-    return run_sheets(run.frame, published, alerts, run.ends())
+    return run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:

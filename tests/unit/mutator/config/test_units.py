@@ -1,16 +1,23 @@
 """Units in keys."""
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 
 from mutator.config import units
 
+CLONE = Path(__file__).parents[4]
+
 
 def test_a_key_gives_up_its_unit() -> None:
-    """The suffix after the last underscore is the unit if it is one, else the key stays whole."""
+    """The longest suffix that is a unit is the key's, else the key stays whole."""
     assert units.split("offset_m") == ("offset", units.UNITS["m"])
     assert units.split("per_step_kph") == ("per_step", units.UNITS["kph"])
+    assert units.split("by_per_m") == ("by", units.UNITS["per_m"])
+    assert units.split("per_m") == ("per", units.UNITS["m"])
+    assert units.split("torque_nm") == ("torque", units.UNITS["nm"])
     assert units.split("target") == ("target", None)
     assert units.split("nth_hit") == ("nth_hit", None)
     assert units.split("_m") == ("_m", None)
@@ -25,6 +32,14 @@ def test_a_key_gives_up_its_unit() -> None:
         (180, "deg", "rad", math.pi),
         (300, "ms", "s", 0.3),
         (-35, "m", "m", -35.0),
+        (250, "mm", "m", 0.25),
+        (12, "cm", "mm", 120.0),
+        (1.5, "km", "m", 1500.0),
+        (90, "degps", "radps", math.pi / 2),
+        (250, "us", "ms", 0.25),
+        (2, "min", "s", 120.0),
+        (1.2, "bar", "pa", 120000.0),
+        (20, "degc", "degc", 20.0),
     ],
 )
 def test_conversion(number: float, source: str, target: str, expected: float) -> None:
@@ -38,3 +53,22 @@ def test_dimensions_do_not_mix() -> None:
     """Metres are no speed."""
     with pytest.raises(ValueError, match="m is no unit of speed"):
         units.convert(1, units.UNITS["m"], units.UNITS["mps"])
+    with pytest.raises(ValueError, match="degC is no unit of temperature in kelvin"):
+        units.convert(20, units.UNITS["degc"], units.UNITS["k"])
+
+
+def test_every_suffix_ends_a_key() -> None:
+    """Whatever unit a key ends in is the one that is found in it, and no unit is there twice."""
+    assert {suffix: units.split(f"by_{suffix}") for suffix in units.UNITS} == {
+        suffix: ("by", unit) for suffix, unit in units.UNITS.items()
+    }
+    assert len({unit.symbol for unit in units.UNITS.values()}) == len(units.UNITS)
+
+
+def test_keys_of_the_library_are_what_they_were() -> None:
+    """No key of a shipped fault or fault model that had no unit ends in one; those with one keep it."""
+    first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
+    for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
+        for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):
+            unit = units.split(key)[1]
+            assert unit is None or unit.suffix in first, f"{path}: {key}"

@@ -104,7 +104,7 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
         ("scale.yaml", "kind: insert", "kind: wrap", "3: 'wrap' for 'kind'; expected one of 'insert' or"),
         ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
         ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
-        ("offset.yaml", "unit: target", "unit: feet", "8: 'feet'; expected target or one of m, mps"),
+        ("offset.yaml", "unit: target", "unit: feet", "8: 'feet'; expected target or one of m, mm, cm"),
         ("scale.yaml", "examples:", "samples:", "8: unknown key 'samples'"),
         (
             "scale.yaml",

@@ -1,0 +1,183 @@
+"""Which triggers a campaign uses, as its file says it: contexts of a table, or a list of its own."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+
+from mutator.config.yaml_files import Keys, Source, StrictModel
+from mutator.errors import MutatorError
+from mutator.model import Hold, Trigger
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import check_condition
+from mutator.triggers.kinds import always, at_time
+
+EVERY_READING = "*"  # what holds in all of them, where a file does not tell them apart
+MOST = 1_000_000_000  # of a limit or a time: no machine has more, and no run takes longer
+_LIST: Keys = ("triggers", "list")
+Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
+_SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListedTrigger:
+    """A trigger of a campaign's own list: at a time (s), while a condition holds, or (neither) always."""
+
+    at_s: float | None
+    when: str | None
+    hold_s: float | None
+
+
+def by_reading(given: object) -> object:
+    """What is told of each reading; what is told once is told of all."""
+    return given if isinstance(given, dict) else {EVERY_READING: given}
+
+
+def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
+    """The JSON schema of something that may be told of each reading."""
+    return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
+
+
+class _ListedModel(StrictModel, title="A trigger"):
+    """One of `always`, `at_s` and `when`; the word `always` alone will do."""
+
+    always: bool = Field(False, description="`true`: from when on triggers are armed, to the end.")
+    at_s: Seconds | None = Field(None, description="From that time on, to the end, in s.")
+    when: str | None = Field(
+        None,
+        description="While this condition holds, over `t` (s) and the values that the target observes.",
+    )
+    hold_s: float | None = Field(
+        None, gt=0.0, allow_inf_nan=False, description="Not longer than this, once triggered."
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "_ListedModel":
+        if sum((self.always, self.at_s is not None, self.when is not None)) != 1:
+            raise ValueError("one of `always`, `at_s` and `when`")
+        return self
+
+
+_Written = Literal["always"] | _ListedModel
+
+
+def _in_words(given: object) -> object:
+    return {"always": True} if given == "always" else given
+
+
+_Listed = Annotated[_ListedModel, BeforeValidator(_in_words, json_schema_input_type=_Written)]
+
+
+class TriggersModel(StrictModel, title="Triggers"):
+    """When faults become active. Guided experiments wait for the contexts of a table or for the triggers of a
+    list, random ones for a time that is drawn. `triggers` may be the list itself: `triggers: [always, {at_s:
+    3}, {when: speed > 5}]`."""
+
+    table: str | None = Field(None, description="A context table, by its name.")
+    rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
+    listed: list[_Listed] | None = Field(
+        None, alias="list", min_length=1, description="Instead of a table: the triggers, each once."
+    )
+    armed_after_s: Annotated[
+        dict[str, Seconds], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_SECONDS))
+    ] = Field(
+        default_factory=dict,
+        min_length=1,
+        description="Before that time no trigger fires and no random time is drawn, in s since the start "
+        "of a run: one number, or one for each reading by its name. Without it, that of the target's "
+        "manifest. An `at_s` is not held up by it.",
+    )
+    random_until_s: float | None = Field(
+        None,
+        gt=0.0,
+        le=MOST,
+        allow_inf_nan=False,
+        description="The latest random time, needed for `random` ones. One past the end of a scenario never "
+        "comes.",
+    )
+    hold_s: float | None = Field(
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="How long a fault stays active once triggered; without it, while its context holds, or "
+        "from its random time to the end.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "TriggersModel":
+        if (self.table is None) == (self.listed is None):
+            raise ValueError("either a `table` or a `list`")
+        if self.rows is not None and self.table is None:
+            raise ValueError("`rows` of a `table`")
+        until, armed = self.random_until_s, max(self.armed_after_s.values(), default=0.0)
+        if until is not None and until <= armed:
+            raise ValueError("random_until_s must be later than armed_after_s")
+        return self
+
+    def triggers(self) -> tuple[ListedTrigger, ...]:
+        """Those of its list."""
+        return tuple(ListedTrigger(at_s=t.at_s, when=t.when, hold_s=t.hold_s) for t in self.listed or ())
+
+
+def _as_it_is(given: object) -> object:
+    return given
+
+
+# a list has become the mapping when this is checked, so that errors have its lines
+Triggers = Annotated[
+    TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Written])
+]
+
+
+def with_list(source: Source) -> Source:
+    """A campaign whose `triggers` are the list itself, as one that has it under `list`."""
+    given = source.data.get("triggers")
+    if not isinstance(given, list):
+        return source
+    lines = {_LIST + keys[1:] if keys[:1] == _LIST[:1] else keys: line for keys, line in source.lines.items()}
+    lines["triggers",] = lines[_LIST]
+    return replace(source, data={**source.data, "triggers": {"list": given}}, lines=lines)
+
+
+def listed_triggers(
+    listed: Sequence[ListedTrigger],
+    source: Source,
+    manifest: TargetManifest,
+    *,
+    armed_after_s: float,
+    hold_s: float | None,
+) -> tuple[Trigger, ...]:
+    """The triggers of a campaign's list, which stands in `source`; `hold_s` is for those that have none of
+    their own. MutatorError at its line for a condition over what the target does not observe, and for a
+    trigger that stands there twice."""
+    found: dict[str, Trigger] = {}
+    for i, one in enumerate(listed):
+        trigger = _made(one, partial(_condition, source, manifest, i), armed_after_s, one.hold_s or hold_s)
+        if trigger.name in found:
+            got = f"'{trigger.name}' a second time"
+            raise source.error((*_LIST, i), got, expected="each trigger once", remedy="remove one")
+        found[trigger.name] = trigger
+    return tuple(found.values())
+
+
+def _made(
+    listed: ListedTrigger, condition: Callable[[str], str], armed_after_s: float, hold_s: float | None
+) -> Trigger:
+    if listed.at_s is not None:
+        return at_time(listed.at_s, name=f"at {listed.at_s:g} s", hold_s=hold_s)
+    trigger = always(armed_after_s=armed_after_s)
+    if listed.when is not None:
+        text = condition(listed.when)
+        trigger = Trigger(name=text, condition=text, armed_after_s=armed_after_s)
+    return replace(trigger, hold=Hold.FOR, hold_s=hold_s) if hold_s else trigger
+
+
+def _condition(source: Source, manifest: TargetManifest, i: int, text: str) -> str:
+    try:
+        return check_condition(text, variables=manifest.observation.variables)
+    except MutatorError as error:
+        raise source.error(
+            (*_LIST, i, "when"), error.got, expected=error.expected, remedy=error.remedy
+        ) from None
