@@ -13,7 +13,8 @@ from mutator.stpa.drawing import draw
 from mutator.targets import manifest_files
 from mutator.targets.upgrade import Upgrade
 from mutator.verification import library
-from mutator.verification.doctor import Finding, examine
+from mutator.verification.doctor import examine
+from mutator.verification.findings import Finding
 from mutator.workspace import Workspace
 
 

@@ -30,7 +30,7 @@ from mutator.engines.processes import (
     was_active,
 )
 from mutator.engines.reference import ReferenceEngine
-from mutator.engines.threads import too_many
+from mutator.engines.threads import too_many, turned_off
 from mutator.model import Limits, Status
 from mutator.mutants.building import build
 from mutator.mutants.probe import probe_module, silent_report, state_after
@@ -64,8 +64,8 @@ class ForkEngine:
         self._patience_s = limits.wall_s + PATIENCE_S
         self._pool: Pool | None = None
         self._pools = 0
-        self._unfit = "" if manifest.stepwise else f"target {manifest.name} is not stepwise"
-        self._seen: dict[_Key, Observed | str] = {}  # or why there is none
+        self._unfit = None if manifest.stepwise else Refused(f"target {manifest.name} is not stepwise")
+        self._seen: dict[_Key, Observed | Refused] = {}  # or why there is none
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
@@ -87,6 +87,24 @@ class ForkEngine:
             self.close()
             return _lost(str(why), folder)
 
+    def refusal(self, job: Job) -> Refused | None:
+        """Why nothing can be forked of the golden run of a job, up to its last step; None if it can."""
+        assert job.golden is not None
+        try:
+            if self._unfit:
+                raise Refused(*self._unfit.args)
+            steps = len(self._observed(job, job.golden).before)
+            swap = plan_swap(self._manifest, self._null, str(self._running().tree))
+            waiting = self._at(job, steps - 1, swap)
+            said, _ = waiting.ask({"do": "load", "modules": []}, self._patience_s)
+            if said["threads"]:
+                raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
+        except Refused as why:
+            return why
+        except Lost as why:
+            return Refused(str(why))
+        return None
+
     def close(self) -> None:
         if self._pool is not None:
             self._pool.close()
@@ -94,7 +112,7 @@ class ForkEngine:
 
     def _execute(self, job: Job, folder: Path) -> Execution:
         if self._unfit:
-            raise Refused(self._unfit)
+            raise Refused(*self._unfit.args)
         if job.mutant is None or job.golden is None or job.hash_seed:
             raise Refused("no experiment")
         swap = plan_swap(self._manifest, job.files, str(self._running().tree))
@@ -114,7 +132,7 @@ class ForkEngine:
             try:
                 self._pool = Pool(self._manifest, self.reference.base, home, self._parent)
             except Refused as why:
-                self._unfit = str(why)
+                self._unfit = why
                 raise
         return self._pool
 
@@ -160,7 +178,7 @@ class ForkEngine:
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
         said, _ = waiting.ask(asked, self._patience_s)
         if said["threads"]:
-            raise Refused(too_many(said["threads"]))
+            raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
         if said["touched"]:
             self.close()
             raise Refused("it writes into its own tree")
@@ -196,7 +214,8 @@ class ForkEngine:
         if report["outside"]:
             raise Refused(f"the target was also imported from {', '.join(report['outside'])}")
         if report["threads"]:
-            raise Refused(f"at its end {too_many(report['threads'])}")
+            others = report["threads"]
+            raise Refused(f"at its end {too_many(others)}", turned_off(others))
         if report["ended"] == "ok" and (problem := job.problem_of(report["probe"])):
             raise Refused(problem)
 
@@ -207,10 +226,10 @@ class ForkEngine:
             try:
                 self._seen[key] = self._watch(job, golden)
             except Refused as why:
-                self._seen[key] = str(why)
+                self._seen[key] = why
         seen = self._seen[key]
-        if isinstance(seen, str):
-            raise Refused(seen)
+        if isinstance(seen, Refused):
+            raise Refused(*seen.args)
         return seen
 
     def _watch(self, job: Job, golden: Path) -> Observed:

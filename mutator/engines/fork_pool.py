@@ -19,7 +19,7 @@ from typing import Any
 from mutator._common.files import remove_folder
 from mutator._common.hashing import digest
 from mutator.engines.processes import end, environment, raised_in
-from mutator.engines.threads import too_many
+from mutator.engines.threads import too_many, turned_off
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
@@ -34,7 +34,15 @@ class Lost(Exception):
 
 
 class Refused(Exception):
-    """This target, or this run of it, cannot be forked; the text says why."""
+    """This target, or this run of it, cannot be forked; the text says why, `remedy` what to do if that is
+    known."""
+
+    def __init__(self, why: str, remedy: str = "") -> None:
+        super().__init__(why, remedy)
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +158,8 @@ class Pool:
         if "failed" in said:
             raise Refused(f"it cannot be loaded: {_why(said['failed'])}")
         if said["threads"]:
-            raise Refused(f"once it is loaded, {too_many(said['threads'])}")
+            others = said["threads"]
+            raise Refused(f"once it is loaded, {too_many(others)}", turned_off(others))
         pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
         loaded = {path: found for path, found in said["files"].items() if path in pristine}
         if loaded != pristine:
@@ -184,7 +193,7 @@ class Pool:
             oldest.close()
         said, handles = source.ask({"do": "branch", "step": step, "args": arguments}, patience_s)
         if said["threads"] or len(handles) != 1:
-            raise Refused(too_many(said["threads"]))
+            raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
         made = Waiting(socket.socket(fileno=handles[0]), self._parent, key)
         made.loaded |= source.loaded
         reply, _ = made.reply(patience_s)

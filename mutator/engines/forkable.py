@@ -1,8 +1,11 @@
-"""Which faults a forking engine can run: their mutants' code can be put into a loaded program."""
+"""What a forking engine can run: targets that it can load, faults whose code can be put into a loaded
+program."""
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from mutator.engines.code_swap import NotSwappable, plan_swap
+from mutator.engines.fork_pool import Lost, Pool, Refused
 from mutator.engines.registry import not_forkable
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -10,6 +13,20 @@ from mutator.model import Fault
 from mutator.mutants.building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
+
+
+def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
+    """Why the target cannot be forked once it is loaded, which is tried; None if it can.
+
+    `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
+    """
+    if why := not_forkable(manifest):
+        return Refused(why)
+    try:
+        Pool(manifest, base, home, None).close()
+    except (Refused, Lost) as found:
+        return found if isinstance(found, Refused) else Refused(str(found))
+    return None
 
 
 def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:

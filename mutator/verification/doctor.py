@@ -9,8 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,8 @@ from packaging.requirements import Requirement
 
 from mutator.errors import MutatorError
 from mutator.targets.requirements import MISSING, check_requirements, shortcoming
+from mutator.verification.fast_engines import loading
+from mutator.verification.findings import Finding, Level
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -27,26 +28,9 @@ LITTLE_DISK = 200e6  # bytes: about a hundred experiments with traces
 LITTLE_MEMORY = 1e9  # bytes: two controllers with their solvers, and the runner
 
 
-class Level(StrEnum):
-    """How a finding bears on campaigns."""
-
-    OK = "ok"
-    WARN = "warning"
-    FAIL = "failed"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """One thing looked at: what was found, and what to do if it is not well."""
-
-    name: str
-    level: Level
-    found: str
-    remedy: str = ""
-
-
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
-    """Look at interpreter, packages, machine, the folder here, child processes, library and target.
+    """Look at interpreter, packages, machine, the folder here, child processes, library and target, which is
+    loaded to see whether it can be forked.
 
     `workspace` may be the error that finding one gave: that is a finding too.
     """
@@ -148,5 +132,6 @@ def _library(workspace: "Workspace") -> Iterator[Finding]:
             overlay = f" and {manifest.overlay}" if manifest.overlay else ""
             found = f"{manifest.root}{overlay}: {len(manifest.tree.files)} files"
             yield Finding(name=f"target {name}", level=Level.OK, found=found)
+            yield replace(loading(manifest), name=f"fast engines, {name}")
         except MutatorError as e:
             yield Finding(name=f"target {name}", level=Level.FAIL, found=str(e), remedy=e.remedy or "")

@@ -73,6 +73,7 @@ def run(job: dict[str, Any]) -> None:
             note_activation(probe, job["inactive"])
         if watcher and probe:
             seen = beside("swap").keep_observations(probe, *job["watch"])
+            watcher.look_for_threads(probe, seen)
         run_module(job["module"], job["args"])
     except BaseException as err:
         report |= describe(err, job["tree"], job["probe"])

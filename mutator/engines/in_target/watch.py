@@ -41,6 +41,7 @@ class Watcher:
     def __init__(self, tree: str) -> None:
         self._tree = tree + os.sep
         self.noted: dict[tuple[str, int], dict[str, Any]] = {}
+        self._threads: set[str] = set()
         self._seeded: set[int] = set()  # ids of shared generators that were given a seed
 
     def begin(self) -> None:
@@ -83,9 +84,21 @@ class Watcher:
         told = {"kind": kind, "file": place[0], "line": place[1], "function": frame.f_code.co_qualname}
         self.noted.setdefault(place, told | {"what": what, "via": via})
 
+    def look_for_threads(self, probe: Any, seen: list[Any]) -> None:
+        """Look at observations 1, 2, 4, 8 and so on, which are those in `seen`, for threads."""
+        observe = probe.observe
+
+        def observe_and_look(**values: Any) -> None:
+            observe(**values)
+            if not len(seen) & (len(seen) - 1):
+                self._threads.update(threads.others())
+
+        probe.observe = observe_and_look
+
     def found(self) -> dict[str, Any]:
         """What was noted, in the order in which it came first, and the threads beside the main one."""
-        return {"noted": list(self.noted.values()), "threads": threads.others()}
+        names = sorted(self._threads.union(threads.others()))
+        return {"noted": list(self.noted.values()), "threads": names}
 
     def _watch(
         self,

@@ -1,0 +1,54 @@
+"""Where two runs that should be one first differ."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from mutator._common.files import no_pipe
+from mutator._common.text import shown
+from mutator.outcomes import golden
+from mutator.outcomes.golden import BadOutput
+from mutator.targets.manifest import TargetManifest
+
+
+def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
+    """Channel, step, time and both values, where the traces in two output folders differ first; else what of
+    the files differs; empty if nothing does."""
+    for name in manifest.outputs:
+        if no_pipe(one / name).read_bytes() != no_pipe(other / name).read_bytes():
+            in_trace = name == manifest.trace_file
+            found = _in_traces(manifest, one, other) if in_trace else _in_records(one, other, name)
+            return found or f"in bytes of {name} that are no value of a channel: a time stamp, say"
+    return ""
+
+
+def _in_traces(manifest: TargetManifest, one: Path, other: Path) -> str:
+    try:
+        first, second = (golden.load_trace(manifest, out, manifest.channels) for out in (one, other))
+    except BadOutput as error:
+        return f"in a trace that cannot be compared ({error.got})"
+    time = manifest.time_channel
+    steps = [len(trace[time]) for trace in (first, second)]
+    least: tuple[float, int, str] | None = None
+    for name in (time, *(channel.name for channel in manifest.channels)):
+        rows = min(len(first[name]), len(second[name]))
+        a, b = first[name][:rows], second[name][:rows]
+        unlike = np.flatnonzero((a != b) & ((a == a) | (b == b)))  # NaN is like NaN
+        if unlike.size:
+            step = int(unlike[0])
+            t = float(golden.times_of(first, name, time)[step])
+            least = (t, step, name) if least is None or t < least[0] else least
+    if least is None:
+        return "" if steps[0] == steps[1] else f"in their length: {steps[0]} and {steps[1]} steps"
+    t, step, name = least
+    values = [repr(trace[name][step].item()) for trace in (first, second)]
+    return f"in channel {name} at step {step} ({t:g} s): {' and '.join(values)}"
+
+
+def _in_records(one: Path, other: Path, name: str) -> str:
+    first, second = (json.loads(no_pipe(out / name).read_bytes()) for out in (one, other))
+    for key in dict.fromkeys((*first, *second)):
+        if first.get(key) != second.get(key):
+            return f"in {name}, '{key}': {shown(first.get(key))} and {shown(second.get(key))}"
+    return ""

@@ -1,0 +1,65 @@
+"""Draws that nothing uses: faults that differ in name only, and parameters that change nothing."""
+
+from collections.abc import Iterator
+
+from jinja2 import TemplateError
+from jinja2.meta import find_undeclared_variables
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+from mutator.faults.fault_models import NAMES, FaultModels
+from mutator.faults.injections import Drawn, InjectionSpec, reference
+from mutator.faults.specs import FaultSpec
+from mutator.verification.findings import Finding, Level, Place
+
+_NAME = "draws"
+
+
+def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
+    """What is drawn, or given to a fault model, and used by nothing."""
+    places = [*_of_specs(specs, models), *_of_models(models)]
+    if not places:
+        return Finding(name=_NAME, level=Level.OK, found="all that is drawn is used")
+    return Finding(
+        name=_NAME,
+        level=Level.WARN,
+        found=f"{len(places)} that nothing uses",
+        remedy="use it in a parameter (`by_m: NAME`), or leave it out: its faults are all the same",
+        places=tuple(places),
+    )
+
+
+def _of_specs(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[Place]:
+    for spec in specs:
+        for variant in spec:
+            draw = variant.draw
+            for reading, injections in variant.readings.items():
+                if draw and not any(_uses(one, draw.name, models) for one in injections):
+                    what = (
+                        f"'{draw.name}' of {spec.name}/{variant.name} is drawn, and {reading} does not use it"
+                    )
+                    yield Place(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
+
+
+def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
+    model = models.get(injection.model)
+    for param in injection.params:
+        schema = model.param(param.name)
+        drawn = param.value if isinstance(param.value, Drawn) else reference(str(param.value))
+        if schema and schema.type not in NAMES and drawn and drawn.name == name:
+            return True
+    return False
+
+
+def _of_models(models: FaultModels) -> Iterator[Place]:
+    """Parameters that a model takes and its template does not mention."""
+    environment = ImmutableSandboxedEnvironment()
+    for model in models:
+        try:
+            used = find_undeclared_variables(environment.parse(model.template))
+        except TemplateError:  # told when it is rendered
+            continue
+        for param in model.params:
+            if param.name not in used:
+                what = f"parameter '{param.name}' of model {model.name}: its template does not use it"
+                line = model.source.line(("params", param.name))
+                yield Place(file=str(model.source.path), line=line, what=what)

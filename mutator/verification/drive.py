@@ -1,0 +1,279 @@
+"""What driving a target tells before a campaign: `mutator check --drive`.
+
+Each scenario is driven twice without a fault, with two hash seeds. The second time a probe counts at every
+statement that faults are put at, and calls that keep a target from being deterministic are noted. Where the
+two differ, a third run, without all that, shows what made the difference.
+"""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import ScratchFolder
+from mutator.campaigns.campaign_files import Campaign, load_campaign
+from mutator.campaigns.experiments import Expansion
+from mutator.engines.fork import ForkEngine
+from mutator.engines.fork_pool import Refused
+from mutator.engines.in_target.watch import CLOCK, THREAD
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.registry import not_forkable
+from mutator.engines.threads import too_many, turned_off
+from mutator.model import Experiment, Limits
+from mutator.mutants.building import build
+from mutator.mutants.probe import is_probe, tag_of
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import always
+from mutator.verification import canary, causes, fast_engines
+from mutator.verification.difference import first_difference
+from mutator.verification.findings import Finding, Level
+from mutator.verification.preflight_rules import CheckRun, judge_golden, judge_null, look
+from mutator.verification.reach import Reach
+from mutator.workspace import Workspace
+
+_OTHER_HASH_SEED = 4242
+_BRIEF_S = 5.0  # a golden run that takes longer is not driven once more for the fast engines
+_MOST = 20  # places that a finding lists
+
+
+def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
+    """What golden runs of the scenarios tell; default: those of the library's campaigns, or all it has.
+
+    Whether the target is deterministic, and why it likely is not; what keeps it from being forked; statements
+    of faults that are never executed; triggers that never hold; canaries that do no harm. MutatorError for an
+    unknown scenario and for a mistake in the library, which `check_library` tells in full.
+    """
+    with ScratchFolder("mutator-drive-") as scratch:
+        return _Drive(workspace, target, scenarios, scratch).findings()
+
+
+@dataclass(frozen=True)
+class _Golden:
+    """What came of the runs of a scenario: the pristine target's, the counting mutant's with another hash
+    seed, and the pristine target's with that one, too (the counting one's, where that need not be asked)."""
+
+    first: Execution
+    watched: Execution
+    again: Execution
+
+
+class _Drive:
+    """The runs of one check, in a scratch folder."""
+
+    def __init__(self, workspace: Workspace, target: str, scenarios: Sequence[str], scratch: Path) -> None:
+        self.workspace = workspace
+        self.manifest: TargetManifest = workspace.manifest(target)
+        loaded = [load_campaign(workspace.campaign(name)) for name in workspace.campaigns]
+        mine = [campaign for campaign in loaded if campaign.target == self.manifest.name]
+        used = dict.fromkeys(name for campaign in mine for name in campaign.scenarios)
+        self.scenarios = list(dict.fromkeys(scenarios)) or list(used) or list(workspace.scenarios)
+        for name in self.scenarios:
+            workspace.scenario(name)
+        self.campaigns = [one for one in mine if set(one.scenarios) & set(self.scenarios)]
+        self.reach = Reach(workspace, self.manifest, self.campaigns)
+        settings = [_setting(workspace, campaign) for campaign in self.campaigns] or [()]
+        self.setting = () if () in settings else settings[0]
+        self.settings = list(dict.fromkeys(settings))
+        limits = self.campaigns[0].limits if self.campaigns else Limits()
+        self.seed = self.campaigns[0].seed if self.campaigns else 0
+        self._scratch = scratch
+        base = prepare_base(self.manifest, scratch / "base")
+        work = scratch / "work"
+        work.mkdir()
+        self.engine = ReferenceEngine(self.manifest, base, work, limits)
+
+    def findings(self) -> list[Finding]:
+        """Everything, in the order in which it is worth reading."""
+        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+            jobs = [job for name in self.scenarios for job in self._jobs(name)]
+            runs = dict(zip((job.name for job in jobs), pool.map(self._run, jobs), strict=True))
+            canaries = pool.map(self._canary, self._canaries())
+            goldens = {name: self._golden(name, runs) for name in self.scenarios}
+            found = [self._determinism(name, golden) for name, golden in goldens.items()]
+            found += self._clocks(goldens) if all(one.level is Level.OK for one in found) else []
+            found.append(self._forking(goldens))
+            for name, golden in goldens.items():
+                self._take(name, self.setting, golden.watched)
+            self._reach_more()
+            return [*found, *self.reach.findings(), *canaries]
+
+    # Runs
+
+    def _jobs(self, scenario: str) -> Iterator[Job]:
+        yield self._job("first", scenario, self.setting)
+        yield self._counting(scenario, self.setting)
+
+    def _golden(self, scenario: str, runs: Mapping[str, Execution]) -> _Golden:
+        """The runs of a scenario; the third is driven where the first two differ."""
+        first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
+        one, other = self._look(first), self._look(watched)
+        if one.problem or (one.digest == other.digest and not other.problem):
+            return _Golden(first, watched, watched)
+        again = replace(self._job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
+        return _Golden(first, watched, self._run(again))
+
+    def _job(self, kind: str, scenario: str, changes: tuple[str, ...]) -> Job:
+        file = self.workspace.scenario(scenario)
+        return Job(name=f"{kind}-{scenario}", scenario=file, seed=self.seed, changes=changes)
+
+    def _counting(self, scenario: str, changes: tuple[str, ...]) -> Job:
+        mutant = self.reach.counting
+        return replace(
+            self._job("counting", scenario, changes),
+            files=mutant.files,
+            mutant=mutant.id,
+            injections=mutant.injections,
+            hash_seed=_OTHER_HASH_SEED,
+            watch=True,
+        )
+
+    def _run(self, job: Job) -> Execution:
+        folder = self.engine.work / f"{job.name}-{'-'.join(job.changes)}"
+        return self.engine.execute(job, folder)
+
+    def _look(self, execution: Execution) -> CheckRun:
+        return look(self.manifest, execution)
+
+    # Determinism
+
+    def _determinism(self, scenario: str, golden: _Golden) -> Finding:
+        """The runs are the same bytes and reach no hazard."""
+        name = f"golden {scenario}"
+        first, watched, again = (self._look(one) for one in (golden.first, golden.watched, golden.again))
+        problem = judge_golden(first, again)
+        if not problem and not (problem := judge_null(first, watched)):
+            found = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
+            return Finding(name=name, level=Level.OK, found=found)
+        if first.problem or again.problem or watched.problem or first.digest == again.digest:
+            remedy = "mend the target, the scenario or the manifest: no campaign starts"
+            return Finding(name=name, level=Level.FAIL, found=problem, remedy=remedy)
+        return self._not_deterministic(name, golden, by_hash=again.digest == watched.digest)
+
+    def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
+        """Where the runs first differ, and what is likely to blame."""
+        where = first_difference(self.manifest, golden.first.out, golden.again.out)
+        places, remedy = causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
+        which = "with two hash seeds, and not with one, they" if by_hash else "they"
+        likely = f"; likely {'cause' if len(places) == 1 else 'causes'}:" if places else ""
+        return Finding(
+            name=name,
+            level=Level.FAIL,
+            found=f"two runs are not the same: {which} first differ {where}{likely}",
+            places=tuple(places),
+            remedy=remedy,
+        )
+
+    def _noted(self, golden: _Golden) -> dict[str, Any]:
+        """What the watched run noted, with the lines of the target's own files."""
+        files = self.reach.counting.files
+        noted = [
+            one
+            | {"line": _own_line(files[one["file"]], one["line"]) if one["file"] in files else one["line"]}
+            for one in golden.watched.watched.get("noted", ())
+            if not is_probe(one["file"])
+        ]
+        return {**golden.watched.watched, "noted": noted}
+
+    def _clocks(self, goldens: Mapping[str, _Golden]) -> list[Finding]:
+        """A deterministic target may read clocks: that is no more than a note."""
+        noted = [place for golden in goldens.values() for place in causes.of_kind(self._noted(golden), CLOCK)]
+        if not noted:
+            return []
+        found = "are read, and nothing in trace or record shows it"
+        return [
+            Finding(name="clocks", level=Level.OK, found=found, places=tuple(dict.fromkeys(noted))[:_MOST])
+        ]
+
+    # Fast engines
+
+    def _forking(self, goldens: Mapping[str, _Golden]) -> Finding:
+        """Whether a golden run can be forked at its steps: tried with a brief one; with a long one only its
+        threads are looked at."""
+        scenario, golden = next(iter(goldens.items()))
+        noted = [self._noted(one) for one in goldens.values()]
+        refusal = self._refusal(scenario, golden)
+        places = dict.fromkeys(place for one in noted for place in causes.of_kind(one, THREAD))
+        told = fast_engines.finding(refusal)
+        return replace(told, places=tuple(places)) if refusal and "thread" in str(refusal) else told
+
+    def _refusal(self, scenario: str, golden: _Golden) -> Refused | None:
+        if why := not_forkable(self.manifest):
+            return Refused(why, f"name one in {self.manifest.path.name}")
+        if self._look(golden.first).problem or golden.first.wall_s > _BRIEF_S:
+            others = golden.watched.watched.get("threads", [])
+            return Refused(too_many(others), turned_off(others)) if others else None
+        null = build(self.manifest, self.workspace.fault_models(), None, always()).files
+        work = self._scratch / "fork"
+        work.mkdir()
+        fork = ForkEngine(self.manifest, self.engine.base, work, self.engine.limits, null=null)
+        try:
+            return fork.refusal(replace(self._job("f", scenario, self.setting), golden=golden.first.out))
+        finally:
+            fork.close()
+
+    # Statements and triggers
+
+    def _take(self, scenario: str, changes: tuple[str, ...], execution: Execution) -> None:
+        self.reach.take(scenario, changes, execution.probe, execution.watched.get("seen", ()))
+
+    def _reach_more(self) -> None:
+        """Drive with the changes that faults and campaigns make, as long as there is something to come to."""
+        own = list(dict.fromkeys(one.changes for one in self.reach.unexecuted if one.changes))
+        for changes in own:
+            for scenario in self.scenarios:
+                if any(one.changes == changes for one in self.reach.unexecuted):
+                    self._drive_on(scenario, (*changes, *self.setting))
+        for setting in self.settings:
+            left = [one.changes for one in self.reach.unexecuted] + [()] * bool(self.reach.untriggered)
+            for changes in dict.fromkeys(left):
+                if setting != self.setting:
+                    self._drive_on(self.scenarios[0], (*changes, *setting))
+
+    def _drive_on(self, scenario: str, changes: tuple[str, ...]) -> None:
+        changes = tuple(dict.fromkeys(changes))
+        self._take(scenario, changes, self._run(self._counting(scenario, changes)))
+
+    # Canaries
+
+    def _canaries(self) -> list[tuple[str, Experiment, str]]:
+        """Campaign, canary and hazard; canaries that differ in their setting only are tried once."""
+        found: dict[object, tuple[str, Experiment, str]] = {}
+        for campaign in sorted(self.campaigns, key=lambda one: len(_setting(self.workspace, one))):
+            reading = _reading(self.workspace, campaign)
+            if campaign.canary not in found and campaign.canary.scenario in self.scenarios:
+                made = Expansion(self.workspace, campaign, self.manifest, campaign.seed, reading).canary()
+                found[campaign.canary] = (campaign.name, made, campaign.canary.hazard)
+        return list(found.values())
+
+    def _canary(self, one: tuple[str, Experiment, str]) -> Finding:
+        campaign, experiment, hazard = one
+
+        def run(tried: Experiment) -> CheckRun:
+            return self._look(self._run(canary.job(self.workspace, self.manifest, tried)))
+
+        problem, found = canary.judge(canary.tries(self.workspace, self.manifest, experiment), run, hazard)
+        return Finding(
+            name=f"canary {campaign}",
+            level=Level.FAIL if problem else Level.OK,
+            found=f"{experiment.fault.spec} in {experiment.scenario} {problem or found}",
+            remedy="choose another fault, an earlier time or another scenario for `canary`"
+            if problem
+            else "",
+        )
+
+
+def _reading(workspace: Workspace, campaign: Campaign) -> str:
+    return campaign.reading or workspace.readings().default
+
+
+def _setting(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
+    """The changes that all runs of a campaign are made with."""
+    return campaign.setting_in(_reading(workspace, campaign))
+
+
+def _own_line(data: bytes, line: int) -> int:
+    """The line of the target's own file that is this one of a mutant's."""
+    return line - sum(tag_of(one) is not None for one in data.splitlines()[: line - 1])

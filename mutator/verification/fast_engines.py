@@ -1,0 +1,62 @@
+"""What keeps a target or its faults from the engines that fork, said before a campaign."""
+
+from mutator._common.files import ScratchFolder
+from mutator._common.text import counted
+from mutator.engines.fork_pool import Refused
+from mutator.engines.forkable import not_forked, not_loadable
+from mutator.engines.reference import prepare_base
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.targets.manifest import TargetManifest
+from mutator.verification.findings import Finding, Level
+from mutator.workspace import Workspace
+
+NAME = "fast engines"
+_WITHOUT = "campaigns run all the same, on the reference engine"
+_LISTED = 3  # reasons
+
+
+def loading(manifest: TargetManifest) -> Finding:
+    """Whether the target can be forked once it is loaded, which is tried: its modules are imported."""
+    with ScratchFolder("mutator-check-") as scratch:
+        base = prepare_base(manifest, scratch / "base")
+        return finding(not_loadable(manifest, base, scratch / "server"))
+
+
+def finding(refusal: Refused | None) -> Finding:
+    """What is told of a target that cannot be forked, or of one that can (None)."""
+    if refusal is None:
+        return Finding(name=NAME, level=Level.OK, found="runs can be forked")
+    return Finding(
+        name=NAME,
+        level=Level.WARN,
+        found=f"nothing can be forked: {refusal}",
+        remedy=f"{refusal.remedy or 'see docs/explanation/performance.md, which engine runs'}; {_WITHOUT}",
+    )
+
+
+def variants(workspace: Workspace, manifest: TargetManifest) -> Finding:
+    """Which variants' mutants cannot be put into a loaded program."""
+    models = workspace.fault_models()
+    faults = [f for spec in workspace.specs() for f in expand(spec, 0, models=models, manifest=manifest)]
+    count = len({fault.spec for fault in faults})
+    reasons: dict[str, list[str]] = {}
+    try:
+        for name, why in not_forked(manifest, models, faults).items():
+            reasons.setdefault(why, []).append(name)
+    except MutatorError as error:
+        return Finding(name="faults for fast engines", level=Level.WARN, found=str(error))
+    if not reasons:
+        found = f"{counted(count, 'variant')} can be forked"
+        return Finding(name="faults for fast engines", level=Level.OK, found=found)
+    told = "; ".join(
+        f"{', '.join(names[:_LISTED])}{' and more' if len(names) > _LISTED else ''}: {why}"
+        for why, names in list(reasons.items())[:_LISTED]
+    )
+    left = sum(map(len, reasons.values()))
+    return Finding(
+        name="faults for fast engines",
+        level=Level.WARN,
+        found=f"{left} of {counted(count, 'variant')} are left to the reference engine: {told}",
+        remedy=_WITHOUT,
+    )

@@ -1,0 +1,36 @@
+"""Findings: what checks of a machine, a library or a target have to tell, good or bad."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Level(StrEnum):
+    """How a finding bears on campaigns."""
+
+    OK = "ok"
+    WARN = "warning"
+    FAIL = "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A line that a finding is about, and what is there; `file` may be relative to the target's root."""
+
+    file: str
+    line: int | None
+    what: str
+
+    def __str__(self) -> str:
+        """`pkg/driver.py:12 in Driver.drive: time.monotonic() reads the clock`."""
+        return f"{self.file}{'' if self.line is None else f':{self.line}'} {self.what}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing looked at: what was found and where, and what to do if it is not well."""
+
+    name: str
+    level: Level
+    found: str
+    remedy: str = ""
+    places: tuple[Place, ...] = ()

@@ -1,0 +1,229 @@
+"""What driving a target tells: controllers that misbehave, each in its own way, are told so with the line."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.verification import drive
+from mutator.verification.drive import check_drive
+from mutator.verification.findings import Finding, Level
+from mutator.workspace import Workspace
+
+SCENARIO = ["A"]
+
+
+@pytest.fixture
+def toy(toycar: Workspace) -> Workspace:
+    """The toy without what is broken on purpose."""
+    for path in [*(toycar.library / "faults" / "hostile").iterdir(), toycar.campaign("hostile")]:
+        path.unlink()
+    return toycar
+
+
+def change(toy: Workspace, file: str, old: str, new: str) -> None:
+    """Edit a file of the toy's tree or library."""
+    root = toy.library.parent
+    path = root / file if file.endswith(".yaml") else root / "tree" / "toycar" / file
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+
+
+def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
+    """The line of the toy's file that has this text."""
+    lines = (toy.library.parent / "tree" / "toycar" / file).read_text().splitlines()
+    (number,) = (n for n, line in enumerate(lines, 1) if text in line)
+    return number
+
+
+def driven(toy: Workspace) -> dict[str, Finding]:
+    """Findings by name."""
+    return {finding.name: finding for finding in check_drive(toy, "toycar", SCENARIO)}
+
+
+def test_a_sound_target_has_nothing_to_tell(toy: Workspace) -> None:
+    """Everything is looked at and all is well; each campaign's canary once."""
+    found = driven(toy)
+    assert {name: one.level for name, one in found.items()} == dict.fromkeys(
+        ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
+    )
+
+
+CLOCK = (
+    "        return gas, brake, wheel",
+    "        gas += time.monotonic() * 1e-9\n        return gas, brake, wheel",
+)
+DRAW = ("        self.warned = []", "        self.warned = []\n        self.noise = np.random.default_rng()")
+NOISE = ("        return gas, brake", "        gas += self.noise.random() * 1e-9\n        return gas, brake")
+SETS = (
+    "        return gas, brake, wheel",
+    "        parts = {'ab': 0.1, 'cd': 0.2, 'ef': 0.3, 'gh': 1e16, 'ij': -1e16}\n"
+    "        for name in {'ab', 'cd', 'ef', 'gh', 'ij'}:\n"
+    "            gas += parts[name]\n        return gas, brake, wheel",
+)
+
+
+@pytest.mark.parametrize(
+    ("edits", "imports", "line", "told"),
+    [
+        ([CLOCK], "import time", "time.monotonic()", "in Driver.drive: time.monotonic() reads the clock"),
+        (
+            [DRAW, NOISE],
+            "import numpy as np",
+            "default_rng()",
+            "in Driver.__init__: a generator of numpy.random",
+        ),
+        ([SETS], "", "for name in", "in Driver.drive: goes through a set in its order"),
+    ],
+    ids=["clock", "unseeded generator", "set order"],
+)
+def test_what_is_not_deterministic_is_told_with_its_line(
+    toy: Workspace, edits: list[tuple[str, str]], imports: str, line: str, told: str
+) -> None:
+    """The runs differ: channel, step, time and both values are told, and the line that is likely to blame."""
+    for old, new in edits:
+        change(toy, "driver.py", old, new)
+    change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
+    found = driven(toy)["golden A"]
+    assert found.level is Level.FAIL
+    assert "first differ in channel gas at step 0 (0 s): " in found.found
+    assert ("with two hash seeds, and not with one" in found.found) == ("set" in told)
+    (place,) = found.places
+    assert str(place).startswith(f"toycar/driver.py:{line_of(toy, line)} {told}")
+    assert found.remedy
+
+
+@pytest.mark.parametrize("long", [False, True], ids=["brief", "long"])
+def test_a_thread_pool_is_told_with_its_line(
+    toy: Workspace, long: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Results in order from a pool are deterministic, but its threads prevent forking: name, line, remedy;
+    also where a run takes too long to try it."""
+    change(
+        toy,
+        "driver.py",
+        "class Driver",
+        "from concurrent.futures import ThreadPoolExecutor\n\n\nclass Driver",
+    )
+    change(
+        toy, "driver.py", "self.warned = []", "self.warned = []\n        self.pool = ThreadPoolExecutor(2)"
+    )
+    change(
+        toy,
+        "driver.py",
+        "        return gas, brake, wheel",
+        "        wheel = self.pool.submit(float, wheel).result()\n        return gas, brake, wheel",
+    )
+    if long:
+        monkeypatch.setattr(drive, "_BRIEF_S", 0.0)
+    found = driven(toy)
+    assert found["golden A"].level is Level.OK
+    fast = found["fast engines"]
+    assert fast.level is Level.WARN
+    assert fast.found.startswith("nothing can be forked: it has 2 threads, and only one can be forked")
+    assert "'ThreadPoolExecutor-0_0'" in fast.found
+    (place,) = fast.places
+    line = line_of(toy, "self.pool.submit")
+    assert str(place).startswith(f"toycar/driver.py:{line} in Driver.drive: starts the thread 'ThreadPool")
+    assert "do that work in the step itself" in fast.remedy
+
+
+def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> None:
+    """Reading a clock is no failure where trace and record are the same."""
+    change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
+    change(
+        toy,
+        "driver.py",
+        "        return gas, brake",
+        "        time.perf_counter()\n        return gas, brake",
+    )
+    found = driven(toy)
+    assert found["golden A"].level is found["clocks"].level is Level.OK
+    assert [place.line for place in found["clocks"].places] == [line_of(toy, "time.perf_counter()")]
+
+
+def test_lines_are_those_of_the_target(toy: Workspace) -> None:
+    """Lines that the counting adds to a file shift what is noted in it; it is told as the target has it."""
+    change(toy, "sensing.py", "class Sensor", "import time\n\n\nclass Sensor")
+    change(
+        toy,
+        "sensing.py",
+        "self.reading = reading",
+        "self.reading = (reading[0] + time.time() * 1e-9, *reading[1:])",
+    )
+    (place,) = driven(toy)["golden A"].places
+    assert (place.file, place.line) == ("toycar/sensing.py", line_of(toy, "time.time()", "sensing.py"))
+
+
+def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
+    """An anchor in a branch that no run comes to is told with the line of its spec; the others are not."""
+    change(
+        toy,
+        "sensing.py",
+        "        offset = world.offset\n",
+        "        offset = world.offset\n        if gap < 0:\n            offset = 0.0\n",
+    )
+    spec = "fault_library/faults/sensor/lane.yaml"
+    change(toy, spec, "after_assign: offset}", "after_assign: offset, nth: 2}")
+    found = driven(toy)["statements"]
+    assert (found.level, found.found) == (
+        Level.WARN,
+        "1 of 4 statements never reached in A, A+alone",
+    )
+    (place,) = found.places
+    path = toy.library.parent / spec
+    number = next(n for n, text in enumerate(path.read_text().splitlines(), 1) if "at: {" in text)
+    assert (place.file, place.line) == (str(path), number)
+    assert place.what == "sensor/lane/shifted: toycar/sensing.py, Sensor.sense, after_assign offset"
+
+
+def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> None:
+    """A statement that runs come to, but not with the change that the fault brings along, is told."""
+    change(
+        toy,
+        "sensing.py",
+        "        gap = world.gap\n",
+        "        gap = 500.0\n        if world.gap < 100.0:\n            gap = world.gap\n",
+    )
+    for kind in ("distance",):
+        path = toy.library / "faults" / "sensor" / f"{kind}.yaml"
+        path.write_text(path.read_text().replace("after_assign: gap}", "after_assign: gap, nth: 2}"))
+    found = driven(toy)["statements"]
+    assert [place.what.partition(":")[0] for place in found.places] == ["sensor/distance/nearer"]
+
+
+def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:
+    """A context that never comes is told with its line, and a random time after the end of every run."""
+    change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
+    change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
+    found = driven(toy)["triggers"]
+    assert found.level is Level.WARN
+    assert found.found.endswith("never reached in A, A+alone")
+    whats = {Path(place.file).name: place.what for place in found.places}
+    assert whats == {
+        "small.yaml": "small: random times until 9 s",
+        "near_far.yaml": "near_far, near: hwt <= 0.01, from 0 s on",
+    }
+
+
+def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> None:
+    """Each value of the canary is tried, and named."""
+    change(toy, "fault_library/campaigns/small.yaml", "at_s: 1.0", "at_s: 5.9")
+    toy.campaign("toy").unlink()
+    found = driven(toy)["canary small"]
+    assert found.level is Level.FAIL
+    assert "sensor/lane/shifted in A did not reach H3 with any of its values: 2." in found.found
+    assert found.found.count(" m") == 4
+
+
+def test_a_target_that_crashes_or_is_harmful_is_told(toy: Workspace) -> None:
+    """What keeps a golden run from being one is told as the checks before a campaign would."""
+    change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
+    found = driven(toy)["golden A"]
+    assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
+
+
+def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:
+    """A scenario that the library does not have is a mistake of the caller's."""
+    with pytest.raises(MutatorError, match="nowhere"):
+        check_drive(toy, "toycar", ["nowhere"])
