@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mutator.api.libraries import (
         check_hazard_analysis,
         check_library,
+        check_target,
         doctor,
         draw_control_structure,
         init_library,
@@ -50,6 +51,7 @@ _HOMES = {
     "mutator.api.libraries": (
         "check_hazard_analysis",
         "check_library",
+        "check_target",
         "doctor",
         "draw_control_structure",
         "init_library",
@@ -106,6 +108,7 @@ __all__ = [
     "cache_folder",
     "check_hazard_analysis",
     "check_library",
+    "check_target",
     "clear_caches",
     "compare",
     "doctor",

@@ -1,5 +1,6 @@
 """A library made, checked and analysed, and the machine that is to use it."""
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -12,8 +13,10 @@ from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
 from mutator.targets import manifest_files
 from mutator.targets.upgrade import Upgrade
-from mutator.verification import library
+from mutator.verification import fast_engines, library
 from mutator.verification.doctor import examine
+from mutator.verification.draws import unused_draws
+from mutator.verification.drive import check_drive
 from mutator.verification.findings import Finding
 from mutator.workspace import Workspace
 
@@ -48,6 +51,29 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
     return library.check_library(found, found.target_name(target))
 
 
+def check_target(
+    workspace: WorkspaceLike = None,
+    *,
+    target: str | None = None,
+    drive: bool = False,
+    scenarios: Sequence[str] = (),
+) -> list[Finding]:
+    """What a target and its faults have to tell before a campaign: what keeps them from being forked, and
+    draws that nothing uses.
+
+    With `drive` golden runs are driven, of these `scenarios` (default: those of the library's campaigns, or
+    all), which tell whether the target is deterministic and the likely cause if it is not, statements of
+    faults and triggers that no run comes to, and canaries that do no harm. `target` names a manifest;
+    default: the library's only one. MutatorError for a library with problems, which `check_library` lists.
+    """
+    found = open_workspace(workspace)
+    name = found.target_name(target)
+    manifest = found.manifest(name)
+    driven = check_drive(found, name, scenarios) if drive else [fast_engines.loading(manifest)]
+    unused = unused_draws(found.specs(), found.fault_models())
+    return [*driven, fast_engines.variants(found, manifest), unused]
+
+
 def check_hazard_analysis(
     workspace: WorkspaceLike = None, *, target: str | None = None
 ) -> list[MutatorError]:
@@ -69,8 +95,8 @@ def draw_control_structure(workspace: WorkspaceLike = None) -> str:
 def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = None) -> list[Finding]:
     """Can this machine run campaigns? Looks at interpreter, packages, machine, library and target.
 
-    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found` and `remedy`. That no library is
-    found is one of them; `workspace` may be the error that looking for it gave.
+    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found`, `places` and `remedy`. That no
+    library is found is one of them; `workspace` may be the error that looking for it gave.
     """
     if isinstance(workspace, MutatorError):
         return examine(workspace)

@@ -130,7 +130,8 @@ class _CanaryModel(StrictModel, title="The canary"):
     """A fault known to be harmful. It must reach its hazard, or the campaign does not start."""
 
     spec: str = Field(
-        description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken."
+        description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken, "
+        "then the others until one does harm."
     )
     scenario: str = Field(description="The scenario.")
     hazard: str = Field(description="The hazard that must come.")

@@ -54,7 +54,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "init", "stpa", "check", "doctor", "cache")),
+    ("Look around", ("list", "init", "upgrade", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),

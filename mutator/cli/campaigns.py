@@ -209,10 +209,8 @@ def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") ->
         f"{summary.done} of {summary.planned} experiments done, "
         f"{summary.ran} now in {duration(summary.elapsed_s)}"
     )
-    if summary.proof:
-        terminal.say(f"proof: {summary.proof}")
-    if summary.no_proof:
-        terminal.say(summary.no_proof)
+    if summary.proof_note:
+        terminal.say(f"proof: {summary.proof_note}")
     if written:
         terminal.say(f"report: {report[0]} and {report[1]}")
     if summary.seal:

@@ -1,6 +1,7 @@
 """`list`, `check`, `doctor`: what the library holds, whether it can be used, and whether this machine can."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
+    from mutator.verification.findings import Finding
     from mutator.workspace import Workspace
 
 
@@ -135,37 +137,75 @@ LISTS: dict[Kind, Callable[["Workspace"], Table]] = {
 CHECK_EXAMPLES = """\b
 Examples:
   mutator check                             library and templates against the target
+  mutator check --drive                     and what golden runs tell
+  mutator check --drive --scenario S1       of this scenario alone
   mutator --target ~/openpilot check        the same library against another tree
 """
+LEVEL_STYLES = {"ok": "green", "warning": "yellow", "failed": "red"}
 
 
 @with_place
 def check(
     manifest: Manifest = None,
+    drive: Annotated[
+        bool,
+        typer.Option(
+            "--drive", help="Drive golden runs, too: is the target deterministic, what do they come to?"
+        ),
+    ] = False,
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(help="Drive this scenario, again for more; default: those of the campaigns."),
+    ] = None,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
     """Check library, templates and anchors against the target.
 
-    Exit code 1 if anything is wrong; each problem is shown with its file and line.
+    Each problem is shown with its file and line. Without any, what keeps the target or its faults from the
+    engines that fork is told, and draws that nothing uses. Exit code 1 for a problem, and for a golden run or
+    canary that would keep a campaign from starting.
     """
     terminal = Terminal(as_json)
+    if scenario and not drive:
+        raise MutatorError("scenarios without a drive", argument="scenario", remedy="add --drive")
     workspace = place.workspace()
     with terminal.wait("checking every spec in every reading"):
         problems = mutator.check_library(workspace, target=manifest)
+    findings: list[Finding] = []
+    if not problems:
+        with terminal.wait("driving golden runs" if drive else "loading the target"):
+            findings = mutator.check_target(workspace, target=manifest, drive=drive, scenarios=scenario or ())
     if as_json:
-        terminal.emit([{"file": p.where, "line": p.line, "problem": str(p)} for p in problems])
+        told = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
+        terminal.emit({"problems": told, "findings": findings})
     for problem in problems:
         terminal.say(error_text(problem), style="red")
-    if problems:
-        terminal.say(counted(len(problems), "problem"), style="bold red")
+    for finding in findings:
+        if drive or finding.level != "ok":
+            _say_finding(terminal, finding)
+    failed = [finding for finding in findings if finding.level == "failed"]
+    if problems or failed:
+        terminal.say(counted(len(problems) + len(failed), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = sum(spec.count for spec in workspace.specs())
     readings = {1: "", 2: ", in both readings"}.get(
         number := len(workspace.readings().names), f", in all {number} readings"
     )
-    terminal.say(f"all well: {len(workspace.spec_files())} specs, {faults} faults{readings}", style="green")
+    warned = sum(finding.level == "warning" for finding in findings)
+    well = f"no problem, {counted(warned, 'warning')}" if warned else "all well"
+    terminal.say(f"{well}: {len(workspace.spec_files())} specs, {faults} faults{readings}", style="green")
+
+
+def _say_finding(terminal: Terminal, finding: "Finding") -> None:
+    """A finding with its places below it, and what to do."""
+    terminal.say(f"{finding.name}: {finding.found}", style=LEVEL_STYLES[finding.level])
+    for one in finding.places:
+        file = short_path(Path(one.file)) if Path(one.file).is_absolute() else one.file
+        terminal.say(f"  {replace(one, file=str(file))}")
+    if finding.remedy:
+        terminal.say(f"  to do: {finding.remedy}")
 
 
 def _line(text: str) -> str:

@@ -15,17 +15,28 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 
 
+def unfit(manifest: TargetManifest) -> Refused | None:
+    """Why nothing of the target can be forked here, as far as is known without loading it."""
+    why = not_forkable(manifest)
+    stepwise = (
+        "" if manifest.stepwise else f"name a function that makes a run in steps in {manifest.path.name}"
+    )
+    return Refused(why, stepwise) if why else None
+
+
 def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
     """Why the target cannot be forked once it is loaded, which is tried; None if it can.
 
     `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
     """
-    if why := not_forkable(manifest):
-        return Refused(why)
+    if found := unfit(manifest):
+        return found
     try:
         Pool(manifest, base, home, None).close()
-    except (Refused, Lost) as found:
-        return found if isinstance(found, Refused) else Refused(str(found))
+    except Refused as why:
+        return why
+    except Lost as why:
+        return Refused(str(why))
     return None
 
 

@@ -271,8 +271,7 @@ def _lines(summary: Summary) -> list[str]:
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
-        f"proof: {summary.proof}" if summary.proof else "",
-        summary.no_proof,
+        f"proof: {summary.proof_note}" if summary.proof_note else "",
         f"results: {summary.results}" if summary.results else "",
         f"seal: {summary.seal}" if summary.seal else "",
     ]

@@ -62,10 +62,11 @@ class Summary:
     elapsed_s: float
 
     @property
-    def no_proof(self) -> str:
-        """Why nothing was proved, as a sentence; empty otherwise."""
-        why = self.not_forked
-        return f"no proof is needed, as no experiment was forked: {why}" if why else ""
+    def proof_note(self) -> str:
+        """How far the proof is, or why there is none; empty where the reference engine was asked for."""
+        if self.not_forked:
+            return f"none is needed, as no experiment was forked: {self.not_forked}"
+        return str(self.proof) if self.proof else ""
 
     @property
     def exit_code(self) -> int:

@@ -122,7 +122,7 @@ class ManifestModel(StrictModel, title="The file"):
         description="When `mutator try` arms triggers, where nothing else is said.",
     )
     entry: _EntryModel = Field(description="How a run is started.")
-    trace: TraceModel = Field(TraceModel.model_construct(), description="The numbers that a run records.")
+    trace: TraceModel | None = Field(None, description="The numbers that a run records.")
     record: str | None = Field(
         None,
         description="The record's name in `{out}`: a JSON file in which the target tells of hazards and "
@@ -176,7 +176,8 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     packages = _packages(model, source)
     check_installed(model.root, packages, model.files or (), source)
     changes = model.entry.changes
-    channels = read_channels(model.channels, model.trace, source)
+    trace = model.trace or TraceModel.model_validate({})
+    channels = read_channels(model.channels, trace, source)
     observation = read_observation(model.observation, source)
     known = observation.judgeable(channel.name for channel in channels)
     return TargetManifest(
@@ -198,8 +199,8 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, _ChangeModel)},
         step_s=model.step_s,
         armed_after_s=model.armed_after_s,
-        trace_file=model.trace.file,
-        time_channel=model.trace.time,
+        trace_file=trace.file,
+        time_channel=trace.time,
         channels=channels,
         record_file=model.record,
         observation=observation,

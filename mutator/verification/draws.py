@@ -34,9 +34,7 @@ def _of_specs(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[Pla
             draw = variant.draw
             for reading, injections in variant.readings.items():
                 if draw and not any(_uses(one, draw.name, models) for one in injections):
-                    what = (
-                        f"'{draw.name}' of {spec.name}/{variant.name} is drawn, and {reading} does not use it"
-                    )
+                    what = f"{spec.name}/{variant.name} draws '{draw.name}', which {reading} does not use"
                     yield Place(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
 
 

@@ -15,12 +15,12 @@ from typing import Any
 from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.experiments import Expansion
+from mutator.engines import forkable
 from mutator.engines.fork import ForkEngine
 from mutator.engines.fork_pool import Refused
 from mutator.engines.in_target.watch import CLOCK, THREAD
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
-from mutator.engines.registry import not_forkable
 from mutator.engines.threads import too_many, turned_off
 from mutator.model import Experiment, Limits
 from mutator.mutants.building import build
@@ -94,7 +94,7 @@ class _Drive:
             goldens = {name: self._golden(name, runs) for name in self.scenarios}
             found = [self._determinism(name, golden) for name, golden in goldens.items()]
             found += self._clocks(goldens) if all(one.level is Level.OK for one in found) else []
-            found.append(self._forking(goldens))
+            found.append(self._forking(goldens, well=found[0].level is Level.OK))
             for name, golden in goldens.items():
                 self._take(name, self.setting, golden.watched)
             self._reach_more()
@@ -189,28 +189,36 @@ class _Drive:
 
     # Fast engines
 
-    def _forking(self, goldens: Mapping[str, _Golden]) -> Finding:
-        """Whether a golden run can be forked at its steps: tried with a brief one; with a long one only its
-        threads are looked at."""
+    def _forking(self, goldens: Mapping[str, _Golden], *, well: bool) -> Finding:
+        """Whether a golden run can be forked at its steps: tried with a brief one that is `well`; of others
+        only the threads are looked at."""
         scenario, golden = next(iter(goldens.items()))
-        noted = [self._noted(one) for one in goldens.values()]
-        refusal = self._refusal(scenario, golden)
-        places = dict.fromkeys(place for one in noted for place in causes.of_kind(one, THREAD))
+        tried = well and golden.first.wall_s <= _BRIEF_S
+        refusal = forkable.unfit(self.manifest)
+        if not refusal:
+            refusal = self._refusal(scenario, golden) if tried else _threads(golden.watched)
+        if refusal is None and not tried:
+            why = (
+                f"as a golden run takes {golden.first.wall_s:.0f} s"
+                if well
+                else "as its golden run is not well"
+            )
+            found = f"no thread is in the way; forking was not tried, {why}"
+            return Finding(name=fast_engines.NAME, level=Level.OK if well else Level.WARN, found=found)
         told = fast_engines.finding(refusal)
-        return replace(told, places=tuple(places)) if refusal and "thread" in str(refusal) else told
+        if refusal is None or "thread" not in str(refusal):
+            return told
+        noted = [self._noted(one) for one in goldens.values()]
+        places = dict.fromkeys(place for one in noted for place in causes.of_kind(one, THREAD))
+        return replace(told, places=tuple(places))
 
     def _refusal(self, scenario: str, golden: _Golden) -> Refused | None:
-        if why := not_forkable(self.manifest):
-            return Refused(why, f"name one in {self.manifest.path.name}")
-        if self._look(golden.first).problem or golden.first.wall_s > _BRIEF_S:
-            others = golden.watched.watched.get("threads", [])
-            return Refused(too_many(others), turned_off(others)) if others else None
         null = build(self.manifest, self.workspace.fault_models(), None, always()).files
         work = self._scratch / "fork"
         work.mkdir()
         fork = ForkEngine(self.manifest, self.engine.base, work, self.engine.limits, null=null)
         try:
-            return fork.refusal(replace(self._job("f", scenario, self.setting), golden=golden.first.out))
+            return fork.refusal(replace(self._job("fork", scenario, self.setting), golden=golden.first.out))
         finally:
             fork.close()
 
@@ -263,6 +271,12 @@ class _Drive:
             if problem
             else "",
         )
+
+
+def _threads(watched: Execution) -> Refused | None:
+    """What the threads of a watched run are in the way of."""
+    others = watched.watched.get("threads", [])
+    return Refused(too_many(others), turned_off(others)) if others else None
 
 
 def _reading(workspace: Workspace, campaign: Campaign) -> str:

@@ -61,9 +61,66 @@ def test_check_tells_each_problem_with_its_place(cli: Cli, root: Path) -> None:
     assert answer.code == 1
     assert "distance.yaml:" in answer.out
     assert "pace" in answer.out
-    problems = cli("check", "--json").json
+    problems = cli("check", "--json").json["problems"]
     assert problems
     assert all(p["file"] == str(spec) and p["line"] for p in problems)
+
+
+def test_check_says_what_prevents_the_fast_engines(cli: Cli, root: Path) -> None:
+    """A target with a thread is told so before any campaign, by `check` and by `doctor`, with its name."""
+    go = root / "tree" / "toycar" / "go.py"
+    thread = "threading.Thread(target=threading.Event().wait, name='poll', daemon=True).start()"
+    go.write_text(go.read_text().replace("class Drive", f"import threading\n\n{thread}\n\n\nclass Drive"))
+    answer = cli("check")
+    assert answer.code == 0
+    assert "fast engines: nothing can be forked: once it is loaded, it has 2 threads" in answer.out
+    assert "beside its own 'poll'" in answer.out
+    assert "no problem, 1 warning: 3 specs" in answer.out
+    levels = {f["name"]: (f["level"], f["found"]) for f in cli("doctor", "--json").json}
+    level, found = levels["fast engines, toycar"]
+    assert (level, "'poll'" in found) == ("warning", True)
+
+
+def test_check_tells_a_draw_that_nothing_uses(cli: Cli, root: Path) -> None:
+    """A variant whose injections do not take its draw is told with the line of the draw."""
+    spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
+    spec.write_text(spec.read_text().replace("by_m: offset", "by_m: 2.5"))
+    answer = cli("check")
+    assert answer.code == 0
+    line = next(n for n, text in enumerate(spec.read_text().splitlines(), 1) if "offset_m:" in text)
+    assert (
+        f"lane.yaml:{line} sensor/lane/shifted draws 'offset', which as_described does not use" in answer.out
+    )
+
+
+def test_check_drive_tells_everything_that_it_looked_at(cli: Cli, root: Path) -> None:
+    """With `--drive` what is well is shown, too; for programs each finding has its level."""
+    answer = cli("check", "--drive", "--scenario", "A")
+    assert answer.code == 0
+    for name in ("golden A: the same bytes twice", "fast engines: ", "statements: ", "triggers: ", "canary "):
+        assert f"\n{name}" in f"\n{answer.out}"
+    assert "golden B" not in answer.out
+    assert answer.out.endswith("all well: 3 specs, 11 faults, in both readings\n")
+
+
+def test_check_drive_fails_for_a_clock(cli: Cli, root: Path) -> None:
+    """A target that is not deterministic fails the check; the line that reads the clock is named."""
+    driver = root / "tree" / "toycar" / "driver.py"
+    text = driver.read_text().replace("class Driver", "import time\n\n\nclass Driver")
+    driver.write_text(text.replace("return gas,", "return gas + time.time() * 1e-12,"))
+    answer = cli("check", "--drive", "--scenario", "A")
+    assert answer.code == 1
+    line = driver.read_text()[: driver.read_text().index("time.time()")].count("\n") + 1
+    assert f"toycar/driver.py:{line} in Driver.drive: time.time() reads the clock" in answer.out
+    found = cli("check", "--drive", "--scenario", "A", "--json").json["findings"]
+    (golden,) = (one for one in found if one["name"] == "golden A")
+    assert (golden["level"], golden["places"][0]["line"]) == ("failed", line)
+
+
+def test_scenarios_are_for_drives(cli: Cli, root: Path) -> None:
+    """A scenario without `--drive` would be ignored, so it is refused; so is one that is unknown."""
+    assert "add --drive" in cli("check", "--scenario", "A").err
+    assert cli("check", "--drive", "--scenario", "nowhere").code == 2
 
 
 def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:

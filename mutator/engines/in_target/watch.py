@@ -42,9 +42,11 @@ class Watcher:
         self._tree = tree + os.sep
         self.noted: dict[tuple[str, int], dict[str, Any]] = {}
         self._threads: set[str] = set()
+        self._quiet = False
         self._seeded: set[int] = set()  # ids of shared generators that were given a seed
 
     def begin(self) -> None:
+        self._watch_numpy()  # first: what it takes from `secrets` is its own
         for name in _CLOCKS:
             for one in (name, f"{name}_ns"):
                 self._watch(time, one, CLOCK, f"time.{one}() reads the clock")
@@ -63,7 +65,6 @@ class Watcher:
         self._watch_threads()
         self._watch_shared(random, random._inst, "random")
         self._watch_seed(random.Random)
-        self._watch_numpy()
 
     def note(self, kind: str, what: str, *, direct: bool = False) -> None:
         """Note the innermost line of the tree on the stack; `direct`: only if it is the caller itself."""
@@ -78,7 +79,7 @@ class Watcher:
             if _INSTALLED in file and not via:
                 via = f"{file.rpartition(_INSTALLED)[2]}:{frame.f_lineno}"
             frame = frame.f_back
-        if frame is None or len(self.noted) >= _MOST:
+        if frame is None or self._quiet or len(self.noted) >= _MOST:
             return
         place = (os.path.relpath(frame.f_code.co_filename, self._tree), frame.f_lineno)
         told = {"kind": kind, "file": place[0], "line": place[1], "function": frame.f_code.co_qualname}
@@ -188,8 +189,22 @@ class Watcher:
         except ImportError:
             return
         self._watch_shared(drawn, drawn.mtrand._rand, "numpy.random")
-        # whatever is made without a seed asks this function for one
         what = "a generator of numpy.random is made without a seed"
+        kind = drawn.RandomState
+
+        def make(generator: Any, seed: Any = None) -> None:
+            if seed is None:
+                self.note(DRAW, what)
+            self._quiet = True  # it asks for a seed also where it has one
+            try:
+                kind.__init__(generator, seed)
+            finally:
+                self._quiet = False
+
+        like = _Like("RandomState", (kind,), {"__init__": make, "like": kind})
+        for home in (drawn, drawn.mtrand):
+            setattr(home, "RandomState", like)  # noqa: B010
+        # whatever else is made without a seed asks this function for one
         self._watch(bit_generator, "randbits", DRAW, what)
 
 

@@ -1,5 +1,6 @@
 """What driving a target tells: controllers that misbehave, each in its own way, are told so with the line."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -120,7 +121,9 @@ def test_a_thread_pool_is_told_with_its_line(
     assert found["golden A"].level is Level.OK
     fast = found["fast engines"]
     assert fast.level is Level.WARN
-    assert fast.found.startswith("nothing can be forked: it has 2 threads, and only one can be forked")
+    assert re.match(
+        r"nothing can be forked: (at its end )?it has [23] threads, and only one can be forked", fast.found
+    )
     assert "'ThreadPoolExecutor-0_0'" in fast.found
     (place,) = fast.places
     line = line_of(toy, "self.pool.submit")
@@ -221,6 +224,23 @@ def test_a_target_that_crashes_or_is_harmful_is_told(toy: Workspace) -> None:
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
     found = driven(toy)["golden A"]
     assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
+
+
+def test_what_is_not_well_is_not_forked(toy: Workspace) -> None:
+    """Where golden runs differ, forking is not tried: it would differ, too, for the same reason."""
+    change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
+    change(toy, "driver.py", *CLOCK)
+    fast = driven(toy)["fast engines"]
+    assert (fast.level, "not tried, as its golden run is not well" in fast.found) == (Level.WARN, True)
+
+
+def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:
+    """Without `entry.stepwise` nothing can be forked, and the manifest is named."""
+    change(toy, "fault_library/targets/toycar.yaml", "  stepwise: begin\n", "")
+    found = driven(toy)
+    assert found["golden A"].level is Level.OK
+    assert "names no `entry.stepwise`" in found["fast engines"].found
+    assert "toycar.yaml" in found["fast engines"].remedy
 
 
 def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:

@@ -1,0 +1,109 @@
+"""What a watched run notes of a tree, in a process of its own: the watcher replaces what it watches."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.engines.in_target import watch
+
+NOTED = {
+    "time.time()": "time.time() reads the clock",
+    "monotonic()": "time.monotonic() reads the clock",
+    "time.perf_counter_ns()": "time.perf_counter_ns() reads the clock",
+    "time.strftime('%Y')": "time.strftime() reads the clock",
+    "datetime.now()": "datetime.datetime.now() reads the clock",
+    "random.gauss(0, 1)": "random.gauss() draws from the generator that all of random share",
+    "random.Random()": "random.Random() is made without a seed",
+    "np.random.rand()": "numpy.random.rand() draws from the generator that all of numpy.random share",
+    "np.random.default_rng()": "a generator of numpy.random is made without a seed",
+    "np.random.RandomState()": "a generator of numpy.random is made without a seed",
+    "os.urandom(2)": "os.urandom() draws from the system",
+    "uuid.uuid4()": "uuid.uuid4() makes another id",
+    "hash('x')": "hash() of texts follows PYTHONHASHSEED",
+    "threading.Thread(target=int, name='poll').start()": "starts the thread 'poll'",
+    "ThreadPoolExecutor(1).submit(int).result()": "starts the thread 'ThreadPoolExecutor-",
+}
+SOUND = (
+    "random.Random(3).random()",
+    "np.random.default_rng(3).random()",
+    "np.random.RandomState(3).rand()",
+    "time.localtime(3)",
+    "datetime(2020, 1, 1)",
+    "1 / isinstance(datetime(2020, 1, 1), datetime)",
+    "hash(3)",
+    "random.seed(3), random.random()",
+    "np.random.seed(3), np.random.rand()",
+)
+IMPORTS = """\
+import os, random, threading, time, uuid
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime
+from time import monotonic
+import numpy as np
+
+"""
+SCRIPT = """\
+import json, sys
+import {name} as watch
+watcher = watch.Watcher(sys.argv[1])
+watcher.begin()
+sys.path.insert(0, sys.argv[1])
+import controller
+controller.drive()
+print(json.dumps(watcher.found()["noted"]))
+"""
+
+
+@pytest.fixture(scope="module")
+def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, str]]]:
+    """What is noted of each line of a controller, by the line."""
+    folder = tmp_path_factory.mktemp("tree")
+    lines = [*NOTED, *SOUND]
+    body = "".join(f"    {line}\n" for line in lines)
+    text = f"{IMPORTS}def drive():\n{body}"
+    (folder / "controller.py").write_text(text)
+    script = SCRIPT.format(name=watch.__name__)
+    done = subprocess.run([sys.executable, "-c", script, folder], capture_output=True, text=True, check=True)
+    found: dict[str, list[dict[str, str]]] = {line: [] for line in lines}
+    for one in json.loads(done.stdout):
+        found[text.splitlines()[one["line"] - 1].strip()].append(one)
+    return found
+
+
+@pytest.mark.parametrize("line", NOTED)
+def test_what_is_not_the_same_in_each_run_is_noted(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
+    """Clocks, draws without a seed, salted hashes and threads are told with file, line and function."""
+    (one,) = noted[line]
+    assert one["what"].startswith(NOTED[line])
+    assert (one["file"], one["function"], one["via"]) == ("controller.py", "drive", "")
+
+
+@pytest.mark.parametrize("line", SOUND)
+def test_what_is_the_same_in_each_run_is_not(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
+    """What has a seed, or a time that it is given, is nobody's fault."""
+    assert noted[line] == []
+
+
+def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
+    """A clock that a package reads is noted at the target's line, and the package's is told beside it."""
+    package, tree = tmp_path / "site-packages" / "pid", tmp_path / "tree"
+    for folder in (package, tree):
+        folder.mkdir(parents=True)
+    (package / "__init__.py").write_text(
+        "import time\nSTARTED = time.time()\n\ndef step():\n    time.time()\n"
+    )
+    (tree / "controller.py").write_text("import pid\n\ndef drive():\n    pid.step()\n")
+    script = SCRIPT.format(name=watch.__name__)
+    path = f"{package.parent}:{Path(watch.__file__).parents[3]}"
+    done = subprocess.run(
+        [sys.executable, "-c", script, tree],
+        env={"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (one,) = json.loads(done.stdout)
+    assert (one["line"], one["via"]) == (4, "pid/__init__.py:5")
