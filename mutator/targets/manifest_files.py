@@ -5,7 +5,6 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.shipped import SHIPPED_TARGET
-from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source, StrictModel, load, read
 from mutator.targets.channels import ChannelModel, TraceModel, read_channels
 from mutator.targets.environment import check_environment
@@ -14,7 +13,7 @@ from mutator.targets.manifest import Film, TargetManifest
 from mutator.targets.observation import ObservationModel, read_observation
 from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
 from mutator.targets.requirements import read_requirements
-from mutator.targets.roots import INSTALLED, check_installed, find_root
+from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene import SceneModel, read_scene
 from mutator.targets.upgrade import NEW, OLD, Upgrade, upgraded, upgraded_text
 
@@ -173,7 +172,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     _check_placeholders(model, source)
     _check_events(model, source)
     check_environment(model.env, source)
-    packages = _packages(model, source)
+    packages = read_packages(model.package, model.packages, source)
     check_installed(model.root, packages, model.files or (), source)
     changes = model.entry.changes
     trace = model.trace or TraceModel.model_validate({})
@@ -186,7 +185,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         root=folder,
         packages=packages,
         files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**/*.py" for p in packages)),
-        overlay=_overlay(path, model, source),
+        overlay=find_overlay(model.overlay, source),
         forbid=tuple(model.forbid),
         env=model.env,
         requires=requires,
@@ -211,48 +210,6 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         source=source,
         film=_film(model.film),
     )
-
-
-def _overlay(path: Path, model: ManifestModel, source: Source) -> Path | None:
-    if model.overlay is None:
-        return None
-    for folder in (path.parent / model.overlay, path.parent.parent / model.overlay):
-        if folder.is_dir():
-            return folder.resolve()
-    raise source.error(
-        ("overlay",),
-        f"no folder {path.parent / model.overlay}",
-        expected="a folder of glue, relative to this file or to the library",
-        remedy="correct `overlay`, or make the folder",
-    )
-
-
-def _packages(model: ManifestModel, source: Source) -> tuple[str, ...]:
-    """The target's packages and modules, each once."""
-    if (model.package is None) == (model.packages is None):
-        raise source.error(
-            ("packages",),
-            "neither `package` nor `packages`" if model.package is None else "both `package` and `packages`",
-            expected="one of them",
-            remedy="name the import package under `package`; several, and modules, under `packages`",
-        )
-    if model.package is not None:
-        if not model.package.isidentifier():
-            raise source.error(("package",), f"'{model.package}'", expected="a Python package's name")
-        return (model.package,)
-    names = tuple(model.packages or ())
-    seen = {PROBE_NAME}
-    for i, name in enumerate(names):
-        stem = name.removesuffix(".py")
-        if not stem.isidentifier() or stem in seen:
-            raise source.error(
-                ("packages", i),
-                f"'{name}'",
-                expected=f"a package, or a module's file such as drive.py, each once, none {PROBE_NAME}",
-                remedy="correct it; what is inside a package needs no mention",
-            )
-        seen.add(stem)
-    return names
 
 
 def _check_names(model: ManifestModel, source: Source) -> None:

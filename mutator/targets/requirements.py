@@ -57,6 +57,6 @@ def check_requirements(manifest: "TargetManifest") -> None:
         )
 
 
-def pip_install(wanted: Iterable[Requirement]) -> str:
+def pip_install(wanted: Iterable[Requirement | str]) -> str:
     """The command that installs these."""
     return " ".join(["pip install", *(f"'{one}'" for one in wanted)])

@@ -1,4 +1,5 @@
-"""Where the root of a target is: a folder, the shipped controller, or where a package is installed."""
+"""Where a target lies: its root (a folder, the shipped controller, an installed package), its packages, its
+overlay."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -7,6 +8,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
+from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source
 from mutator.targets.requirements import pip_install
 
@@ -29,9 +31,53 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
             ("root",),
             f"no package or module '{name}' is installed here",
             expected="one that this Python can import, in a folder of its own name or a .py file",
-            remedy=pip_install(requires or [Requirement(name)]),
+            remedy=pip_install(requires or [name]),
         )
     return place.parent
+
+
+def find_overlay(overlay: str | None, source: Source) -> Path | None:
+    """The folder that is laid over the root, relative to the manifest or to its library."""
+    path = source.path
+    if overlay is None:
+        return None
+    for folder in (path.parent / overlay, path.parent.parent / overlay):
+        if folder.is_dir():
+            return folder.resolve()
+    raise source.error(
+        ("overlay",),
+        f"no folder {path.parent / overlay}",
+        expected="a folder of glue, relative to this file or to the library",
+        remedy="correct `overlay`, or make the folder",
+    )
+
+
+def read_packages(package: str | None, packages: Sequence[str] | None, source: Source) -> tuple[str, ...]:
+    """The target's packages and modules, each once."""
+    if (package is None) == (packages is None):
+        raise source.error(
+            ("packages",),
+            "neither `package` nor `packages`" if package is None else "both `package` and `packages`",
+            expected="one of them",
+            remedy="name the import package under `package`; several, and modules, under `packages`",
+        )
+    if package is not None:
+        if not package.isidentifier():
+            raise source.error(("package",), f"'{package}'", expected="a Python package's name")
+        return (package,)
+    names = tuple(packages or ())
+    seen = {PROBE_NAME}
+    for i, name in enumerate(names):
+        stem = name.removesuffix(".py")
+        if not stem.isidentifier() or stem in seen:
+            raise source.error(
+                ("packages", i),
+                f"'{name}'",
+                expected=f"a package, or a module's file such as drive.py, each once, none {PROBE_NAME}",
+                remedy="correct it; what is inside a package needs no mention",
+            )
+        seen.add(stem)
+    return names
 
 
 def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: Source) -> None:

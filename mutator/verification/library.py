@@ -57,7 +57,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
         for spec in specs:
             found.problems += check_spec(spec, models, manifest) if spec else ()
     if readings:
-        found.problems += check_campaigns(workspace, readings)
+        found.problems += check_campaigns(workspace, readings, manifest)
     if not found.problems:
         checked = found.tried(workspace.specs)
         analysis = found.tried(workspace.analysis)
@@ -66,16 +66,19 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     return found.problems
 
 
-def check_campaigns(workspace: Workspace, readings: Readings) -> list[MutatorError]:
-    """Problems of the library's campaigns, and those that the studies they ask for find in its data."""
+def check_campaigns(
+    workspace: Workspace, readings: Readings, manifest: TargetManifest | None = None
+) -> list[MutatorError]:
+    """Problems of the library's campaigns, and those that the studies they ask for find in its data. What the
+    target does not observe is told of campaigns for it, if it is given."""
     found, asked = _Found(), set[str]()
     for name in workspace.campaigns:
         campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
         if campaign is None:
             continue
         found.tried(partial(check_readings, campaign, readings))
-        if campaign.listed and campaign.target in workspace.targets:
-            found.tried(partial(_check_triggers, campaign, workspace))
+        if manifest and manifest.name == campaign.target:
+            found.tried(partial(_check_triggers, campaign, manifest))
         study = found.tried(partial(load_study, campaign))
         if study and campaign.study and campaign.study not in asked:
             asked.add(campaign.study)
@@ -84,9 +87,8 @@ def check_campaigns(workspace: Workspace, readings: Readings) -> list[MutatorErr
     return found.problems
 
 
-def _check_triggers(campaign: Campaign, workspace: Workspace) -> None:
+def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
     """MutatorError for a trigger of a campaign's list that its target does not know."""
-    manifest = workspace.manifest(campaign.target)
     listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
 
 

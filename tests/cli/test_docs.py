@@ -94,8 +94,8 @@ def work(tmp_path: Path) -> Path:
     """A folder with what the commands of the docs need of a clone."""
     for folder in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    toy = Path("tests") / "toy"
-    shutil.copytree(CLONE / toy, tmp_path / toy, ignore=shutil.ignore_patterns("__pycache__"))
+    for toy in (Path("tests") / "toy", Path("tests") / "pole"):
+        shutil.copytree(CLONE / toy, tmp_path / toy, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path
 
 

@@ -9,6 +9,7 @@ import pytest
 from mutator.api.trials import try_fault
 from mutator.errors import MutatorError
 from mutator.model import Outcome
+from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 
@@ -61,6 +62,7 @@ def test_an_installed_module(pole: Workspace, site: Path) -> None:
             {"root": "installed:none_of_poles", "packages": "[none_of_poles]"},
             "2: no package or module 'none_of_poles' is .*; pip install 'none_of_poles'",
         ),
+        ({"root": "installed:_none", "packages": "[_none]"}, "2: .*; pip install '_none'"),
         ({"root": "installed:sys", "packages": "[sys]"}, "2: no package or module 'sys' is installed"),
         ({"root": "'installed:a.b'", "packages": "[a]"}, "2: 'installed:a.b'; expected installed: and the"),
         (
@@ -81,6 +83,13 @@ def test_what_is_not_installed(pole: Workspace, site: Path, keys: dict[str, str]
     """A package that is missing, or has no source, and a tree that would have its neighbours, are refused."""
     with pytest.raises(MutatorError, match=f"pole.yaml:{said}"):
         installed(pole, **keys).manifest("pole")
+
+
+def test_check_tells_a_missing_package_once(pole: Workspace) -> None:
+    """What makes the manifest unreadable is one problem, however many campaigns are for that target."""
+    installed(pole, root="installed:none_of_poles", packages="[none_of_poles]", requires='["poles>=1"]')
+    (problem,) = check_library(pole, "pole")
+    assert problem.remedy == "pip install 'poles>=1'"
 
 
 def test_an_installed_package_is_driven(
