@@ -81,10 +81,12 @@ def needless(folder: RunFolder) -> str | None:
     """
     if folder.shard is not None:
         return None
-    told = folder.timings()
+    told, records = folder.timings(), folder.records()
     reasons = Counter[str]()
     for name in folder.share():
-        line = told.get(name, {})
+        record, line = records.get(name), told.get(name, {})
+        if record is None or not _counts(record):  # it is still to be run: what is told is of before
+            return None
         if line.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
             return None
         reasons[str(line.get("why", ""))] += 1

@@ -181,3 +181,15 @@ def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path
     summary = run_campaign(threaded, "small", run, engine="fork")
     assert (summary.proof, summary.seal) == (None, seal)
     assert not (run / "proof").exists()
+
+
+@pytest.mark.slow
+def test_what_is_run_again_by_another_engine_is_proved(toycar: Workspace, tmp_path: Path) -> None:
+    """An experiment that is still to be run may yet be forked, whatever is told of its run before."""
+    run = tmp_path / "run"
+    run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
+    folder = RunFolder.open(run)
+    assert equivalence.needless(folder) is not None
+    for path in (run / "records").iterdir():
+        path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    assert equivalence.needless(RunFolder.unverified(run)) is None
