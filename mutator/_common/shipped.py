@@ -51,7 +51,7 @@ def write_library(folder: Path) -> None:
     moved and whichever mutator is installed. MutatorError for a folder that holds anything.
     """
     shipped = shipped_folder()
-    _make_empty(folder)
+    make_empty(folder)
     for name in ("fault_library", "templates"):
         shutil.copytree(shipped / name, folder / name, ignore=shutil.ignore_patterns(".*"))
     for manifest in (folder / "fault_library" / "targets").glob("*.yaml"):
@@ -60,7 +60,8 @@ def write_library(folder: Path) -> None:
     shutil.copyfile(_README, folder / "README.md")
 
 
-def _make_empty(folder: Path) -> None:
+def make_empty(folder: Path) -> None:
+    """Make a new folder, or find it empty; MutatorError for one that holds anything or cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         problem = f"not empty ({sorted(folder.iterdir())[0].name})" if any(folder.iterdir()) else ""

@@ -1,5 +1,6 @@
 """A library made, checked and analysed, and the machine that is to use it."""
 
+import os
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -8,6 +9,9 @@ from mutator._common.files import write_atomic
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
+from mutator.onboarding.new_library import write_library_for
+from mutator.onboarding.survey import survey
+from mutator.onboarding.unfilled import unfilled
 from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
@@ -21,13 +25,24 @@ from mutator.verification.findings import Finding
 from mutator.workspace import Workspace
 
 
-def init_library(folder: str | Path) -> Path:
-    """Write a fault library and templates to edit into a new or empty folder, which is returned.
+def init_library(folder: str | Path, *, target: str | PathLike[str] | None = None) -> Path:
+    """Write a fault library to edit into a new or empty folder, which is returned.
 
-    They are copies of what ships with mutator, with a README. MutatorError for a folder that holds anything.
+    With `target`, the folder of a controller's source or `installed:NAME`, it is a first library for that
+    controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is read,
+    never imported. Without it, library and templates are copies of what ships with mutator.
+    MutatorError for a folder that holds anything, and for a target that is not there.
     """
-    write_library(Path(folder))
+    if target is None:
+        write_library(Path(folder))
+    else:
+        write_library_for(survey(os.fspath(target)), Path(folder))
     return Path(folder)
+
+
+def unfilled_places(folder: str | Path) -> list[MutatorError]:
+    """The places of a library's folder that are still to be filled in."""
+    return list(unfilled(Path(folder)))
 
 
 def upgrade_manifest(path: str | Path) -> Upgrade | None:

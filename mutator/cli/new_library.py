@@ -1,17 +1,21 @@
 """`init` and `upgrade`: a library of one's own, and its manifests in today's schema."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 import mutator
+from mutator._common.text import counted
+from mutator.api.libraries import unfilled_places
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json
 
 INIT_EXAMPLES = """\b
 Examples:
-  mutator init faults        a copy to edit, in faults/; its README has the first commands
+  mutator init faults                           a copy to edit, in faults/; its README has the first commands
+  mutator init faults --target ../controller    a first library for the controller in that folder
+  mutator init faults --target installed:NAME   for an installed package
 """
 
 
@@ -23,18 +27,29 @@ def register(app: typer.Typer) -> None:
 
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new or empty folder.")],
+    target: Annotated[
+        str | None,
+        typer.Option(metavar="TREE", help="The source of a controller: a folder, or installed:NAME."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write a fault library and templates to edit.
+    """Write a fault library to edit.
 
-    They are copies of what ships with mutator, with a README. In DIR and below, mutator uses them; the
-    controller under test stays the one that ships, unless the manifest in DIR or --target names another.
+    With --target, a first library for that controller, whose source is read and never run: manifest, entry,
+    scenario, fault and campaign, with places to fill in. Without it, copies of the library and templates
+    that ship with mutator, for the controller that ships. In DIR and below, mutator uses them.
     """
     terminal = Terminal(as_json)
-    mutator.init_library(folder)
+    mutator.init_library(folder, target=target)
+    told: dict[str, Any] = {"folder": str(folder)}
+    held = "fault_library/, templates/"
+    if target is not None:
+        places = unfilled_places(folder)
+        told["unfilled"] = [{"file": place.where, "line": place.line} for place in places]
+        held = f"fault_library/ with {counted(len(places), 'place')} to fill in,"
     if as_json:
-        terminal.emit({"folder": str(folder)})
-    terminal.say(f"{short_path(folder)}: fault_library/, templates/ and a README.md that says how to go on")
+        terminal.emit(told)
+    terminal.say(f"{short_path(folder)}: {held} and a README.md that says how to go on")
 
 
 def upgrade(

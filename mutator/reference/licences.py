@@ -23,8 +23,8 @@ _HEAD = """\
 licence, given here as the package states it. Binary wheels may carry libraries under further licences, as
 those of `av` and `opencv-python-headless` carry FFmpeg; the `.dist-info` of such a wheel has them.
 
-*Needed by* says who asks for a package: `mutator` to run; an extra of it (`test`, `dev`, `train`); or only
-other packages of this table.
+*Needed by* says who asks for a package: `mutator` to run; an extra of it (`test`, `dev`, `train`,
+`examples`); or only other packages of this table.
 
 """
 _ROW = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)

@@ -41,8 +41,8 @@ class _EntryModel(StrictModel, title="The entry"):
     )
     stepwise: str | None = Field(
         None,
-        description="A function of the module that takes these arguments and gives a run that is driven "
-        "step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
+        description="A function of the module (or `Class.method`) that takes these arguments and gives a run "
+        "that is driven step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
         "need.",
     )
     independent: list[str] = Field(
@@ -216,7 +216,8 @@ def _check_names(model: ManifestModel, source: Source) -> None:
     for key, command in (("entry", model.entry), ("film", model.film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error((key, "module"), f"'{command.module}'", expected="a dotted module name")
-    if (stepwise := model.entry.stepwise) is not None and not stepwise.isidentifier():
+    stepwise = model.entry.stepwise
+    if stepwise is not None and not all(part.isidentifier() for part in stepwise.split(".")):
         raise source.error(("entry", "stepwise"), f"'{stepwise}'", expected="a function of the entry module")
     if model.record is not None and Path(model.record).name != model.record:
         raise source.error(("record",), f"'{model.record}'", expected="a bare file name, made in {out}")

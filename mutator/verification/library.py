@@ -20,6 +20,7 @@ from mutator.mutants.anchors import parse_file, parsed
 from mutator.mutants.building import build
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.splicing import apply_edits, joined, unsplice
+from mutator.onboarding.unfilled import unfilled
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -34,12 +35,14 @@ T = TypeVar("T")
 def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of library, templates and target, in the order of the files; empty when all is well.
 
-    Checks that manifests, models, specs, hazards and context tables load; that the models' examples hold;
-    that every spec expands in every reading; that every anchor is found in the target exactly once; that one
-    mutant of every shape compiles and un-splices; that campaigns load and the studies that they ask for find
-    their data in order; and that a hazard analysis, if there is one, has no gap.
+    Checks that nothing is left to fill in; that manifests, models, specs, hazards and context tables load;
+    that the models' examples hold; that every spec expands in every reading; that every anchor is found in
+    the target exactly once; that one mutant of every shape compiles and un-splices; that campaigns load and
+    the studies that they ask for find their data in order; and that a hazard analysis, if there is one, has
+    no gap.
     """
     found = _Found()
+    found.problems += unfilled(workspace.library)
     manifest = found.tried(lambda: workspace.manifest(target))
     if manifest:
         found.tried(lambda: check_requirements(manifest))

@@ -27,7 +27,12 @@ CLONE = Path(__file__).parents[2]
 README = CLONE / "README.md"
 CONTRIBUTING = CLONE / "CONTRIBUTING.md"
 BENCHMARKS = CLONE / "benchmarks" / "README.md"
+EXAMPLES = {  # pages, and the package that their commands need
+    CLONE / "examples" / folder / "README.md": package
+    for folder, package in (("cartpole", "gymnasium"), ("highway", "highway_env"), ("opendbc", "opendbc"))
+}
 PAGES = [README, CONTRIBUTING, BENCHMARKS, *sorted((CLONE / "docs").rglob("*.md"))]
+PAGES += [CLONE / "examples" / "README.md", *EXAMPLES]
 TUTORIAL = CLONE / "docs" / "tutorial" / "first-campaign.md"
 HOW_TO = CLONE / "docs" / "how-to"
 COMPARISON = HOW_TO / "compare-with-openpilot.md"
@@ -35,8 +40,10 @@ WORKED_THROUGH = [
     README,
     TUTORIAL,
     TUTORIAL.with_name("first-fault.md"),
+    TUTORIAL.with_name("your-own-controller.md"),
     COMPARISON,
     *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # whose code test_studies runs
+    *EXAMPLES,
 ]
 INDEX = CLONE / "docs" / "README.md"
 
@@ -96,6 +103,8 @@ def work(tmp_path: Path) -> Path:
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
     for toy in (Path("tests") / "toy", Path("tests") / "pole"):
         shutil.copytree(CLONE / toy, tmp_path / toy, ignore=shutil.ignore_patterns("__pycache__"))
+    examples = CLONE / "examples"
+    shutil.copytree(examples, tmp_path / "examples", ignore=shutil.ignore_patterns("__pycache__", "runs"))
     return tmp_path
 
 
@@ -155,6 +164,9 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
     """The console sessions of a page, run in its order, give exactly the output that is printed there."""
     found = sessions(page)
     assert len(found) >= 2
+    if page in EXAMPLES:
+        pytest.importorskip(EXAMPLES[page])
+        work = work / page.parent.relative_to(CLONE)
     printed = work_through(page, work)
     if os.environ.get("UPDATE_DOCS"):
         rewrite(page, printed)

@@ -1,5 +1,6 @@
-"""`init`: a library of one's own."""
+"""`init`: a library of one's own, and a first one for a foreign controller."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -44,3 +45,130 @@ def test_init_refuses_a_folder_with_content(cli: Cli, nowhere: Path) -> None:
 def test_init_for_a_program(cli: Cli, nowhere: Path) -> None:
     """`--json` names the folder."""
     assert cli("init", "faults", "--json").json == {"folder": "faults"}
+
+
+CONTROLLER = """
+class Controller:
+    def __init__(self, gain=1.0):
+        self.gain = gain
+        self.last = 0.0
+
+    def update(self, state):
+        error = 0.0 - state
+        self.last = self.gain * error
+        return self.last
+"""
+MARK = re.compile(r"^ *# TODO\(init\):.*\n", re.MULTILINE)
+
+
+@pytest.fixture
+def tree(nowhere: Path) -> Callable[..., Path]:
+    """Makes a source tree of these files."""
+
+    def make(files: dict[str, str]) -> Path:
+        folder = nowhere / "tree"
+        folder.mkdir()
+        for name, text in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text)
+        return folder
+
+    return make
+
+
+TREES: dict[str, tuple[dict[str, str], str, str]] = {
+    "flat": ({"steer.py": CONTROLLER, "other.py": "x = 1\n"}, "packages: [other.py, steer.py]", "steer.py"),
+    "module": ({"steer.py": CONTROLLER}, "packages: [steer.py]", "steer.py"),
+    "package": ({"car/__init__.py": "", "car/steer.py": CONTROLLER}, "package: car", "car/steer.py"),
+    "drive": ({"drive.py": CONTROLLER}, "entry: {module: drive_loop", "drive.py"),
+}
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_a_first_library_runs_once_its_marks_are_gone(
+    name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For a controller with an ordinary step all is there: without an edit but the deletion of its marks the
+    library fits, and the likeliest value is put in and driven."""
+    files, manifest, place = TREES[name]
+    cli("init", "faults", "--target", tree(files))
+    (written,) = (nowhere / "faults/fault_library/targets").iterdir()
+    assert manifest in written.read_text()
+    for path in (nowhere / "faults").rglob("*.*"):
+        path.write_text(MARK.sub("", path.read_text()))
+    monkeypatch.chdir(nowhere / "faults")
+    assert cli("check").out.startswith("all well: 1 specs, 18 faults")
+    tried = cli("try", "controller/value", "--variant", "added", "--value", 10, "-s", "first", "--trigger", 1)
+    assert tried.code == 0, tried.err
+    assert f"+++ b/{place}" in tried.out
+    assert "error = error + 10" in tried.out
+    assert "hazard FAR_OFF" in tried.out
+
+
+FOREIGN: dict[str, dict[str, str]] = {
+    "nothing": {},
+    "no controller": {"data/notes.txt": "x", "values.py": "x = 1\n"},
+    "syntax errors": {"broken.py": "def step(:\n", "steer.py": CONTROLLER},
+    "only syntax errors": {"broken.py": "def step(:\n"},
+    "needs arguments": {
+        "a.py": "class Pid:\n    def __init__(self, p, *, i): ...\n"
+        "    def step(self, x, dt):\n        y = x * dt\n        return y\n"
+    },
+    "function": {"a.py": "def control(x):\n    y = 2 * x\n    return y\n"},
+    "namesake": {"a.py": "class Drive:\n    def step(self, x):\n        y = 2 * x\n        return y\n"},
+    "odd names": {"a-b.py": CONTROLLER, "c/d-e/f.py": CONTROLLER},
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_check_lists_every_place_to_fill_in(
+    name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the tree holds, a library is written, and `check` names each mark once, with file and line and
+    what belongs there."""
+    told = cli("init", "faults", "--target", tree(FOREIGN[name]), "--json").json
+    assert (nowhere / "faults" / "README.md").exists()
+    marks = [
+        (path.relative_to(nowhere).as_posix(), number)
+        for path in sorted((nowhere / "faults").rglob("*.*"))
+        if path.suffix in (".yaml", ".py")
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if "# TODO(init): " in line
+    ]
+    assert [(Path(place["file"]).as_posix(), place["line"]) for place in told["unfilled"]] == marks
+    assert len(marks) >= 12
+    monkeypatch.chdir(nowhere / "faults")
+    answer = cli("check")
+    assert answer.code == 1
+    lines = answer.out.splitlines()
+    for file, number in marks:
+        place = f"{file.removeprefix('faults/')}:{number}: not filled in: "
+        assert sum(line.startswith(place) for line in lines) == 1, place
+
+
+def test_marks_tell_all_that_their_comment_says(
+    cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A comment that goes on below its mark is told as a whole; one in another line is none of it."""
+    cli("init", "faults", "--target", "installed:typer")
+    path = nowhere / "faults/fault_library/scenarios/first.yaml"
+    path.write_text("# TODO(init): the speed\n# in m/s\nspeed: 3\n# another\n")
+    monkeypatch.chdir(nowhere / "faults")
+    assert "first.yaml:1: not filled in: the speed in m/s; do so, and delete the comment" in cli("check").out
+
+
+def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
+    """The manifest names the package and the requirement, and nothing of the shipped target is copied."""
+    assert "places to fill in" in cli("init", "faults", "--target", "installed:typer").out
+    manifest = (nowhere / "faults/fault_library/targets/typer.yaml").read_text()
+    assert "root: installed:typer\n" in manifest
+    assert re.search(r'requires: \["typer>=[\d.]+"\]', manifest)
+    assert not any("openpilot" in path.read_text() for path in (nowhere / "faults").rglob("*.*"))
+
+
+def test_init_refuses_a_target_that_is_not_there(cli: Cli, nowhere: Path) -> None:
+    """A missing folder is wrong input, and no library is begun for it."""
+    answer = cli("init", "faults", "--target", "nowhere")
+    assert answer.code == 2
+    assert "no folder nowhere" in answer.err
+    assert not (nowhere / "faults").exists()

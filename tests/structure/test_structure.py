@@ -74,9 +74,10 @@ def cycle(root: Path) -> list[str]:
 def strangers_in_target(root: Path) -> list[str]:
     """Imports, in what runs inside a target's process, of more than the standard library and numpy."""
     allowed = {*sys.stdlib_module_names, "numpy"}
+    package = root / "mutator"
     return [
         f"{path.name}: {name}"
-        for path in (root / "mutator" / "engines" / "in_target").glob("*.py")
+        for path in (package / "glue.py", *(package / "engines" / "in_target").glob("*.py"))
         for name, _ in imports(path, root)
         if name.partition(".")[0] not in allowed
     ]
@@ -156,6 +157,9 @@ VIOLATIONS = {
     "study": ("mutator/report/building.py", "from mutator import paper"),
     "new package": ("mutator/novel.py", "X = 1"),
     "stranger in a target's process": ("mutator/engines/in_target/run_once.py", "import pandas"),
+    "stranger in the glue": ("mutator/glue.py", "import yaml"),
+    "harness in the glue": ("mutator/glue.py", "from mutator.errors import MutatorError"),
+    "glue in the harness": ("mutator/engines/jobs.py", "from mutator import glue"),
     "hidden import": ("mutator/report/page.py", "def f():\n    from mutator.report import panel"),
     "namesake": ("mutator/report/page.py", "def page():\n    pass"),
 }

@@ -15,6 +15,7 @@ import importlib.util
 import io
 import json
 import marshal
+import operator
 import os
 import socket
 import struct
@@ -44,11 +45,12 @@ def serve_first(connection: int, start: dict[str, Any]) -> None:
     """Load the target, and wait before any run."""
     os.chdir(start["home"])
     sys.path.insert(0, start["tree"])
+    sys.meta_path.insert(0, child.Harness)
     sys.argv = [start["module"]]
     server = Process(start, socket.socket(fileno=connection))
     try:
         module = importlib.import_module(start["module"])
-        server.begin = getattr(module, start["stepwise"])
+        server.begin = operator.attrgetter(start["stepwise"])(module)
     except BaseException as err:
         server.send({"failed": child.describe(err, start["tree"], None)})
         return

@@ -39,6 +39,20 @@ def beside(name: str) -> Any:
 guard = beside("guard")
 
 
+class Harness:
+    """Finds `mutator`, of which targets import the glue, where this file lies, whatever is installed."""
+
+    package = Path(__file__).resolve().parents[2]
+
+    @classmethod
+    def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:
+        if name != cls.package.name:
+            return None
+        return importlib.util.spec_from_file_location(
+            name, cls.package / "__init__.py", submodule_search_locations=[str(cls.package)]
+        )
+
+
 def main(job_file: str, connection: int) -> int:
     job = json.loads(Path(job_file).read_text(encoding="utf-8"))
     space = guard.Space(job["home"], job["disk_mb"])
@@ -59,6 +73,7 @@ def run(job: dict[str, Any]) -> None:
     limit_resources(job)
     os.chdir(job["out"])
     sys.path.insert(0, job["tree"])
+    sys.meta_path.insert(0, Harness)
     report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
     probe = None
     known = set(sys.modules)
@@ -207,9 +222,10 @@ def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
 
 
 def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Top-level names of what was imported beside the `known` modules, but for those of the packages and the
-    standard library."""
-    return sorted({name.partition(".")[0] for name in libraries(known, packages)} - sys.stdlib_module_names)
+    """Top-level names of what was imported beside the `known` modules, but for those of the packages, the
+    standard library and the harness."""
+    own = {*sys.stdlib_module_names, Harness.package.name}
+    return sorted({name.partition(".")[0] for name in libraries(known, packages)} - own)
 
 
 def tree_files(tree: str) -> dict[str, str]:

@@ -1,0 +1,227 @@
+"""Glue between a controller and the harness: a run, step by step, and what it leaves behind.
+
+The entry module of a target is a class that builds the loop and drives one step of it, and two lines:
+
+    from mutator.glue import Run
+
+    class Drive(Run):
+        def __init__(self, scenario, seed):
+            super().__init__(step_s=0.02, duration_s=scenario["duration_s"])
+            self.car, self.controller = Car(scenario["speed_mps"]), Controller()
+
+        def step(self):
+            distance = self.car.distance()
+            brake = self.controller.update(distance)
+            self.car.advance(brake)
+            self.record(distance=distance, brake=brake)
+
+    if __name__ == "__main__":
+        Drive.main()
+
+and in the manifest `entry: {module: drive, stepwise: Drive.open}`. It runs in the target's process, so this
+module needs the standard library and numpy alone, and nothing else of mutator.
+"""
+
+import json
+import random
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+TRACE = "trace.npz"
+RECORD = "record.json"
+TIME = "t"  # the channel that every trace has, in s
+_OPTIONS = ("scenario", "seed", "out")
+
+
+class GlueError(Exception):
+    """A mistake in how a run is started or written, in words for who wrote it."""
+
+
+class Scenario(dict[str, Any]):
+    """What a scenario file says, by key. GlueError, with the keys that there are, for one that is missing."""
+
+    def __init__(self, values: dict[str, Any], path: Path) -> None:
+        super().__init__(values)
+        self.path = path
+
+    def __missing__(self, key: str) -> Any:
+        raise GlueError(f"{self.path}: no '{key}', only {', '.join(self) or 'an empty file'}")
+
+
+class Run:
+    """One run of a closed loop. A subclass has `__init__(self, scenario, seed)`, which builds the loop, and
+    `step(self)`, which drives it on by `step_s` and ends with `self.record(...)`.
+
+    `scenario` is a `Scenario`, `seed` an int. Nothing global is seeded; see `seed_globals`.
+    """
+
+    # names with two underscores, so that a subclass may use any other
+    def __init__(self, *, step_s: float, duration_s: float) -> None:
+        """A run of `duration_s`, which ends sooner where `end` is called."""
+        self.step_s = step_s
+        self.__steps = round(duration_s / step_s)
+        if self.__steps < 1:
+            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected one step at least")
+        self.__channels: tuple[str, ...] = ()
+        self.__rows: list[tuple[float, ...]] = []
+        self.__ended = False
+        self.__hazards: dict[str, float | None] = {}
+        self.__alerts: list[dict[str, Any]] = []
+        self.__alerting: set[str] = set()
+
+    def step(self) -> None:
+        """Drive the loop on by one step, and record it: written in the subclass."""
+        raise NotImplementedError(f"{type(self).__name__} has no step()")
+
+    @property
+    def t(self) -> float:
+        """Time in s since the start: of the step that is being driven, until it is recorded."""
+        return len(self.__rows) * self.step_s
+
+    @property
+    def done(self) -> bool:
+        """Whether no step is left."""
+        return self.__ended or len(self.__rows) >= self.__steps
+
+    def end(self) -> None:
+        """Make this step the last: the pole lies, the cars have met, nothing more can be learnt."""
+        self.__ended = True
+
+    def record(self, **channels: float) -> None:
+        """Record the step that is ending: a number for each channel, the same channels in each step.
+
+        It comes once in each step, and last: from then on `t` is the time of the next.
+        """
+        if not self.__rows:
+            self.__channels = tuple(channels)
+        if channels.keys() != set(self.__channels) or TIME in channels:
+            odd = sorted(channels.keys() ^ set(self.__channels)) or [TIME]
+            raise GlueError(
+                f"at {self.t:g} s: channels {', '.join(odd)}; expected the same in each step, without {TIME}"
+            )
+        self.__rows.append((self.t, *(float(channels[name]) for name in self.__channels)))
+
+    def hazard(self, name: str, now: bool) -> None:
+        """Judge a hazard of which the manifest only has the name: to be called in each step, before `record`.
+        The time of the first step in which it is there counts."""
+        if self.__hazards.setdefault(name, None) is None and now:
+            self.__hazards[name] = self.t
+
+    def alert(self, name: str, now: bool) -> None:
+        """Say whether the controller alerts its driver: to be called in each step, before `record`. Each time
+        that an alert begins counts."""
+        if now and name not in self.__alerting:
+            self.__alerts.append({"name": name, "t": self.t})
+        (self.__alerting.add if now else self.__alerting.discard)(name)
+
+    def write(self, out: Path) -> None:
+        """Write the trace, then the record, into the folder `out`: of equal runs, equal bytes."""
+        columns = np.array(self.__rows, dtype=np.float64).T
+        np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))
+        unfinished = out / f".{RECORD}"  # a run that is killed has no record
+        said = {"hazards": self.__hazards, "alerts": self.__alerts}
+        unfinished.write_text(json.dumps(said) + "\n", encoding="utf-8")
+        unfinished.replace(out / RECORD)
+
+    @classmethod
+    def open(cls, arguments: Sequence[str]) -> Self:
+        """The run of `--scenario FILE --seed N --out DIR`, before its first step: `stepwise` in the manifest.
+
+        Any other `--key value` stands in place of what the scenario has under that key, and `--key` alone for
+        true: so a change of the manifest needs no code.
+        """
+        given = _options(arguments)
+        subclass: Any = cls
+        run: Self = subclass(_scenario(given), _seed(given))
+        return run
+
+    @classmethod
+    def main(cls, arguments: Sequence[str] | None = None) -> None:
+        """Drive a run from its first step to its last and write it, as the arguments of the process say."""
+        arguments = sys.argv[1:] if arguments is None else arguments
+        run = cls.open(arguments)
+        while not run.done:
+            steps = len(run.__rows)
+            run.step()
+            if len(run.__rows) != steps + 1:
+                raise GlueError(
+                    f"step() recorded {len(run.__rows) - steps} rows at {run.t:g} s; expected one"
+                )
+        run.write(Path(_needed(_options(arguments), "out")))
+
+
+def seed_globals(seed: int) -> None:
+    """Seed the generators that a process has one of, `random` and `numpy.random`: for code that draws from
+    them rather than from a generator of its own."""
+    random.seed(seed)
+    np.random.seed(seed)
+
+
+def read_scenario(path: Path) -> Scenario:
+    """A scenario file: `key: value` in each line, `#` before a comment.
+
+    Such a file is YAML, but not all YAML is such a file. A value is written as in JSON (a number, true,
+    false, null, [1, 2], {"a": 1}); anything else is text. GlueError for another kind of line.
+    """
+    found: dict[str, Any] = {}
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        text = line.partition(" #")[0].rstrip()
+        if not text or text.startswith("#"):
+            continue
+        key, colon, value = text.partition(":")
+        if not (colon and key.isidentifier() and value.strip()) or key in found:
+            raise GlueError(f"{path}:{number}: '{text}'; expected `key: value`, each key once")
+        found[key] = _value(value.strip())
+    return Scenario(found, path)
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def _options(arguments: Sequence[str]) -> dict[str, str | None]:
+    """`--key value`, `--key=value` and `--key` (None) by key, with _ for any further -."""
+    found: dict[str, str | None] = {}
+    waiting = ""
+    for argument in arguments:
+        if argument.startswith("--"):
+            name, equals, value = argument[2:].partition("=")
+            waiting = name.replace("-", "_")
+            found[waiting] = value if equals else None
+        elif waiting and found[waiting] is None:
+            found[waiting] = argument
+        else:
+            raise GlueError(f"argument '{argument}'; expected --scenario FILE --seed N --out DIR")
+    return found
+
+
+def _needed(given: dict[str, str | None], name: str) -> str:
+    value = given.get(name)
+    if value is None:
+        raise GlueError(f"no --{name}; expected --scenario FILE --seed N --out DIR")
+    return value
+
+
+def _seed(given: dict[str, str | None]) -> int:
+    text = _needed(given, "seed")
+    if not text.isdecimal():
+        raise GlueError(f"--seed {text}; expected a whole number, 0 or more")
+    return int(text)
+
+
+def _scenario(given: dict[str, str | None]) -> Scenario:
+    """The scenario of the arguments, with what stands in its keys' places."""
+    scenario = read_scenario(Path(_needed(given, "scenario")))
+    for key, value in given.items():
+        if key in _OPTIONS:
+            continue
+        scenario[key]  # a key that the scenario does not have is a mistake
+        scenario[key] = True if value is None else _value(value)
+    return scenario

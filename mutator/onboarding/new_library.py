@@ -1,0 +1,110 @@
+"""Writes a first library for a source tree: manifest, entry, scenario, fault, campaign, README."""
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from mutator._common.shipped import make_empty
+from mutator._common.text import counted
+from mutator.onboarding.candidates import LoopCandidate, loop_candidates
+from mutator.onboarding.survey import Survey
+from mutator.onboarding.unfilled import MARK
+
+MOST_SHOWN = 5  # candidates for the loop; values of each
+_TIME_STEPS = ("dt", "delta_t", "time_step", "timestep")
+_FILES = {
+    "README.md": "README.md",
+    "manifest.yaml": "fault_library/targets/{name}.yaml",
+    "drive.py": "fault_library/overlays/{name}/{entry}.py",
+    "scenario.yaml": "fault_library/scenarios/first.yaml",
+    "fault.yaml": "fault_library/faults/controller/value.yaml",
+    "campaign.yaml": "fault_library/campaigns/first.yaml",
+}
+
+
+def write_library_for(found: Survey, folder: Path) -> None:
+    """Write the files into a new or empty folder; MutatorError for one that holds anything."""
+    make_empty(folder)
+    words = _words(found, folder.resolve())
+    templates = Environment(
+        loader=PackageLoader("mutator.onboarding", "files"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # what is written is YAML, Python and Markdown
+    )
+    for template, place in _FILES.items():
+        path = folder / place.format(name=words["name"], entry=words["entry"])
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = templates.get_template(f"{template}.j2").render(words)
+        path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
+
+
+def _words(found: Survey, folder: Path) -> dict[str, Any]:
+    """What the templates say."""
+    candidates = loop_candidates(found)[:MOST_SHOWN]
+    title = found.installed or (found.packages[0] if len(found.packages) == 1 else found.root.name)
+    name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower() or "controller"
+    taken = {package.removesuffix(".py") for package in found.packages}
+    only = found.packages[0] if len(found.packages) == 1 else ""
+    manifest = folder / "fault_library" / "targets"
+    return {
+        "name": name,
+        "title": f"The controller in {found.root.name}",
+        "entry": next(name for name in ("drive", "drive_loop", "drive_closed_loop") if name not in taken),
+        "installed": found.installed,
+        "requires": found.requires,
+        "root": os.path.relpath(found.root, manifest),
+        "root_shown": found.installed or found.root.name,
+        "where": f"the installed package {found.installed}" if found.installed else f"`{found.root.name}`",
+        "package": only if not only.endswith(".py") else "",
+        "packages": found.packages,
+        "count": counted(len(found.modules), "file") + " of Python",
+        "unread": found.unread[:MOST_SHOWN],
+        "mark": MARK,
+        "candidates": candidates,
+        **_of_loop(candidates[0] if candidates else None),
+    }
+
+
+def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
+    """What the entry and the first fault say of the likeliest step of the loop."""
+    if best is None:
+        return dict.fromkeys(
+            ("module", "imported", "builder", "call", "path", "function", "value", "others"), ""
+        ) | {
+            "run": "Drive",
+            "thing": "the controller",
+            "builds": (),
+            "build_arguments": "",
+        }
+    called = "self.controller" if best.owner else best.function
+    if best.owner and best.function != "__call__":
+        called += f".{best.function}"
+    first, *rest = best.values or (None,)
+    places = ", ".join(f"{value.name} (line {value.line})" for value in rest[:MOST_SHOWN])
+    return {
+        "module": best.module,
+        "imported": best.owner or best.function,
+        "run": "Drive" if best.owner != "Drive" else "Loop",
+        "thing": best.name,
+        "builder": best.owner or "",
+        "builds": best.builds,
+        "build_arguments": ", ".join(f"{argument}=..." for argument in best.builds),
+        "call": f"{called}({_arguments(best)})",
+        "path": best.path,
+        "function": best.name,
+        "value": first,
+        "others": f"Others of {best.name}: {places}" if places else f"{best.path}:{best.line} has no other",
+    }
+
+
+def _arguments(best: LoopCandidate) -> str:
+    """The state for the first argument that is needed, a place to fill in for every other but a time step."""
+    first, *others = best.needs or ("",)
+    texts = [f"{name}={'self.step_s' if name in _TIME_STEPS else '...'}" for name in others]
+    return ", ".join(["state", *texts]) if first else ""

@@ -1,0 +1,142 @@
+"""What a source tree holds: its packages, its flat modules and their syntax trees. Nothing is imported."""
+
+import ast
+import importlib.util
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from mutator.errors import MutatorError
+
+INSTALLED = "installed:"
+_MOST_FILES = 5000
+_NOT_THE_CONTROLLER = {
+    *("test", "tests", "testing", "doc", "docs", "example", "examples", "benchmark", "benchmarks", "scripts"),
+    *("build", "dist", "node_modules", "site-packages", "venv", "env", "__pycache__"),
+}
+_NO_MODULES = {"setup.py", "conftest.py", "noxfile.py", "__init__.py", "__main__.py"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Module:
+    """A file of Python: its path relative to the root, and its syntax tree."""
+
+    path: str
+    tree: ast.Module
+
+    @property
+    def name(self) -> str:
+        """What it is imported as."""
+        return self.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """A source tree, as a manifest would name it.
+
+    `root` is the folder that goes on `sys.path`, `packages` are import packages and flat modules (`drive.py`)
+    in it. `modules` could be read, `unread` could not: path and line, and why. `requires` is the installed
+    distribution that the tree is of, as a requirement.
+    """
+
+    root: Path
+    packages: tuple[str, ...]
+    modules: tuple[Module, ...]
+    unread: tuple[tuple[str, str], ...] = ()
+    installed: str | None = None
+    requires: str | None = None
+
+
+def survey(target: str) -> Survey:
+    """Look at a folder, or at the package `installed:NAME`. MutatorError where there is no such thing."""
+    if target.startswith(INSTALLED):
+        return _installed(target.removeprefix(INSTALLED))
+    folder = Path(target).resolve()
+    if not folder.is_dir():
+        raise MutatorError(
+            f"no folder {target}",
+            argument="target",
+            expected=f"the folder that holds a controller's source, or {INSTALLED}NAME",
+            remedy="correct `target`",
+        )
+    if (folder / "__init__.py").exists():
+        return _of(folder.parent, (folder.name,))
+    if [*_packages_in(folder)] == ["src"] and not (folder / "src" / "__init__.py").exists():
+        folder /= "src"
+    return _of(folder, tuple(_packages_in(folder)))
+
+
+def _installed(name: str) -> Survey:
+    """The package or module that `import NAME` would find."""
+    spec = importlib.util.find_spec(name) if name.isidentifier() else None
+    origin = Path(spec.origin) if spec and spec.origin else None
+    if origin is None or origin.suffix != ".py":
+        raise MutatorError(
+            f"no installed package '{name}'",
+            argument="target",
+            expected="the name that Python code imports it by",
+            remedy="install it beside mutator, or correct the name",
+        )
+    is_package = origin.name == "__init__.py"
+    root = origin.parents[1] if is_package else origin.parent
+    found = _of(root, (name if is_package else origin.name,))
+    return Survey(
+        root=found.root,
+        packages=found.packages,
+        modules=found.modules,
+        unread=found.unread,
+        installed=name,
+        requires=_distribution(name),
+    )
+
+
+def _distribution(name: str) -> str | None:
+    """The installed distribution of an import package, and that it is at least of this version."""
+    owners = metadata.packages_distributions().get(name)
+    return f"{owners[0]}>={metadata.version(owners[0])}" if owners else None
+
+
+def _packages_in(folder: Path) -> Iterator[str]:
+    """Packages, with or without `__init__.py`, and flat modules of a folder, but for tests and the like."""
+    for path in sorted(folder.iterdir()):
+        stem = path.name.removesuffix(".py")
+        if not stem.isidentifier() or stem in _NOT_THE_CONTROLLER:
+            continue
+        if path.is_dir():
+            if any(_files(path)):
+                yield path.name
+        elif path.suffix == ".py" and path.name not in _NO_MODULES and not stem.startswith("test_"):
+            yield path.name
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """Files of Python below a folder, but for tests, hidden folders and environments."""
+    for place, folders, names in os.walk(folder):
+        folders[:] = sorted(n for n in folders if n.isidentifier() and n not in _NOT_THE_CONTROLLER)
+        if "pyvenv.cfg" in names:
+            folders.clear()
+            continue
+        yield from (Path(place, name) for name in sorted(names) if name.endswith(".py"))
+
+
+def _of(root: Path, packages: tuple[str, ...]) -> Survey:
+    modules: list[Module] = []
+    unread: list[tuple[str, str]] = []
+    for name in packages:
+        for path in [root / name] if name.endswith(".py") else _files(root / name):
+            if len(modules) + len(unread) == _MOST_FILES:
+                raise MutatorError(
+                    f"more than {_MOST_FILES} files of Python",
+                    where=root,
+                    expected="the source of one controller",
+                    remedy="name the folder of a part of it",
+                )
+            relative = path.relative_to(root).as_posix()
+            try:
+                modules.append(Module(path=relative, tree=ast.parse(path.read_bytes())))
+            except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
+                line = getattr(err, "lineno", None) or 1
+                unread.append((f"{relative}:{line}", getattr(err, "msg", None) or str(err)))
+    return Survey(root=root, packages=packages, modules=tuple(modules), unread=tuple(unread))

@@ -1,0 +1,35 @@
+"""The places of a generated library that are still for its owner to fill in."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from mutator.errors import MutatorError
+
+MARK = "TODO(init)"
+
+
+def unfilled(library: Path) -> Iterator[MutatorError]:
+    """Every line of the library's YAML and Python that has the mark, in the order of the files."""
+    for path in sorted(library.rglob("*")):
+        if path.suffix not in (".yaml", ".py") or not path.is_file():
+            continue
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        for number, line in enumerate(lines, 1):
+            _, mark, text = line.partition(f"# {MARK}:")
+            if mark:
+                yield MutatorError(
+                    f"not filled in: {_whole(text, lines[number:])}",
+                    where=path,
+                    line=number,
+                    remedy=f"do so, and delete the comment with {MARK}",
+                )
+
+
+def _whole(text: str, following: list[str]) -> str:
+    """A comment with the comments on the lines right below it."""
+    words = [text.strip()]
+    for line in map(str.strip, following):
+        if not line.startswith("# ") or MARK in line:
+            break
+        words.append(line.removeprefix("# "))
+    return " ".join(words)

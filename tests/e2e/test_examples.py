@@ -1,0 +1,105 @@
+"""The examples: other people's controllers, each from its installed package. Extra `examples`."""
+
+import csv
+import sys
+from collections import Counter
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.engines.jobs import RunMode
+from mutator.execution.running import run_campaign
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+pytestmark = pytest.mark.slow
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+INSTALLED = {"cartpole": "simple_pid", "highway": "highway_env", "opendbc": "opendbc"}
+ALSO = {"cartpole": "gymnasium"}
+MOST_GLUE, MOST_YAML = 25, 40  # lines
+FORKED = 0.95
+
+
+@pytest.fixture(scope="module", params=INSTALLED)
+def example(request: pytest.FixtureRequest) -> str:
+    """The name of an example whose packages are installed here."""
+    name: str = request.param
+    for package in (INSTALLED[name], ALSO.get(name, "numpy")):
+        if find_spec(package) is None:
+            pytest.skip(f"no {package} here: pip install 'mutator[examples]'")
+    return name
+
+
+@pytest.fixture(scope="module")
+def workspace(example: str) -> Workspace:
+    return Workspace.find(library=EXAMPLES / example / "fault_library")
+
+
+@pytest.fixture(scope="module")
+def run(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the example's first campaign."""
+    out = tmp_path_factory.mktemp("examples") / "run"
+    assert run_campaign(workspace, "first", out, workers=2).exit_code == 0
+    return out
+
+
+def rows(run: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((run / "results.csv").open()))
+
+
+def test_nothing_is_left_to_do(workspace: Workspace) -> None:
+    """`mutator check` finds nothing: no place is left to fill in, and each fault finds its statement."""
+    assert mutator.check_library(workspace) == []
+
+
+def test_every_experiment_ends_well(run: Path) -> None:
+    """No experiment ends by the harness's fault or in time; what crashes, crashes in the controller. Faults
+    do harm, and not all of them do."""
+    statuses = Counter(row["status"] for row in rows(run))
+    assert sum(statuses.values()) >= 40
+    assert set(statuses) <= {"ok", "crashed"}
+    assert len({row["outcome"] for row in rows(run)} & {"hazard", "sdc"}) == 2
+
+
+def test_nearly_all_are_forked(run: Path) -> None:
+    """Of the experiments that do not crash, at least 95 % are forks of the golden run."""
+    ended = {row["experiment_id"] for row in rows(run) if row["status"] == "ok"}
+    timings = RunFolder.open(run).timings()
+    forked = {name for name in ended if timings[name]["engine"] == RunMode.FORK}
+    assert len(forked) >= FORKED * len(ended)
+
+
+def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
+    """On the reference engine, where each experiment has an interpreter of its own, the results are the same
+    bytes; and so said the proof of the campaign itself."""
+    assert run_campaign(workspace, "first", tmp_path / "run", workers=2, engine="reference").exit_code == 0
+    for name in ("results.csv", "plan.csv"):
+        assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()
+
+
+def own_lines(folder: Path, suffix: str) -> Counter[str]:
+    """Lines of the files of a kind, but for comments and empty ones."""
+    lines = (
+        line.strip() for path in sorted(folder.rglob(f"*{suffix}")) for line in path.read_text().splitlines()
+    )
+    return Counter(line for line in lines if line and not line.startswith("#"))
+
+
+@pytest.mark.parametrize(("suffix", "most"), [(".py", MOST_GLUE), (".yaml", MOST_YAML)])
+def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp_path: Path) -> None:
+    """What an example has beyond the lines that `mutator init` writes for its package is short."""
+    mutator.init_library(tmp_path / "new", target=f"installed:{INSTALLED[example]}")
+    own = own_lines(EXAMPLES / example, suffix) - own_lines(tmp_path / "new", suffix)
+    assert 0 < own.total() <= most, f"{own.total()} lines"
+
+
+def test_the_extra_has_what_the_examples_need() -> None:
+    """On Pythons that opendbc supports, one extra installs the packages of all examples."""
+    text = (EXAMPLES.parent / "pyproject.toml").read_text(encoding="utf-8")
+    (line,) = [line for line in text.splitlines() if line.startswith("examples = ")]
+    for package in ("gymnasium", "highway-env", "opendbc", "simple-pid"):
+        assert f'"{package}>=' in line
+    assert sys.version_info < (3, 13) or "python_version < '3.13'" in line

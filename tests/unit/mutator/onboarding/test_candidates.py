@@ -1,0 +1,110 @@
+"""Which functions of a tree are guessed to be the step of a loop, and which values to be worth a fault."""
+
+import ast
+
+import pytest
+
+from mutator.onboarding.candidates import LoopCandidate, loop_candidates
+from mutator.onboarding.survey import Module, Survey
+
+CAR = '''
+class World:
+    def advance(self, gas):
+        self.speed = self.speed + gas
+        return self.speed
+
+
+class SpeedController:
+    def __init__(self, gain, *, limit, start=0.0):
+        self.gain, self.limit = gain, limit
+        self.i = start
+        self.last = 0.0
+
+    def update(self, speed, wanted, *, dt, trim=0.0):
+        """Gas for a speed."""
+        error = wanted - speed
+        self.i += error * dt
+        gas = self.gain * error + self.i
+        if gas > self.limit:
+            gas = self.limit
+        label = f"{gas} of {self.limit}"
+        self.log[0] = gas - 1
+        self._seen = gas + 1
+        state, other = gas, error
+        return gas
+
+    @property
+    def control(self):
+        x = 1 + 1
+        return x
+
+    def _step(self):
+        x = 2 * 3
+        return x
+
+
+def clip(x):
+    low = min(x, 1.0)
+    return low
+
+
+def run(controller, world):
+    for _ in range(10):
+        world.advance(controller.update(world.speed, 3.0, dt=0.1))
+'''
+
+
+def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
+    """What is guessed of these modules, by name."""
+    modules = tuple(Module(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
+    return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
+
+
+def test_the_controllers_step_comes_first() -> None:
+    """A step-like method of a class with state, called in a loop, is likelier than the world or a helper."""
+    first, *others = candidates(car=CAR)
+    assert (first.name, first.path, first.line) == ("SpeedController.update", "car.py", 14)
+    assert {one.name for one in others} == {"World.advance", "clip", "run"}
+
+
+def test_what_it_needs() -> None:
+    """Arguments without a default are needed, keyword ones too: those of the step, and of the constructor."""
+    first, *_ = candidates(car=CAR)
+    assert first.needs == ("speed", "wanted", "dt")
+    assert first.builds == ("gain", "limit")
+
+
+def test_values_are_numbers_that_have_a_name() -> None:
+    """Texts, items and unpacked tuples are no values; arithmetic on a name given once comes
+    first, and one given several times is told apart."""
+    first, *_ = candidates(car=CAR)
+    assert [(value.name, value.line, value.nth) for value in first.values] == [
+        ("error", 16, None),
+        ("self.i", 17, None),
+        ("self._seen", 23, None),
+        ("gas", 18, 1),
+        ("gas", 20, 2),
+    ]
+
+
+def test_values_of_inner_functions_are_not_the_steps() -> None:
+    """What a function inside assigns is no variable of the step, and loops and branches are."""
+    (step,) = candidates(
+        a="def step(x):\n    def inner():\n        deep = x + 1\n    while x:\n        x = x - 1\n    try:\n"
+        "        y = abs(x)\n    except ValueError:\n        z = x * 2\n    return inner\n"
+    )
+    assert {value.name for value in step.values} == {"x", "y", "z"}
+
+
+def test_a_file_named_for_a_controller_counts() -> None:
+    """Of two equal functions, the one in a file named for a controller comes first."""
+    source = "def step(x):\n    y = x + 1\n    return y\n"
+    assert [one.path for one in candidates(a=source, pilot=source)] == ["pilot.py", "a.py"]
+
+
+@pytest.mark.parametrize(
+    "source", ["", "x = 1\n", "def step(x):\n    '''Only words.'''\n", "class A:\n    pass\n"]
+)
+def test_nothing_to_step(source: str) -> None:
+    """Modules without functions that do something have no candidate."""
+    assert candidates(a=source) == ()

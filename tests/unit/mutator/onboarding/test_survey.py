@@ -1,0 +1,115 @@
+"""What a look at a source tree finds, which is read and never imported."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.onboarding.survey import survey
+
+Tree = Callable[..., Path]
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Tree:
+    """Writes files, path to text, below a folder."""
+
+    def write(**files: str) -> Path:
+        for name, text in files.items():
+            path = tmp_path / "tree" / name.replace("__", "/").replace("_py", ".py")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        return tmp_path / "tree"
+
+    (tmp_path / "tree").mkdir()
+    return write
+
+
+def test_packages_and_flat_modules(tree: Tree) -> None:
+    """Packages and flat modules are told apart; tests, setup scripts and folders without Python are none."""
+    folder = tree(
+        pkg__a_py="",
+        loose_py="",
+        setup_py="",
+        test_loose_py="",
+        tests__x_py="",
+        data__notes="",
+        build__y_py="",
+    )
+    found = survey(str(folder))
+    assert found.root == folder
+    assert found.packages == ("loose.py", "pkg")
+    assert [module.name for module in found.modules] == ["loose", "pkg.a"]
+
+
+def test_a_package_itself(tree: Tree) -> None:
+    """The folder of a package means the package, in the folder above it."""
+    folder = tree(pkg__a_py="x = 1\n")
+    (folder / "pkg" / "__init__.py").touch()
+    found = survey(str(folder / "pkg"))
+    assert (found.root, found.packages) == (folder, ("pkg",))
+    assert [module.name for module in found.modules] == ["pkg", "pkg.a"]
+
+
+def test_a_src_layout(tree: Tree) -> None:
+    """A project that keeps its package in src/ has its root there."""
+    folder = tree(src__pkg__a_py="", setup_py="")
+    found = survey(str(folder))
+    assert (found.root, found.packages) == (folder / "src", ("pkg",))
+
+
+def test_an_empty_folder(tree: Tree) -> None:
+    """Where there is nothing, nothing is found."""
+    assert survey(str(tree())).packages == ()
+
+
+def test_what_cannot_be_read_is_told(tree: Tree) -> None:
+    """A file with a syntax error, or that is no text, is left out, with place and reason."""
+    folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
+    (folder / "binary.py").write_bytes(b"\0\xff")
+    found = survey(str(folder))
+    assert [module.path for module in found.modules] == ["good.py"]
+    assert [place for place, _ in found.unread] == ["bad.py:2", "binary.py:1"]
+    assert all(why for _, why in found.unread)
+
+
+def test_nothing_is_imported(tree: Tree) -> None:
+    """A tree that does harm when it is imported does none."""
+    tree(harm_py="raise SystemExit('imported')\n")
+    assert survey(str(tree())).packages == ("harm.py",)
+    assert "harm" not in sys.modules
+
+
+def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
+    """A virtual environment below a package, under whatever name, and hidden folders are left out."""
+    folder = tree(pkg__a_py="", pkg__own__lib_py="")
+    (folder / "pkg" / "own" / "pyvenv.cfg").touch()
+    (folder / "pkg" / ".hidden").mkdir()
+    (folder / "pkg" / ".hidden" / "b.py").touch()
+    assert [module.path for module in survey(str(folder)).modules] == ["pkg/a.py"]
+
+
+def test_an_installed_package() -> None:
+    """`installed:NAME` is found without an import, with the requirement that it fulfils."""
+    found = survey("installed:typer")
+    assert found.packages == ("typer",)
+    assert found.requires and found.requires.startswith("typer>=")
+    assert any(module.name == "typer.main" for module in found.modules)
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("/nowhere/at/all", "no folder"),
+        ("installed:nowhere_at_all", "no installed package 'nowhere_at_all'"),
+        ("installed:../x", "no installed package"),
+        ("installed:math", "no installed package 'math'"),
+    ],
+)
+def test_what_is_not_there_is_told(target: str, words: str) -> None:
+    """A missing folder or package, or one without Python source, is the user's mistake, with a remedy."""
+    with pytest.raises(MutatorError, match=words) as told:
+        survey(target)
+    assert told.value.remedy

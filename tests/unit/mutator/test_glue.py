@@ -1,0 +1,194 @@
+"""The glue of a target's entry module: how a run is opened, driven, recorded and written."""
+
+import json
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mutator.glue import GlueError, Run, read_scenario, seed_globals
+
+
+class Ball(Run):
+    """A ball that falls, and is caught where it is to be."""
+
+    def __init__(self, scenario, seed):
+        super().__init__(step_s=0.1, duration_s=scenario["duration_s"])
+        self.height = scenario["height_m"] + 0.001 * seed
+        self.caught = scenario["caught"]
+
+    def step(self):
+        self.height -= 1.0
+        lies = self.height <= 0.0
+        self.hazard("LIES", lies)
+        self.hazard("FLIES", False)
+        self.alert("low", 1.0 < self.height < 3.0 or self.height < 0.0)
+        if lies and self.caught:
+            self.end()
+        self.record(height=self.height, lies=lies)
+
+
+@pytest.fixture
+def arguments(tmp_path: Path) -> list[str]:
+    """What starts a run of the ball."""
+    scenario = tmp_path / "drop.yaml"
+    scenario.write_text(
+        "about: A drop: from 4 m  # not far\n\n# times\nduration_s: 0.6\nheight_m: 4\ncaught: false\n"
+    )
+    out = tmp_path / "out"
+    out.mkdir()
+    return ["--scenario", str(scenario), "--seed", "0", "--out", str(out)]
+
+
+def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, object]]:
+    """Trace and record of a run."""
+    Ball.main(arguments)
+    out = Path(arguments[5])
+    with np.load(out / "trace.npz") as trace:
+        return {name: trace[name].tolist() for name in trace}, json.loads((out / "record.json").read_text())
+
+
+def test_a_run_leaves_a_row_for_each_step(arguments: list[str]) -> None:
+    """The trace has time and every channel of every step; the record has when a hazard first came (null: it
+    did not) and when each alert began."""
+    trace, record = driven(arguments)
+    assert list(trace) == ["t", "height", "lies"]
+    assert trace["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert trace["height"] == [3.0, 2.0, 1.0, 0.0, -1.0, -2.0]
+    assert trace["lies"] == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+    assert record["hazards"] == {"LIES": pytest.approx(0.3), "FLIES": None}
+    assert record["alerts"] == [{"name": "low", "t": 0.1}, {"name": "low", "t": pytest.approx(0.4)}]
+
+
+def test_a_run_may_end_early(arguments: list[str]) -> None:
+    """The step in which `end` is called is the last, and is recorded."""
+    trace, _ = driven([*arguments, "--caught"])
+    assert trace["height"][-1] == 0.0
+
+
+def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
+    """Neither trace nor record has anything of when or how often it was written; nothing else is left."""
+    out = Path(arguments[5])
+    files = []
+    for _ in range(2):
+        driven(arguments)
+        files.append({path.name: path.read_bytes() for path in out.iterdir()})
+    assert files[0] == files[1]
+    assert set(files[0]) == {"trace.npz", "record.json"}
+
+
+def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path: Path) -> None:
+    """An engine that drives step by step, into a folder of its own, gets the same bytes."""
+    driven(arguments)
+    run = Ball.open(arguments)
+    while not run.done:
+        run.step()
+    run.write(tmp_path)
+    for name in ("trace.npz", "record.json"):
+        assert (tmp_path / name).read_bytes() == (Path(arguments[5]) / name).read_bytes()
+
+
+@pytest.mark.parametrize("flags", [["--height-m", "-2"], ["--height_m=-2"]])
+def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], flags: list[str]) -> None:
+    """A further flag with a value replaces a key of the scenario: a change needs no code."""
+    trace, _ = driven([*arguments, *flags])
+    assert trace["height"][0] == -3.0
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--heigth_m", "3"], "drop.yaml: no 'heigth_m', only about, duration_s, height_m, caught"),
+        (["3"], "argument '3'"),
+        (["--seed", "-1"], "--seed -1; expected a whole number"),
+        (["--seed"], "no --seed"),
+        (["--duration_s", "0.01"], "one step at least"),
+    ],
+)
+def test_a_wrong_argument_is_told(arguments: list[str], flags: list[str], words: str) -> None:
+    """What a run cannot be started with is named, and what was expected."""
+    with pytest.raises(GlueError) as told:
+        Ball.main([*arguments, *flags])
+    assert words in str(told.value)
+
+
+def test_values_of_a_scenario(tmp_path: Path) -> None:
+    """Values are those of JSON, and else text, colons included."""
+    path = tmp_path / "a.yaml"
+    path.write_text('a: 1\nb: 2.5\nc: true\nd: null\ne: [1, 2]\nf: {"x": 1}\ng: a: b\nh: "1"\ni: a#b\n')
+    expected = {
+        "a": 1,
+        "b": 2.5,
+        "c": True,
+        "d": None,
+        "e": [1, 2],
+        "f": {"x": 1},
+        "g": "a: b",
+        "h": "1",
+        "i": "a#b",
+    }
+    assert read_scenario(path) == expected
+
+
+@pytest.mark.parametrize("line", ["- a", "a:", "  b: 1", "a 1", "first: 2"])
+def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> None:
+    """A line that is no `key: value`, or a key that was there before, is told by file and line."""
+    path = tmp_path / "a.yaml"
+    path.write_text(f"first: 1\n{line}\n")
+    with pytest.raises(GlueError, match=r"a\.yaml:2: '.*'; expected `key: value`"):
+        read_scenario(path)
+
+
+@pytest.mark.parametrize("later", [{"b": 1.0}, {}, {"a": 1.0, "b": 2.0}])
+def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
+    """A step that records other channels than the first one is a mistake, which is told."""
+    run = Run(step_s=0.5, duration_s=1.0)
+    run.record(a=1.0)
+    with pytest.raises(GlueError, match=r"at 0.5 s: channels [ab]"):
+        run.record(**later)
+
+
+def test_time_is_recorded_anyhow() -> None:
+    """A channel of the name of time would be lost, and is refused."""
+    with pytest.raises(GlueError, match="without t"):
+        Run(step_s=0.5, duration_s=1.0).record(t=1.0)
+
+
+@pytest.mark.parametrize("rows", [0, 2])
+def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that records nothing would never end, one that records twice has two times: it is told."""
+    monkeypatch.setattr(Ball, "step", lambda run: [run.record(a=1.0) for _ in range(rows)])
+    with pytest.raises(GlueError, match=f"recorded {rows} rows"):
+        Ball.main(arguments)
+
+
+def test_a_run_without_a_step_says_so(arguments: list[str]) -> None:
+    """`step` is for the subclass to write."""
+    with pytest.raises(NotImplementedError, match="Run has no step"):
+        Run(step_s=1.0, duration_s=1.0).step()
+
+
+def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
+    """The generators of the process are as they were after a run, and are seeded by `seed_globals` alone."""
+    before = random.getstate()
+    driven(arguments)
+    assert random.getstate() == before
+    draws = []
+    for _ in range(2):
+        seed_globals(7)
+        draws.append((random.random(), np.random.random()))
+    assert draws[0] == draws[1]
+
+
+def test_the_glue_needs_numpy_alone() -> None:
+    """Importing it loads nothing of the harness, and no package but numpy."""
+    code = (
+        "import numpy, sys; known = set(sys.modules); import mutator.glue; print(*sys.modules.keys() - known)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    own = {"mutator", "mutator._common", "mutator._common.version", "mutator.glue"}
+    assert {name for name in loaded if name.partition(".")[0] not in sys.stdlib_module_names} == own
