@@ -7,13 +7,13 @@ The entry module of a target is a class that builds the loop and drives one step
     class Drive(Run):
         def __init__(self, scenario, seed):
             super().__init__(step_s=0.02, duration_s=scenario["duration_s"])
-            self.car, self.controller = Car(scenario["speed_mps"]), Controller()
+            self.cart, self.controller = Cart(scenario["speed_mps"]), Controller()
 
         def step(self):
-            distance = self.car.distance()
-            brake = self.controller.update(distance)
-            self.car.advance(brake)
-            self.record(distance=distance, brake=brake)
+            distance = self.cart.distance()
+            force = self.controller.update(distance)
+            self.cart.advance(force)
+            self.record(distance=distance, force=force)
 
     if __name__ == "__main__":
         Drive.main()

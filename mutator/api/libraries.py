@@ -10,8 +10,8 @@ from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.onboarding.new_library import write_library_for
-from mutator.onboarding.survey import survey
-from mutator.onboarding.unfilled import unfilled
+from mutator.onboarding.survey import look_at
+from mutator.onboarding.unfilled import left_to_fill
 from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
@@ -36,13 +36,13 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
     if target is None:
         write_library(Path(folder))
     else:
-        write_library_for(survey(os.fspath(target)), Path(folder))
+        write_library_for(look_at(os.fspath(target)), Path(folder))
     return Path(folder)
 
 
 def unfilled_places(folder: str | Path) -> list[MutatorError]:
     """The places of a library's folder that are still to be filled in."""
-    return list(unfilled(Path(folder)))
+    return list(left_to_fill(Path(folder)))
 
 
 def upgrade_manifest(path: str | Path) -> Upgrade | None:

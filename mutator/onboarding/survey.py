@@ -49,7 +49,7 @@ class Survey:
     requires: str | None = None
 
 
-def survey(target: str) -> Survey:
+def look_at(target: str) -> Survey:
     """Look at a folder, or at the package `installed:NAME`. MutatorError where there is no such thing."""
     if target.startswith(INSTALLED):
         return _installed(target.removeprefix(INSTALLED))

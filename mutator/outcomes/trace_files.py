@@ -97,7 +97,7 @@ def _read_mcap(path: Path, steps: str, channels: Iterable[Channel]) -> Arrays:
     try:
         from mcap.reader import make_reader
     except ImportError:
-        raise BadTrace("an .mcap file, and no package mcap", "pip install 'mutator[mcap]'") from None
+        raise BadTrace("an .mcap file, and no package mcap", "pip install mcap") from None
     places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}
     topics = {steps, *(topic for topic, _ in places.values())}
     seen: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}

@@ -82,7 +82,7 @@ class TraceModel(StrictModel, title="The trace"):
     file: str = Field(
         "trace.npz",
         description="Its name in `{out}`: an `.npz` with an array for each channel, a `.csv` or `.parquet` "
-        "with a column for each, or an `.mcap` with JSON messages (`pip install 'mutator[mcap]'`).",
+        "with a column for each, or an `.mcap` with JSON messages (`pip install mcap`).",
     )
     time: str = Field(
         "t",

@@ -81,7 +81,7 @@ class HazardModel(StrictModel, title="A hazard"):
     stl: str | None = Field(
         None,
         description="Instead of `when`: a formula of signal temporal logic that must hold, as rtamt has it "
-        "(`pip install 'mutator[stl]'`). The hazard comes at the first step where it does not.",
+        "(`pip install rtamt`). The hazard comes at the first step where it does not.",
     )
     for_s: float = Field(
         0.0, ge=0.0, allow_inf_nan=False, description="How long it must last to be a hazard."

@@ -1,4 +1,4 @@
-"""Signal temporal logic, as rtamt reads it: an extra (`pip install 'mutator[stl]'`)."""
+"""Signal temporal logic, as rtamt reads it: an extra (`pip install rtamt`)."""
 
 import re
 from collections.abc import Collection, Mapping
@@ -44,7 +44,7 @@ def _parsed(formula: str, variables: Collection[str], step_s: float) -> Any:
         raise MutatorError(
             "a formula of signal temporal logic, and no rtamt to read it",
             expected="the package rtamt",
-            remedy="pip install 'mutator[stl]', or say it with `when`",
+            remedy="pip install rtamt, or say it with `when`",
         ) from None
     specification = rtamt.StlDiscreteTimeSpecification()
     for name in (*names_in(formula, variables), _OUT):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.onboarding.survey import survey
+from mutator.onboarding.survey import look_at
 
 Tree = Callable[..., Path]
 
@@ -38,7 +38,7 @@ def test_packages_and_flat_modules(tree: Tree) -> None:
         data__notes="",
         build__y_py="",
     )
-    found = survey(str(folder))
+    found = look_at(str(folder))
     assert found.root == folder
     assert found.packages == ("loose.py", "pkg")
     assert [module.name for module in found.modules] == ["loose", "pkg.a"]
@@ -48,7 +48,7 @@ def test_a_package_itself(tree: Tree) -> None:
     """The folder of a package means the package, in the folder above it."""
     folder = tree(pkg__a_py="x = 1\n")
     (folder / "pkg" / "__init__.py").touch()
-    found = survey(str(folder / "pkg"))
+    found = look_at(str(folder / "pkg"))
     assert (found.root, found.packages) == (folder, ("pkg",))
     assert [module.name for module in found.modules] == ["pkg", "pkg.a"]
 
@@ -56,20 +56,20 @@ def test_a_package_itself(tree: Tree) -> None:
 def test_a_src_layout(tree: Tree) -> None:
     """A project that keeps its package in src/ has its root there."""
     folder = tree(src__pkg__a_py="", setup_py="")
-    found = survey(str(folder))
+    found = look_at(str(folder))
     assert (found.root, found.packages) == (folder / "src", ("pkg",))
 
 
 def test_an_empty_folder(tree: Tree) -> None:
     """Where there is nothing, nothing is found."""
-    assert survey(str(tree())).packages == ()
+    assert look_at(str(tree())).packages == ()
 
 
 def test_what_cannot_be_read_is_told(tree: Tree) -> None:
     """A file with a syntax error, or that is no text, is left out, with place and reason."""
     folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
     (folder / "binary.py").write_bytes(b"\0\xff")
-    found = survey(str(folder))
+    found = look_at(str(folder))
     assert [module.path for module in found.modules] == ["good.py"]
     assert [place for place, _ in found.unread] == ["bad.py:2", "binary.py:1"]
     assert all(why for _, why in found.unread)
@@ -78,7 +78,7 @@ def test_what_cannot_be_read_is_told(tree: Tree) -> None:
 def test_nothing_is_imported(tree: Tree) -> None:
     """A tree that does harm when it is imported does none."""
     tree(harm_py="raise SystemExit('imported')\n")
-    assert survey(str(tree())).packages == ("harm.py",)
+    assert look_at(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules
 
 
@@ -88,12 +88,12 @@ def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
     (folder / "pkg" / "own" / "pyvenv.cfg").touch()
     (folder / "pkg" / ".hidden").mkdir()
     (folder / "pkg" / ".hidden" / "b.py").touch()
-    assert [module.path for module in survey(str(folder)).modules] == ["pkg/a.py"]
+    assert [module.path for module in look_at(str(folder)).modules] == ["pkg/a.py"]
 
 
 def test_an_installed_package() -> None:
     """`installed:NAME` is found without an import, with the requirement that it fulfils."""
-    found = survey("installed:typer")
+    found = look_at("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")
     assert any(module.name == "typer.main" for module in found.modules)
@@ -111,5 +111,5 @@ def test_an_installed_package() -> None:
 def test_what_is_not_there_is_told(target: str, words: str) -> None:
     """A missing folder or package, or one without Python source, is the user's mistake, with a remedy."""
     with pytest.raises(MutatorError, match=words) as told:
-        survey(target)
+        look_at(target)
     assert told.value.remedy
