@@ -98,6 +98,7 @@ def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: So
             ("trace", "file"),
             f"'{trace.file}'",
             expected=f"a bare file name, made in {{out}}, that ends in {', '.join(SUFFIXES)}",
+            remedy="have the run write one of these, and name it",
         )
     if not any(model.role is Role.ACTUATOR for model in models.values()):
         raise source.error(

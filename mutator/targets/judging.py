@@ -196,6 +196,7 @@ def _metric(name: str, model: MetricModel, known: Collection[str], source: Sourc
             keys,
             f"metric '{name}' with {' and '.join(given) or 'no aggregate'}",
             expected=f"one of {', '.join(_AGGREGATES)}",
+            remedy="make a metric of each",
         )
     (aggregate,) = given
     check = _condition if aggregate == "duration" else _formula

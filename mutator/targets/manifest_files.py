@@ -215,12 +215,27 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
 def _check_names(model: ManifestModel, source: Source) -> None:
     for key, command in (("entry", model.entry), ("film", model.film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
-            raise source.error((key, "module"), f"'{command.module}'", expected="a dotted module name")
+            raise source.error(
+                (key, "module"),
+                f"'{command.module}'",
+                expected="a dotted module name",
+                remedy="write it as after `python -m`: package.module",
+            )
     stepwise = model.entry.stepwise
     if stepwise is not None and not all(part.isidentifier() for part in stepwise.split(".")):
-        raise source.error(("entry", "stepwise"), f"'{stepwise}'", expected="a function of the entry module")
+        raise source.error(
+            ("entry", "stepwise"),
+            f"'{stepwise}'",
+            expected="a function of the entry module",
+            remedy="write its name alone, as `open_run` or `Drive.open`",
+        )
     if model.record is not None and Path(model.record).name != model.record:
-        raise source.error(("record",), f"'{model.record}'", expected="a bare file name, made in {out}")
+        raise source.error(
+            ("record",),
+            f"'{model.record}'",
+            expected="a bare file name, made in {out}",
+            remedy="leave out the folder",
+        )
 
 
 def _check_placeholders(model: ManifestModel, source: Source) -> None:

@@ -63,7 +63,12 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
         )
     if package is not None:
         if not package.isidentifier():
-            raise source.error(("package",), f"'{package}'", expected="a Python package's name")
+            raise source.error(
+                ("package",),
+                f"'{package}'",
+                expected="a Python package's name",
+                remedy="write it as `import` does",
+            )
         return (package,)
     names = tuple(packages or ())
     seen = {PROBE_NAME}

@@ -80,7 +80,10 @@ def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Sce
     """The scene of a manifest, `known` being the names that formulas may use; MutatorError with the line."""
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
-            ("scene", "follow"), f"'{model.follow}'", expected=f"one of {', '.join(model.actors)}"
+            ("scene", "follow"),
+            f"'{model.follow}'",
+            expected=f"one of {', '.join(model.actors)}",
+            remedy="correct the name",
         )
     actors = tuple(_actor(name, actor, known, source) for name, actor in model.actors.items())
     lines = tuple(_line(name, line, known, source) for name, line in model.lines.items())
@@ -107,10 +110,14 @@ def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source
 def _line(name: str, model: _LineModel, known: Collection[str], source: Source) -> Line:
     keys: Keys = ("scene", "lines", name)
     if (model.points_m is None) == (model.y is None):
-        raise source.error(keys, f"line '{name}'", expected="either `points_m` or `y`")
+        raise source.error(
+            keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="say one of them"
+        )
     for i, point in enumerate(model.points_m or ()):
         if len(point) != 2:
-            raise source.error((*keys, "points_m", i), f"{point}", expected="[x, y]")
+            raise source.error(
+                (*keys, "points_m", i), f"{point}", expected="[x, y]", remedy="give both numbers, in m"
+            )
     return Line(
         name=name,
         points=tuple((x, y) for x, y in model.points_m or ()),
