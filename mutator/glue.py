@@ -114,9 +114,11 @@ class Run:
     def alert(self, name: str, now: bool) -> None:
         """Say whether the controller alerts its driver: to be called in each step, before `record`. Each time
         that an alert begins counts."""
-        if now and name not in self.__alerting:
+        if not now:
+            self.__alerting.discard(name)
+        elif name not in self.__alerting:
+            self.__alerting.add(name)
             self.__alerts.append({"name": name, "t": self.t})
-        (self.__alerting.add if now else self.__alerting.discard)(name)
 
     def write(self, out: Path) -> None:
         """Write the trace, then the record, into the folder `out`: of equal runs, equal bytes."""
@@ -137,6 +139,8 @@ class Run:
         given = _options(arguments)
         subclass: Any = cls
         run: Self = subclass(_scenario(given), _seed(given))
+        if not hasattr(run, "_Run__rows"):
+            raise GlueError(f"{cls.__name__}.__init__ has no super().__init__(step_s=..., duration_s=...)")
         return run
 
     @classmethod

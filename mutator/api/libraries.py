@@ -9,9 +9,9 @@ from mutator._common.files import write_atomic
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
+from mutator.onboarding.marks import unfilled
 from mutator.onboarding.new_library import write_library_for
 from mutator.onboarding.survey import look_at
-from mutator.onboarding.unfilled import left_to_fill
 from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
@@ -42,7 +42,7 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
 
 def unfilled_places(folder: str | Path) -> list[MutatorError]:
     """The places of a library's folder that are still to be filled in."""
-    return list(left_to_fill(Path(folder)))
+    return list(unfilled(Path(folder)))
 
 
 def upgrade_manifest(path: str | Path) -> Upgrade | None:

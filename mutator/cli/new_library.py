@@ -27,9 +27,11 @@ def register(app: typer.Typer) -> None:
 
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new or empty folder.")],
-    target: Annotated[
+    tree: Annotated[
         str | None,
-        typer.Option(metavar="TREE", help="The source of a controller: a folder, or installed:NAME."),
+        typer.Option(
+            "--target", metavar="TREE", help="The source of a controller: a folder, or installed:NAME."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -40,10 +42,10 @@ def init(
     that ship with mutator, for the controller that ships. In DIR and below, mutator uses them.
     """
     terminal = Terminal(as_json)
-    mutator.init_library(folder, target=target)
+    mutator.init_library(folder, target=tree)
     told: dict[str, Any] = {"folder": str(folder)}
     held = "fault_library/, templates/"
-    if target is not None:
+    if tree is not None:
         places = unfilled_places(folder)
         told["unfilled"] = [{"file": place.where, "line": place.line} for place in places]
         held = f"fault_library/ with {counted(len(places), 'place')} to fill in,"

@@ -1,17 +1,19 @@
 """Writes a first library for a source tree: manifest, entry, scenario, fault, campaign, README."""
 
+import json
 import os
 import re
 from pathlib import Path
 from typing import Any
 
+import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from mutator._common.shipped import make_empty
 from mutator._common.text import counted
 from mutator.onboarding.candidates import LoopCandidate, loop_candidates
+from mutator.onboarding.marks import MARK
 from mutator.onboarding.survey import Survey
-from mutator.onboarding.unfilled import MARK
 
 MOST_SHOWN = 5  # candidates for the loop; values of each
 _TIME_STEPS = ("dt", "delta_t", "time_step", "timestep")
@@ -37,6 +39,7 @@ def write_library_for(found: Survey, folder: Path) -> None:
         keep_trailing_newline=True,
         autoescape=False,  # what is written is YAML, Python and Markdown
     )
+    templates.filters["yaml"] = _as_yaml
     for template, place in _FILES.items():
         path = folder / place.format(name=words["name"], entry=words["entry"])
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -44,11 +47,18 @@ def write_library_for(found: Survey, folder: Path) -> None:
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
 
 
+def _as_yaml(text: str) -> str:
+    """A text as a YAML value: quoted where it would be something else."""
+    plain = re.fullmatch(r"[\w./][\w./ -]*", text) and yaml.safe_load(text) == text
+    return text if plain else json.dumps(text, ensure_ascii=False)
+
+
 def _words(found: Survey, folder: Path) -> dict[str, Any]:
     """What the templates say."""
     candidates = loop_candidates(found)[:MOST_SHOWN]
     title = found.installed or (found.packages[0] if len(found.packages) == 1 else found.root.name)
-    name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower() or "controller"
+    name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower()
+    name = name if name[:1].isalpha() else f"controller_{name}".strip("_")
     taken = {package.removesuffix(".py") for package in found.packages}
     only = found.packages[0] if len(found.packages) == 1 else ""
     manifest = folder / "fault_library" / "targets"

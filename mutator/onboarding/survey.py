@@ -1,16 +1,17 @@
 """What a source tree holds: its packages, its flat modules and their syntax trees. Nothing is imported."""
 
 import ast
-import importlib.util
+import keyword
 import os
+import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
 from mutator.errors import MutatorError
+from mutator.targets.roots import INSTALLED, installed_at
 
-INSTALLED = "installed:"
 _MOST_FILES = 5000
 _NOT_THE_CONTROLLER = {
     *("test", "tests", "testing", "doc", "docs", "example", "examples", "benchmark", "benchmarks", "scripts"),
@@ -70,26 +71,15 @@ def look_at(target: str) -> Survey:
 
 def _installed(name: str) -> Survey:
     """The package or module that `import NAME` would find."""
-    spec = importlib.util.find_spec(name) if name.isidentifier() else None
-    origin = Path(spec.origin) if spec and spec.origin else None
-    if origin is None or origin.suffix != ".py":
+    place = installed_at(name) if name.isidentifier() else None
+    if place is None:
         raise MutatorError(
             f"no installed package '{name}'",
             argument="target",
             expected="the name that Python code imports it by",
             remedy="install it beside mutator, or correct the name",
         )
-    is_package = origin.name == "__init__.py"
-    root = origin.parents[1] if is_package else origin.parent
-    found = _of(root, (name if is_package else origin.name,))
-    return Survey(
-        root=found.root,
-        packages=found.packages,
-        modules=found.modules,
-        unread=found.unread,
-        installed=name,
-        requires=_distribution(name),
-    )
+    return replace(_of(place.parent, (place.name,)), installed=name, requires=_distribution(name))
 
 
 def _distribution(name: str) -> str | None:
@@ -100,25 +90,46 @@ def _distribution(name: str) -> str | None:
 
 def _packages_in(folder: Path) -> Iterator[str]:
     """Packages, with or without `__init__.py`, and flat modules of a folder, but for tests and the like."""
-    for path in sorted(folder.iterdir()):
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be looked at ({err.strerror})", where=folder, remedy="check its permissions"
+        ) from None
+    for path in entries:
         stem = path.name.removesuffix(".py")
-        if not stem.isidentifier() or stem in _NOT_THE_CONTROLLER:
+        if not _importable(stem) or stem in _NOT_THE_CONTROLLER:
             continue
         if path.is_dir():
             if any(_files(path)):
                 yield path.name
-        elif path.suffix == ".py" and path.name not in _NO_MODULES and not stem.startswith("test_"):
+        elif _is_module(path) and path.name not in _NO_MODULES and not stem.startswith("test_"):
             yield path.name
 
 
 def _files(folder: Path) -> Iterator[Path]:
     """Files of Python below a folder, but for tests, hidden folders and environments."""
     for place, folders, names in os.walk(folder):
-        folders[:] = sorted(n for n in folders if n.isidentifier() and n not in _NOT_THE_CONTROLLER)
+        folders[:] = sorted(n for n in folders if _importable(n) and n not in _NOT_THE_CONTROLLER)
         if "pyvenv.cfg" in names:
             folders.clear()
             continue
-        yield from (Path(place, name) for name in sorted(names) if name.endswith(".py"))
+        yield from filter(_is_module, (Path(place, name) for name in sorted(names)))
+
+
+def _is_module(path: Path) -> bool:
+    """Whether a file can be imported, by its name."""
+    return path.suffix == ".py" and _importable(path.stem) and path.is_file()
+
+
+def _importable(name: str) -> bool:
+    return name.isidentifier() and not keyword.iskeyword(name)
+
+
+def _parsed(path: Path) -> ast.Module:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the controller's own style
+        return ast.parse(path.read_bytes())
 
 
 def _of(root: Path, packages: tuple[str, ...]) -> Survey:
@@ -135,7 +146,7 @@ def _of(root: Path, packages: tuple[str, ...]) -> Survey:
                 )
             relative = path.relative_to(root).as_posix()
             try:
-                modules.append(Module(path=relative, tree=ast.parse(path.read_bytes())))
+                modules.append(Module(path=relative, tree=_parsed(path)))
             except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
                 line = getattr(err, "lineno", None) or 1
                 unread.append((f"{relative}:{line}", getattr(err, "msg", None) or str(err)))

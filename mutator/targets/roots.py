@@ -25,7 +25,7 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
     name = root.removeprefix(INSTALLED)
     if not name.isidentifier():
         raise source.error(("root",), f"'{root}'", expected=f"{INSTALLED} and the name of an import package")
-    place = _place(name)
+    place = installed_at(name)
     if place is None:
         raise source.error(
             ("root",),
@@ -105,7 +105,7 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
             )
 
 
-def _place(name: str) -> Path | None:
+def installed_at(name: str) -> Path | None:
     """The folder or the file of an import package or module; None where there is no one such place."""
     try:
         found = find_spec(name)

@@ -20,7 +20,7 @@ from mutator.mutants.anchors import parse_file, parsed
 from mutator.mutants.building import build
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.splicing import apply_edits, joined, unsplice
-from mutator.onboarding.unfilled import left_to_fill
+from mutator.onboarding.marks import unfilled
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -42,7 +42,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     no gap.
     """
     found = _Found()
-    found.problems += left_to_fill(workspace.library)
+    found.problems += unfilled(workspace.library)
     manifest = found.tried(lambda: workspace.manifest(target))
     if manifest:
         found.tried(lambda: check_requirements(manifest))

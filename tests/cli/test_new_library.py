@@ -146,6 +146,21 @@ def test_check_lists_every_place_to_fill_in(
         assert sum(line.startswith(place) for line in lines) == 1, place
 
 
+@pytest.mark.parametrize("name", ["my tree: {v#2}", "123", "null", "1e3"])
+def test_a_tree_may_have_any_name(
+    name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What would be something else than a text in YAML is quoted: the manifest finds the tree."""
+    folder = nowhere / name
+    folder.mkdir()
+    for file in ("steer.py", "null.py"):
+        (folder / file).write_text(CONTROLLER)
+    cli("init", "faults", "--target", folder)
+    monkeypatch.chdir(nowhere / "faults")
+    answer = cli("check")
+    assert all("not filled in" in line for line in answer.out.splitlines()[:-1]), answer.out
+
+
 def test_marks_tell_all_that_their_comment_says(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

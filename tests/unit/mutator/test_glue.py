@@ -165,6 +165,17 @@ def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytes
         Ball.main(arguments)
 
 
+def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
+    """Whoever forgets to call the constructor of `Run` is told how."""
+
+    class Bare(Run):
+        def __init__(self, scenario, seed):
+            self.seed = seed
+
+    with pytest.raises(GlueError, match=r"Bare.__init__ has no super\(\).__init__\(step_s=..., "):
+        Bare.open(arguments)
+
+
 def test_a_run_without_a_step_says_so(arguments: list[str]) -> None:
     """`step` is for the subclass to write."""
     with pytest.raises(NotImplementedError, match="Run has no step"):

@@ -18,6 +18,18 @@ def test_a_library_is_made_once(tmp_path: Path) -> None:
         mutator.init_library(folder)
 
 
+def test_a_first_library_for_a_controller(tmp_path: Path) -> None:
+    """With a target the folder is a workspace with its manifest, whose problems are places to fill in."""
+    (tmp_path / "tree").mkdir()
+    (tmp_path / "tree" / "a.py").write_text("def control(x):\n    y = 2 * x\n    return y\n")
+    folder = mutator.init_library(tmp_path / "own", target=tmp_path / "tree")
+    workspace = mutator.Workspace.find(library=folder / "fault_library")
+    assert list(workspace.targets) == ["a"]
+    problems = mutator.check_library(workspace)
+    assert problems
+    assert all(problem.got.startswith("not filled in: ") and problem.line for problem in problems)
+
+
 def test_problems_of_a_library_are_a_list(toycar: Workspace) -> None:
     """A spec that is broken is one problem more, with its file."""
     before = {problem.where for problem in mutator.check_library(toycar)}

@@ -1,5 +1,6 @@
 """What a look at a source tree finds, which is read and never imported."""
 
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -80,6 +81,24 @@ def test_nothing_is_imported(tree: Tree) -> None:
     tree(harm_py="raise SystemExit('imported')\n")
     assert look_at(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules
+
+
+def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
+    """Files whose names are no names of modules, pipes and dangling links are left out."""
+    folder = tree(pkg__a_py="")
+    for name in ("b-c.py", "class.py"):
+        (folder / "pkg" / name).touch()
+    os.mkfifo(folder / "pkg" / "pipe.py")
+    (folder / "gone.py").symlink_to(folder / "nowhere")
+    found = look_at(str(folder))
+    assert found.packages == ("pkg",)
+    assert [module.path for module in found.modules] == ["pkg/a.py"]
+
+
+def test_its_warnings_are_its_own(tree: Tree, recwarn: pytest.WarningsRecorder) -> None:
+    """Python's remarks on the controller's style are not told."""
+    look_at(str(tree(odd_py="x = '\\d'\ny = 1 is 1\n")))
+    assert not recwarn.list
 
 
 def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:

@@ -166,6 +166,11 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("package: toycar", "package: toy-car", "4: 'toy-car'; expected a Python package's name"),
         ("module: toycar.run", "module: toycar/run", "9: 'toycar/run'; expected a dotted module name"),
         (
+            "  module: toycar.run",
+            "  module: toycar.run\n  stepwise: Run..open",
+            "10: 'Run..open'; expected a function of the entry module",
+        ),
+        (
             "file: trace.npz",
             "file: ../trace.npz",
             "12: '../trace.npz'; expected a bare file name",

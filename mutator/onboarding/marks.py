@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 MARK = "TODO(init)"
 
 
-def left_to_fill(library: Path) -> Iterator[MutatorError]:
+def unfilled(library: Path) -> Iterator[MutatorError]:
     """Every line of the library's YAML and Python that has the mark, in the order of the files."""
     for path in sorted(library.rglob("*")):
         if path.suffix not in (".yaml", ".py") or not path.is_file():

@@ -1,0 +1,85 @@
+"""Targets whose entry is made with the glue: found beside the harness that runs them, by either engine."""
+
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.engines.in_target.run_once import Harness
+from mutator.engines.jobs import RunMode
+from mutator.model import Status
+from mutator.triggers.kinds import at_time
+
+from ..fork_on_toy import Edit, Fork
+
+MANIFEST = "fault_library/targets/toycar.yaml"
+ENTRY = """
+import sys
+
+from mutator.glue import Run
+from toycar.driver import Driver
+from toycar.sensing import Sensor
+from toycar.world import World
+
+
+class Drive(Run):
+    def __init__(self, scenario, seed):
+        super().__init__(step_s=0.05, duration_s=scenario["steps"] * 0.05)
+        self.world, self.sensor, self.driver = World(scenario), Sensor(), Driver()
+        self.commands = (0.0, 0.0, 0.0)
+        print(sys.modules["mutator"].__file__)
+
+    def step(self):
+        world = self.world
+        now = world.advance(*self.commands)
+        world.judge(now)
+        self.sensor.sense(world)
+        self.commands = gas, brake, wheel_turn = self.driver.drive(now, world.speed, self.sensor.reading)
+        self.record(gap=world.gap, speed=world.speed, gas=gas, brake=brake, wheel_turn=wheel_turn)
+
+
+if __name__ == "__main__":
+    Drive.main()
+"""
+
+
+@pytest.fixture
+def glued(fork: Fork, edit: Edit) -> Fork:
+    """The toy, driven by an entry that is made with the glue."""
+    (fork.toy.library.parent / "tree" / "toycar" / "go.py").write_text(ENTRY)
+    edit(
+        MANIFEST,
+        '["{scenario}", --to, "{out}", --number, "{seed}"]',
+        "[--scenario, '{scenario}', --seed, '{seed}', --out, '{out}']",
+    )
+    edit(MANIFEST, "stepwise: begin", "stepwise: Drive.open")
+    edit(MANIFEST, "trace: {file: log.npz, time: time}", "trace: {file: trace.npz, time: t}")
+    edit(MANIFEST, "record: said.json", "record: record.json")
+    return fork
+
+
+def test_both_engines_drive_the_same(glued: Fork) -> None:
+    """A run that an engine steps, forks and writes comes to the bytes of one in a fresh interpreter."""
+    job = glued.job(at_time(2.0))
+    forked = glued.engine.execute(job, glued.folder / "work" / "forked")
+    plain = glued.engine.reference.execute(job, glued.folder / "plain")
+    assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
+    assert plain.status is Status.OK
+    assert plain.probe and plain.probe["triggered"]
+    for name in ("trace.npz", "record.json"):
+        assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
+
+
+def test_the_glue_is_that_of_the_harness(glued: Fork) -> None:
+    """A run imports it from beside the harness that drives it, whichever mutator is installed, and its
+    report does not take that for a package of the target's."""
+    plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
+    assert Path(plain.log.strip()) == Path(mutator.__file__)
+    assert "mutator" not in plain.modules
+    assert "numpy" in plain.modules
+
+
+def test_nothing_else_is_found_there() -> None:
+    """The harness offers itself, not what lies beside it."""
+    assert Harness.find_spec("tests") is None
+    assert Harness.find_spec("mutator.glue") is None
