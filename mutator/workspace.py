@@ -207,9 +207,9 @@ class Workspace:
         """The context tables of the library by name; `context_table` reads one."""
         return self._files("stpa/contexts")
 
-    def context_table(self, name: str | Path) -> ContextTable:
-        """The context table `name`, or the table of that path."""
-        return load_context_table(self._file("stpa/contexts", name, "context table"))
+    def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
+        """The context table `name`, or the table of that path; `variables` are what a target observes."""
+        return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:
         """Accidents and hazards of fault_library/stpa/hazards.yaml; None where there is no such file."""

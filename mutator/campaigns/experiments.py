@@ -124,8 +124,8 @@ class Expansion:
                 hold_s=self.campaign.hold_s,
             )
         with self._placed(("triggers", "table")):
-            table = self.workspace.context_table(self.campaign.table)
-            table.check(self.manifest.observation.variables)
+            variables = self.manifest.observation.variables
+            table = self.workspace.context_table(self.campaign.table, variables)
         with self._placed(("triggers", "rows")):
             return table.triggers(
                 hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.rows

@@ -1,7 +1,7 @@
 """STPA as data: hazards and context tables, from which the guided triggers come."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,15 +51,7 @@ class ContextTable:
 
     def check(self, variables: Collection[str]) -> None:
         """MutatorError, with its line, for a row that asks for what is not among the target's variables."""
-        for row in self.rows:
-            unknown = [name for name in names_in(row.condition) if name not in variables]
-            if unknown:
-                raise self.source.error(
-                    ("contexts", row.id, "when"),
-                    f"unknown name '{unknown[0]}' in '{row.condition}'",
-                    expected=f"what the target observes: {', '.join(variables)}",
-                    remedy="correct it, or add it to `observation` in the target's manifest",
-                )
+        _check_names(self.rows, variables, self.source)
 
     def triggers(
         self,
@@ -137,8 +129,9 @@ class HazardsModel(StrictModel, title="hazards.yaml"):
     hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")
 
 
-def load_context_table(path: Path) -> ContextTable:
-    """Read a context table; every condition is checked as a trigger condition.
+def load_context_table(path: Path, variables: Collection[str] | None = None) -> ContextTable:
+    """Read a context table; every condition is checked as a trigger condition, over the target's `variables`
+    (None: any, `ContextTable.check` tells later).
 
     MutatorError also for contexts that leave something uncovered or overlap, where that can be proved, and
     for rows that do not judge the same control actions.
@@ -161,6 +154,8 @@ def load_context_table(path: Path) -> ContextTable:
         )
         for name, row in model.contexts.items()
     )
+    if variables is not None:
+        _check_names(rows, variables, source)
     _check_actions(rows, source)
     return ContextTable(
         name=model.name,
@@ -171,6 +166,18 @@ def load_context_table(path: Path) -> ContextTable:
         coverage=_covered_once(rows, source),
         source=source,
     )
+
+
+def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source: Source) -> None:
+    for row in rows:
+        unknown = [name for name in names_in(row.condition) if name not in variables]
+        if unknown:
+            raise source.error(
+                ("contexts", row.id, "when"),
+                f"unknown name '{unknown[0]}' in '{row.condition}'",
+                expected=f"what the target observes: {', '.join(variables)}",
+                remedy="correct it, or add it to `observation` in the target's manifest",
+            )
 
 
 def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:

@@ -87,7 +87,7 @@ def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
     """The manifest's `film` may be missing; then the error says what to write there."""
     manifest = root / "fault_library/targets/toycar.yaml"
     before, rest = manifest.read_text().split("film:\n")
-    manifest.write_text(before + "trace_file" + rest.split("trace_file")[1])
+    manifest.write_text(before + "trace:" + rest.split("trace:")[1])
     cli("plan", "toy", "--out", "runs/p", "--limit", "1")
     planned = Path("runs/p/plan.csv").read_text().splitlines()[1].split(",")[0]
     answer = cli("show", planned, "--video", "a.json")

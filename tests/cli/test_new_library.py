@@ -172,6 +172,19 @@ def test_marks_tell_all_that_their_comment_says(
     assert "first.yaml:1: not filled in: the speed in m/s; do so, and delete the comment" in cli("check").out
 
 
+def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
+    """The commands of a first library's README are verbs with such options, on names that the library has."""
+    cli("init", "faults", "--target", "installed:typer")
+    readme = (nowhere / "faults" / "README.md").read_text()
+    block = readme.split("```sh\n")[1].split("```")[0]
+    words = [line.partition("#")[0].split()[1:] for line in block.splitlines()]
+    assert [verb for verb, *_ in words] == ["check", "check", "try", "run"]
+    for verb, *others in words:
+        told = cli(verb, "--help").out
+        assert all(re.search(rf"{word}\b", told) for word in others if word.startswith("-"))
+    assert "variants:" in (nowhere / "faults/fault_library/faults/controller/value.yaml").read_text()
+
+
 def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     """The manifest names the package and the requirement, and nothing of the shipped target is copied."""
     assert "places to fill in" in cli("init", "faults", "--target", "installed:typer").out
