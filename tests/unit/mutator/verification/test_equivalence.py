@@ -20,6 +20,8 @@ from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
+Reseal = Callable[..., None]
+
 
 def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
     """One in a hundred, 20 at least, the same for the same seed, and nothing rare is missing."""
@@ -45,21 +47,23 @@ def proven(toycar: Workspace, tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path) -> None:
+def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
     """One record that the reference engine would not have written is named, and the campaign fails."""
     (path,) = (proven / "records").iterdir()
     lines = path.read_text().splitlines()
     record = json.loads(lines[1])
     path.write_text("\n".join([lines[0], json.dumps(record | {"trace_digest": "0" * 64}), *lines[2:], ""]))
+    reseal(proven)
     with pytest.raises(CheckFailed, match=f"experiment {record['experiment_id']} .*trace_digest '000"):
         run_campaign(toycar, "small", proven)
 
 
 @pytest.mark.slow
-def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path) -> None:
+def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
     """A proof that is not whole is no success; the same command makes it whole, with any engine."""
     (path,) = (proven / "proof").iterdir()
     path.write_text(path.read_text().splitlines()[0] + "\n")
+    reseal(proven, finished=False)
     folder = RunFolder.open(proven)
     assert [len(piece.ids) for piece in equivalence.left(folder)] == [2]
     records = read_records(proven)
