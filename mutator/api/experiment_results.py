@@ -177,5 +177,7 @@ def verdict(record: Record) -> dict[str, Any]:
         "alerts_s": dict(record.alerts),
         "reaction_time_s": reaction_time(record.hazards, record.alerts),
         "largest_difference": dict(record.max_dev),
+        "drive_ended_s": record.t_end,
+        "metrics": dict(record.metrics),
         "trace_digest": record.trace_digest,
     }
