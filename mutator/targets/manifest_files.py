@@ -89,7 +89,7 @@ class ManifestModel(StrictModel, title="The file"):
         None,
         min_length=1,
         description="Globs, relative to the root: what makes up the tree. `**` stands for any folders. "
-        "Without it, all `.py` files of the packages and modules. Links count as what they lead to.",
+        "Without it, all files of the packages, data too, and the modules. Links count as what they lead to.",
     )
     overlay: str | None = Field(
         None,
@@ -184,7 +184,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         path=path,
         root=folder,
         packages=packages,
-        files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**/*.py" for p in packages)),
+        files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**" for p in packages)),
         overlay=find_overlay(model.overlay, source),
         forbid=tuple(model.forbid),
         env=model.env,

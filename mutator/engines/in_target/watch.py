@@ -16,10 +16,10 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import Any
 
 _spec = importlib.util.spec_from_file_location("threads", Path(__file__).with_name("threads.py"))
@@ -124,14 +124,35 @@ class Watcher:
         setattr(home, name, watched)
 
     def _watch_dates(self) -> None:
-        """The classes cannot be changed: others that are like them stand in their place."""
+        """The classes cannot be changed: others that are like them stand in their place, in a module that
+        the tree alone imports. Compiled code, such as that of pandas, dies of another class."""
+        watched = ModuleType("datetime")
+        vars(watched).update(vars(datetime))
         for name, methods in (("date", ("today",)), ("datetime", ("today", "now", "utcnow"))):
             original = getattr(datetime, name)
             like = _Like(name, (original,), {"__module__": "datetime", "like": original})
             for method in methods:
                 call = self._noting(getattr(original, method), f"datetime.{name}.{method}() reads the clock")
                 setattr(like, method, staticmethod(call))
-            setattr(datetime, name, like)
+            setattr(watched, name, like)
+        load = builtins.__import__
+
+        def load_for(
+            name: str,
+            globals: Mapping[str, object] | None = None,
+            locals: Mapping[str, object] | None = None,
+            fromlist: Sequence[str] | None = (),
+            level: int = 0,
+        ) -> ModuleType:
+            if (
+                name == "datetime"
+                and not level
+                and str((globals or {}).get("__file__")).startswith(self._tree)
+            ):
+                return watched
+            return load(name, globals, locals, fromlist, level)
+
+        builtins.__import__ = load_for
 
     def _noting(self, original: Callable[..., Any], what: str) -> Callable[..., Any]:
         def watched(*args: Any, **named: Any) -> Any:

@@ -107,3 +107,18 @@ def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
     )
     (one,) = json.loads(done.stdout)
     assert (one["line"], one["via"]) == (4, "pid/__init__.py:5")
+
+
+def test_compiled_code_has_its_classes(tmp_path: Path) -> None:
+    """pandas, which dies of another `datetime`, is imported as ever; the tree's own dates are watched."""
+    (tmp_path / "controller.py").write_text(
+        "import datetime\nimport pandas\n\ndef drive():\n    assert pandas.Timestamp(2020, 1, 1)\n"
+        "    datetime.date.today()\n"
+    )
+    script = SCRIPT.format(name=watch.__name__)
+    done = subprocess.run(
+        [sys.executable, "-c", script, tmp_path], capture_output=True, text=True, check=True
+    )
+    assert [(one["line"], one["what"]) for one in json.loads(done.stdout)] == [
+        (6, "datetime.date.today() reads the clock")
+    ]

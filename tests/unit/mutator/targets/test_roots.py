@@ -34,17 +34,18 @@ def installed(pole: Workspace, **keys: str) -> Workspace:
 
 
 def test_an_installed_package(pole: Workspace, site: Path) -> None:
-    """Its own Python files and the overlay are the tree, and no neighbour; nothing is imported."""
+    """Its own files and the overlay are the tree, and no neighbour; nothing is imported."""
     manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
         "pole"
     )
     assert manifest.root == site.resolve()
-    assert manifest.tree.files.keys() - manifest.tree.overlaid == {"filters_of_poles/__init__.py"}
+    own = {"filters_of_poles/__init__.py", "filters_of_poles/gains.txt"}
+    assert manifest.tree.files.keys() - manifest.tree.overlaid == own
     assert manifest.package == "filters_of_poles"
     assert "filters_of_poles" not in sys.modules
-    files = '["filters_of_poles/**"]'
+    files = '["filters_of_poles/*.py"]'
     manifest = installed(pole, files=files).manifest("pole")
-    assert "filters_of_poles/gains.txt" in manifest.tree.files
+    assert "filters_of_poles/gains.txt" not in manifest.tree.files
 
 
 def test_an_installed_module(pole: Workspace, site: Path) -> None:
