@@ -122,6 +122,7 @@ class Run:
 
     def write(self, out: Path) -> None:
         """Write the trace, then the record, into the folder `out`: of equal runs, equal bytes."""
+        out.mkdir(parents=True, exist_ok=True)
         columns = np.array(self.__rows, dtype=np.float64).T
         np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))
         unfinished = out / f".{RECORD}"  # a run that is killed has no record

@@ -34,7 +34,8 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
     """What a check needs to know of a run that is over."""
     if execution.status is not Status.OK:
         log = execution.log.strip()
-        last = f" ({log.splitlines()[-1]})" if log else ""
+        # what a run printed last says why it was killed; of an exception the message does
+        last = f" ({log.splitlines()[-1]})" if log and execution.raised is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
         golden.load_trace(manifest, execution.out, manifest.compared)
