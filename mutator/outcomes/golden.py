@@ -76,6 +76,13 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
         wanted = values if name in times else times_of(trace, name, manifest.time_channel)
         if values.ndim != 1 or values.shape != wanted.shape:
             raise BadOutput("channels of different lengths", where=path, expected="one value per step")
+    for name in (times & trace.keys()) | {manifest.time_channel}:
+        values = trace[name].astype(float)
+        if not (np.isfinite(values).all() and (np.diff(values) >= 0.0).all()):
+            channel = name.removesuffix(own_times(""))
+            raise BadOutput(
+                f"times of {channel} that go back or are none", where=path, expected="s, in order"
+            )
 
 
 def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
@@ -87,10 +94,11 @@ def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
     """A channel's value in each step: the newest one of a channel with times of its own, NaN before its
     first."""
     own = trace.get(own_times(channel))
-    if own is None:
-        return trace[channel]
-    at = np.searchsorted(own, steps + _TINY, side="right")
-    return np.concatenate(([np.nan], trace[channel]))[at]
+    return trace[channel] if own is None else _newest(own, trace[channel], steps)
+
+
+def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    return np.concatenate(([np.nan], values))[np.searchsorted(times, at + _TINY, side="right")]
 
 
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
@@ -151,26 +159,40 @@ def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[s
 
 
 def compare(golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str) -> Difference:
-    """Compare channels value by value; NaN equals NaN. Traces of two lengths differ where one ends."""
-    first = _end_of_shorter(golden[time], faulty[time])
+    """Compare channels value by value; NaN equals NaN. Traces of two lengths differ where one ends, and
+    values that come at other times where the first of them does."""
+    first = _other_times(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
     for channel in channels:
         times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
-        first = min(first, _end_of_shorter(*times))
-        rows = min(map(len, times))
-        deviation = _deviation(golden[channel.name][:rows], faulty[channel.name][:rows])
+        first = min(first, _other_times(*times))
+        at, values = _on_same_times(times, [golden[channel.name], faulty[channel.name]])
+        deviation = _deviation(*values)
         largest.append((channel.name, float(deviation.max(initial=0.0))))
         beyond = np.flatnonzero(deviation > channel.tolerance)
         if beyond.size:
-            first = min(first, float(times[0][beyond[0]]))
+            first = min(first, float(at[beyond[0]]))
     return Difference(t_first=None if first == np.inf else first, max_dev=tuple(largest))
 
 
-def _end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """The time of the first step that one run has and the other has not; infinite where both are as long."""
+def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
+    """When the times of two runs first differ, or one has ended; infinite where they are the same."""
     rows = min(len(golden), len(faulty))
+    unlike = np.flatnonzero(golden[:rows] != faulty[:rows])
+    if unlike.size:
+        return float(min(golden[unlike[0]], faulty[unlike[0]]))
     longer = max(golden, faulty, key=len)
     return float(longer[rows]) if rows < len(longer) else np.inf
+
+
+def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Times that both runs have, with the values of each; where the times differ, at all of them, the newest
+    value of each."""
+    rows = min(map(len, times))
+    if np.array_equal(times[0][:rows], times[1][:rows]):
+        return times[0][:rows], [one[:rows] for one in values]
+    at = np.union1d(*times)
+    return at, [_newest(own, one, at) for own, one in zip(times, values, strict=True)]
 
 
 def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:

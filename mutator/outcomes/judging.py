@@ -130,7 +130,8 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
     if metric.where:
         counts &= over_time.holds(metric.where, values)
     if metric.aggregate in ("integral", "duration"):
-        lengths = np.diff(time, append=time[-1:])  # each value lasts until the next step
+        until = np.append(time[1:], time[-1:])  # each value lasts until the next step, or the drive's end
+        lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time
         return math.fsum((numbers * lengths)[counts].tolist())
     kept = numbers[counts]
     if not kept.size:

@@ -41,17 +41,20 @@ def read(path: Path, manifest: TargetManifest, channels: Iterable[Channel] | Non
     names = [manifest.time_channel, *of_time, *(channel.in_trace for channel in wanted)]
     columns = _COLUMNS[path.suffix](path, None if channels is None else names)
     known = {channel.in_trace for channel in wanted} | {*of_time}
-    values = {name: column for name, column in columns.items() if channels is None and name not in known}
-    values[manifest.time_channel] = columns[manifest.time_channel]
+    rest = {name: column for name, column in columns.items() if channels is None and name not in known}
+    time = columns[manifest.time_channel]
+    # a row of a table without the time of a step is of channels with times of their own
+    steps = slice(None) if path.suffix == ".npz" else ~_empty(time)
+    values = {name: column[steps] for name, column in rest.items()} | {manifest.time_channel: time[steps]}
     for channel in wanted:
         if channels is None and channel.in_trace not in columns:
             continue
         column = columns[channel.in_trace]
-        there = np.full(column.shape, True) if path.suffix == ".npz" else ~_empty(column)
+        there = steps
         if channel.time:
+            there = slice(None) if path.suffix == ".npz" else ~_empty(column)
             values[own_times(channel.name)] = columns[channel.time][there]
-            column = column[there]
-        values[channel.name] = column
+        values[channel.name] = column[there]
     return values
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator.config.yaml_files import Source, StrictModel
+from mutator.triggers.conditions import RESERVED
 
 SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
@@ -114,6 +115,13 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
     keys = ("channels", name)
     if name == trace.time:
         raise source.error(keys, f"'{name}'", expected="a channel beside the time", remedy="leave it out")
+    if name in RESERVED:
+        raise source.error(
+            keys,
+            f"'{name}'",
+            expected=f"a name that formulas do not have already: {', '.join(RESERVED)}",
+            remedy=f"call it otherwise, with `from: {name}`",
+        )
     if model.tolerance and model.role is not Role.ACTUATOR:
         raise source.error(
             (*keys, "tolerance"),

@@ -37,7 +37,7 @@ class Hazard:
 
     It comes where `when` has held for `for_s` seconds, or where the STL formula `stl` is violated. `margin`
     is how far a step is from it, in `unit` (of `stl`, its robustness). Once `terminal` holds, the drive is
-    over: what comes later says nothing ('' never; `True`: from the hazard on).
+    over: later steps are in no metric ('' never; `True`: from the hazard on). Hazards count all the same.
     """
 
     name: str
@@ -142,10 +142,16 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
     keys: Keys = ("hazards", name)
     if model.when is not None and model.stl is not None:
         raise source.error((*keys, "stl"), "`when` and `stl`", expected="one of them", remedy="remove one")
-    if model.stl is not None and model.for_s:
-        raise source.error(
-            (*keys, "for_s"), "`for_s` with `stl`", expected="time in the formula", remedy="remove it"
-        )
+    judged_by = "stl" if model.stl is not None else "the record"
+    useless = () if model.when is not None else ("for_s", "margin")
+    for key in useless:
+        if key in model.model_fields_set:
+            raise source.error(
+                (*keys, key),
+                f"`{key}` of a hazard that is judged by {judged_by}",
+                expected="it beside `when`",
+                remedy="remove it",
+            )
     when = _condition(model.when, known, source, (*keys, "when"))
     formula = model.stl or ""
     if formula:

@@ -1,5 +1,7 @@
 """Target manifests as YAML: `fault_library/targets/<name>.yaml`, checked and read into a `TargetManifest`."""
 
+import re
+from collections.abc import Collection
 from pathlib import Path
 
 from pydantic import Field
@@ -179,6 +181,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     channels = read_channels(model.channels, trace, source)
     observation = read_observation(model.observation, source)
     known = observation.judgeable(channel.name for channel in channels)
+    _check_recorded(source, set(observation.variables) - set(known))
     return TargetManifest(
         name=model.name,
         path=path,
@@ -252,6 +255,22 @@ def _check_placeholders(model: ManifestModel, source: Source) -> None:
         check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))
         check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
         check_placeholders(film.still, OF_FILMS, source, ("film", "still"))
+
+
+def _check_recorded(source: Source, hidden: Collection[str]) -> None:
+    """Hazards and metrics are judged on the trace: what is observed and not recorded is in none."""
+    for key in ("hazards", "metrics"):
+        entries = source.data.get(key)
+        for name, entry in entries.items() if isinstance(entries, dict) else ():
+            for field, text in entry.items() if isinstance(entry, dict) else ():
+                words = re.findall(r"[^\W\d]\w*", text) if isinstance(text, str) else []
+                if field not in ("about", "unit", "source") and (found := [w for w in words if w in hidden]):
+                    raise source.error(
+                        (key, name, field),
+                        f"'{found[0]}', which is observed and not recorded",
+                        expected="what follows from the channels",
+                        remedy=f"have the run record it, as a channel `{found[0]}` with `role: truth`",
+                    )
 
 
 def _check_events(model: ManifestModel, source: Source) -> None:

@@ -13,7 +13,7 @@ from mutator.config.locations import PROBE_NAME, AtModel, dotted_name
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.model import FaultLocation
 from mutator.targets.paths import inside
-from mutator.triggers.conditions import TIME, check_formula, names_in
+from mutator.triggers.conditions import RESERVED, TIME, check_formula, names_in
 
 _LONGEST = 1000  # characters of an expression
 _READING = (
@@ -21,7 +21,8 @@ _READING = (
     *(ast.operator, ast.unaryop, ast.cmpop),
 )
 _FUNCTIONS = ("abs", "min", "max", "hypot", "float", "len")
-_TAKEN = ("abs", "min", "max", "hypot", "ever", "rate", "inf", TIME)
+_TAKEN = (*RESERVED, "math")
+_ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  # others: one or more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,6 +171,9 @@ def _expression(text: str) -> str:
         if isinstance(node, ast.Call):
             known = isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS
             if not known or node.keywords:
+                raise ValueError(text)
+            least, most = _ARGUMENTS.get(ast.unparse(node.func), (1, _LONGEST))
+            if not least <= len(node.args) <= most:
                 raise ValueError(text)
         elif isinstance(node, ast.Subscript):
             _check_constant(node.slice, text)

@@ -1,5 +1,6 @@
 """A scene: what a drive looks like from above, in channels. It is checked here and drawn elsewhere."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
@@ -92,6 +93,10 @@ def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Sce
 
 def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source) -> Actor:
     keys: Keys = ("scene", "actors", name)
+    if model.shape == "circle" and model.width_m is not None:
+        raise source.error(
+            (*keys, "width_m"), "the width of a circle", expected="`length_m` alone", remedy="remove it"
+        )
     with source.placing((*keys, "visible")):
         visible = check_condition(model.visible, variables=known, over_time=True)
     return Actor(
@@ -114,7 +119,7 @@ def _line(name: str, model: _LineModel, known: Collection[str], source: Source) 
             keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="say one of them"
         )
     for i, point in enumerate(model.points_m or ()):
-        if len(point) != 2:
+        if len(point) != 2 or not all(map(math.isfinite, point)):
             raise source.error(
                 (*keys, "points_m", i), f"{point}", expected="[x, y]", remedy="give both numbers, in m"
             )

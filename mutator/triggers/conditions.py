@@ -19,6 +19,7 @@ _ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # at least, at mo
 _NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # no variable is called so
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+RESERVED = (*_FUNCTIONS, *_OVER_TIME, "inf", TIME)  # names in formulas that are no values of the target's
 _MAX_LENGTH = 1000
 _ALLOWED = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, and "
 

@@ -6,6 +6,7 @@ import math
 import random
 import re
 import types
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from mutator.errors import MutatorError
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
 from mutator.mutants.rendering import render
+from mutator.targets.observation import Value
 from mutator.triggers.conditions import check_condition, evaluate
 from mutator.web import asset
 from mutator.workspace import Workspace
@@ -128,6 +130,23 @@ def test_step_limit(clone: Workspace) -> None:
     with pytest.raises(fi.StepLimit, match="more than 3 steps"):
         fi.observe(t=0.3, d_rel=1.0, v_ego=1.0, v_lead=1.0)
     assert drive(fi, "...") == "..."
+
+
+def test_values_have_any_name(clone: Workspace) -> None:
+    """What the probe calls its own variables is no matter to what is observed."""
+    names = ("run", "values", "error", "active", "float", "map")
+    read = tuple(Value(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
+    place = clone.manifest("openpilot").observation
+    trigger = Trigger(name="test", condition=check_condition(" + ".join(names) + " > 14"))
+    observation = replace(place, values=read, derived=())
+    values = contract.template_values("m1", trigger, Hold.WHILE, ("a",), observation, 0.1)
+    module = types.ModuleType("_fi")
+    models = clone.fault_models()
+    exec(render(models.probe, values, models.folder / "_fi.py.j2"), module.__dict__)
+    module.observe(t=0.0, **dict.fromkeys(names, 2))
+    assert not module.active("a")
+    module.observe(t=0.1, **dict.fromkeys(names, 3))
+    assert module.active("a")
 
 
 def test_derived_variables(clone: Workspace) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.golden import load_record, load_trace
+from mutator.outcomes.golden import compare, load_record, load_trace
 from mutator.outcomes.judging import Judged, judge_run, load_judged
+from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 
@@ -95,8 +96,8 @@ def test_when_a_hazard_comes(write: Write, rule: str, first: float | None) -> No
         ("max: gap", 3.0),  # not 4, after the end
         ("mean: speed", 1.0),
         ("last: speed", 2.0),
-        ("integral: speed", 4.0),  # 1 + 2 - 1 + 2: each value lasts until the next step
-        ('duration: "speed > 0"', 3.0),
+        ("integral: speed", 2.0),  # 1 + 2 - 1: each value lasts until the next step, the last one no more
+        ('duration: "speed > 0"', 2.0),
         ("at_end: speed", 2.0),
         ("min: left", 0.0),
         ('{min: gap, where: "speed < 0"}', 2.0),
@@ -233,6 +234,48 @@ def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
     assert trace["gap"].tolist() == GAP.tolist()
     assert trace["seen@"].tolist() == t_seen.tolist()
     assert load_record(manifest, tmp_path) == {"hazards": {}, "alerts": []}
+
+
+def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) -> None:
+    """In a table, rows without the time of a step belong to channels with times of their own."""
+    fast = "trace: {file: trace.csv, time: time}"
+    text = (tmp_path / "cart.yaml", write("hazards: {}\n"))[0].read_text()
+    text = text.replace("trace: {file: trace.npz, time: time}", fast)
+    text = text.replace("  speed: {unit: m/s, role: truth}\n", "  heat: {unit: degC, time: t_heat}\n")
+    text = text.replace("hazards: {}", 'hazards: {HOT: {when: "heat > 5 and gap > 0"}}')
+    (tmp_path / "cart.yaml").write_text(text)
+    rows = ["time,gap,force,t_heat,heat", "0,3,1,0,1", ",,,0.5,2", "1,2,1,1,3", ",,,1.5,9", "2,1,1,2,9"]
+    (tmp_path / "trace.csv").write_text("\n".join(rows) + "\n")
+    manifest = load_manifest(tmp_path / "cart.yaml")
+    assert load_judged(manifest, tmp_path).hazards == (("HOT", 2.0),)
+    assert load_trace(manifest, tmp_path, manifest.channels)["gap"].tolist() == [3.0, 2.0, 1.0]
+
+
+@pytest.mark.parametrize("times", [[0, 2, 1], [0, 1, np.nan], [0, np.inf, np.inf]])
+def test_times_go_on(write: Write, tmp_path: Path, times: list[float]) -> None:
+    """Times that go back, or are none, are no trace: hazards would be looked for in the wrong order."""
+    np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
+    manifest = write("hazards: {}\n")
+    with pytest.raises(MutatorError, match="times of time that go back or are none"):
+        load_trace(manifest, tmp_path, manifest.channels)
+
+
+@pytest.mark.parametrize(
+    ("later", "first", "largest"),
+    [
+        ([0.0, 1.9, 2.5], 1.0, 7.0),  # late: 9 s value is there at 1.9 s, not at 1 s
+        ([0.0, 1.0, 2.5], 2.0, 4.0),
+        ([0.0, 1.0, 2.0], None, 0.0),
+    ],
+)
+def test_a_late_command_differs(later: list[float], first: float | None, largest: float) -> None:
+    """Equal values at other times are a difference, from the first time that differs on."""
+    pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
+    values = np.array([2.0, 9.0, 5.0])
+    golden = {"t": T, "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}
+    found = compare(golden, golden | {"pedal@": np.array(later)}, [pedal], "t")
+    assert found.t_first == first
+    assert dict(found.max_dev) == {"pedal": largest}
 
 
 def _write_mcap(path: Path, t_seen: np.ndarray, seen: np.ndarray) -> None:

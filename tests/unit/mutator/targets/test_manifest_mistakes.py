@@ -33,6 +33,7 @@ observation:
   time: now
   values:
     gap: {is: cart.gap, unit: m, about: to the wall}
+    seen: {is: cart.seen, unit: m, about: what is observed alone}
   derived:
     closing: {is: 0 - gap, unit: m, about: the other way}
 hazards:
@@ -90,6 +91,10 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
         ("margin: gap", "margin: gap > 0", "gap > 0", "gap"),
         ("min: gap", "min: gap, max: gap", "min and max", "one of"),
         ("worse: lower", "worse: smaller", "'smaller'", "lower"),
+        ("  gap: {unit: m, role", "  rate: {unit: m, role", "'rate'", "from: rate"),
+        ("  LATE: {}", "  LATE: {for_s: 1}", "judged by the record", "when"),
+        ("is: cart.gap", "is: 'abs(1, 2)'", "abs(1, 2)", "attributes"),
+        ("when: gap <= 0", "when: seen <= 0", "observed and not recorded", "role: truth"),
         ("  least:", "  t_hit least:", "'t_hit least'", "letters"),
         ("follow: cart", "follow: car", "'car'", "cart"),
         ('{y: "0"}', "{points_m: [[1, 2], [3]]}", "[3.0]", "[x, y]"),
@@ -97,7 +102,7 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
     ],
 )
 def test_a_mistake_is_told_with_what_to_do(path: Path, right: str, wrong: str, got: str, known: str) -> None:
-    """Thirty kinds: each names file and line, the value, what is expected there, and a remedy."""
+    """More than thirty kinds: each names file and line, the value, what is expected there, and a remedy."""
     assert right in WHOLE
     path.write_text(WHOLE.replace(right, wrong, 1))
     with pytest.raises(MutatorError) as caught:
