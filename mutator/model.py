@@ -228,8 +228,9 @@ class Record:
 
     `error` is the exception that ended the run, if one did, whoever is to blame. `hazards` and `alerts` are
     (name, first time) pairs sorted by time; only what came at or after the activation is kept. `max_dev` and
-    `t_manifest` refer to the manifest's compared channels. `t_end` is when a terminal hazard ended the drive;
-    `metrics` has the manifest's metrics and the margins of its hazards, those that have a value.
+    `t_manifest` refer to the manifest's compared channels. `t_end` is when a terminal hazard ended the drive,
+    and `dev` what `max_dev` is up to there (empty without such an end: the same). `metrics` has the metrics
+    of the manifest and the margins of its hazards, those that have a value.
     """
 
     experiment_id: str
@@ -246,4 +247,5 @@ class Record:
     error: RunError | None = added(None)
     patch: str = ""  # digest of the stored patch; empty without a mutant, and in old records
     t_end: float | None = added(None)
+    dev: tuple[tuple[str, float], ...] = added(())
     metrics: tuple[tuple[str, float], ...] = added(())

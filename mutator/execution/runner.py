@@ -165,10 +165,11 @@ class Runner:
             if activation is None:
                 raise
             return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation)
-        difference = golden.compare(reference, faulty, channels, self.manifest.time_channel)
+        judged = judge_run(self.manifest, faulty, said)
+        time = self.manifest.time_channel
+        difference = golden.compare(reference, faulty, channels, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
-        judged = judge_run(self.manifest, faulty, said)
         hazards = first_events(judged.hazards, activation)
         return Record(
             experiment_id=experiment.id,
@@ -184,6 +185,7 @@ class Runner:
             trace_digest=golden.trace_digest(self.manifest, execution.out),
             patch=digest(built.patch_bytes),
             t_end=judged.t_end,
+            dev=() if judged.t_end is None else difference.dev,
             metrics=judged.metrics,
         )
 

@@ -79,7 +79,7 @@ _TEXTS |= {*_DERIVED_TEXTS}
 
 
 def result_columns(
-    hazards: Iterable[str], compared: Sequence[str], metrics: Iterable[Sequence[str]] = ()
+    hazards: Iterable[str], compared: Sequence[str], metrics: Sequence[Sequence[str]] = ()
 ) -> tuple[Column, ...]:
     """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, and
     name, unit and meaning of its metrics."""
@@ -92,6 +92,10 @@ def result_columns(
             for name, column in deviation_columns(compared).items()
         ),
         *(Column(name, "number", unit, about) for name, unit, about in metrics),
+        *(
+            Column(column, "number", "the channel's", f"largest difference of `{name}` up to the drive's end")
+            for name, column in driven_columns(compared, metrics).items()
+        ),
         *EXTRA,
     )
 
@@ -134,10 +138,17 @@ def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
     }
 
 
+def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) -> dict[str, str]:
+    """Column of each compared channel, `dev_` as in `deviation_columns`, where a hazard can end the drive."""
+    if T_END not in (name for name, *_ in metrics):
+        return {}
+    return {name: column.removeprefix("max_") for name, column in deviation_columns(channels).items()}
+
+
 def check_names(manifest: TargetManifest) -> None:
     """MutatorError, at its line of the manifest, for a hazard whose columns have the name of another one."""
     taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
-    taken |= {*DERIVED, T_END}
+    taken |= {*DERIVED, T_END, *driven_columns([c.name for c in manifest.compared], [[T_END]]).values()}
     named = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):
         names = {column.name for column in hazard_columns(hazard)}

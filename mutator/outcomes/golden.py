@@ -34,10 +34,11 @@ class BadOutput(MutatorError):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """Where a trace leaves golden: time of the first difference beyond tolerance (s), and the largest
-    difference of each compared channel."""
+    difference of each compared channel, in the whole run and (`dev`) up to the end of the drive."""
 
     t_first: float | None
     max_dev: tuple[tuple[str, float], ...]
+    dev: tuple[tuple[str, float], ...]
 
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
@@ -158,21 +159,28 @@ def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[s
     return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
 
 
-def compare(golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str) -> Difference:
+def compare(
+    golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None = None
+) -> Difference:
     """Compare channels value by value; NaN equals NaN. Traces of two lengths differ where one ends, and
-    values that come at other times where the first of them does."""
+    values that come at other times where the first of them does. `t_end` is the end of the drive, if it has
+    one before that of the run."""
+    end = np.inf if t_end is None else t_end + _TINY
     first = _other_times(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
+    driven: list[tuple[str, float]] = []
     for channel in channels:
         times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
         first = min(first, _other_times(*times))
         at, values = _on_same_times(times, [golden[channel.name], faulty[channel.name]])
         deviation = _deviation(*values)
         largest.append((channel.name, float(deviation.max(initial=0.0))))
+        driven.append((channel.name, float(deviation[at <= end].max(initial=0.0))))
         beyond = np.flatnonzero(deviation > channel.tolerance)
         if beyond.size:
             first = min(first, float(at[beyond[0]]))
-    return Difference(t_first=None if first == np.inf else first, max_dev=tuple(largest))
+    t_first = None if first == np.inf else first
+    return Difference(t_first=t_first, max_dev=tuple(largest), dev=tuple(driven))
 
 
 def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:

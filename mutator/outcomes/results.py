@@ -31,11 +31,13 @@ SCHEMA, STAMP = "results/1", "results.json"
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
-def row(experiment: Experiment, record: Record, hazards: Sequence[str]) -> dict[str, object]:
+def row(
+    experiment: Experiment, record: Record, hazards: Sequence[str], *, ends: bool = False
+) -> dict[str, object]:
     """One row by column, in any order; without the largest differences where the run left no trace.
 
-    `hazards` are those that the target checks. None for nothing; flags are 0 or 1; times are seconds of
-    simulation since its start.
+    `hazards` are those that the target checks; `ends` says that one of them can end the drive. None stands for
+    nothing; flags are 0 or 1; times are seconds of simulation since its start.
     """
     activation = record.activation
     ok = record.status is Status.OK
@@ -60,8 +62,11 @@ def row(experiment: Experiment, record: Record, hazards: Sequence[str]) -> dict[
         cells[time.name] = _time(times.get(name))
     columns = deviation_columns([name for name, _ in record.max_dev])
     cells |= {columns[name]: value for name, value in record.max_dev}
-    end = {} if record.t_end is None else {T_END: _time(record.t_end)}
-    return cells | end | dict(record.metrics)
+    if ends:
+        driven = dict(record.max_dev) | dict(record.dev)
+        cells |= {columns[name].removeprefix("max_"): value for name, value in driven.items()}
+        cells[T_END] = _time(record.t_end)
+    return cells | dict(record.metrics)
 
 
 def _time(value: float | None) -> float | None:
@@ -99,8 +104,10 @@ def tables(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
     experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     head = folder.head
-    columns = result_columns(head["hazards"], head["compared"], head.get("metrics", ()))
-    rows = [row(e, records[e.id], head["hazards"]) for e in experiments if e.id in records]
+    metrics = head.get("metrics", ())
+    columns = result_columns(head["hazards"], head["compared"], metrics)
+    ends = T_END in (name for name, *_ in metrics)
+    rows = [row(e, records[e.id], head["hazards"], ends=ends) for e in experiments if e.id in records]
     return {
         CSV: _csv(rows, [column.name for column in columns]),
         PARQUET: _parquet(rows, columns),

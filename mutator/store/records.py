@@ -47,6 +47,7 @@ def record_from(data: Mapping[str, Any]) -> Record:
         error=RunError(**data["error"]) if data.get("error") else None,
         patch=data.get("patch", ""),
         t_end=data.get("t_end"),
+        dev=_pairs(data.get("dev", [])),
         metrics=_pairs(data.get("metrics", [])),
     )
 

@@ -131,6 +131,9 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
         "outcome": record.outcome,
         "t_manifest": record.t_manifest,
         "max_dev": record.max_dev,
+        "dev": record.dev,
+        "t_end": record.t_end,
+        "metrics": record.metrics,
         "hazards": record.hazards,
         "alerts": record.alerts,
         "trace_digest": record.trace_digest,
@@ -149,6 +152,9 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
     if record.status is Status.OK and channels != list(head["compared"]):
         yield f"differences of {', '.join(channels)}", f"those of {', '.join(head['compared'])}"
     beyond = [name for name, value in record.max_dev if value > tolerances.get(name, float("inf"))]
+    largest = dict(record.max_dev)
+    if any(value > largest.get(name, -1.0) for name, value in record.dev):
+        yield f"differences {record.dev} up to the drive's end", f"none larger than {record.max_dev}"
     if beyond and record.t_manifest is None:
         yield f"{beyond[0]} differs, and was not manifested", "the time of the first difference"
 

@@ -49,6 +49,14 @@ def test_equal_traces_do_not_differ() -> None:
     assert difference.max_dev == (("gas", 0.0),)
 
 
+def test_differences_up_to_the_end_of_the_drive() -> None:
+    """What comes after the end is in the largest difference of the run, and not in that of the drive."""
+    golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
+    found = compare(golden, faulty, [GAS], "t", t_end=0.2)
+    assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
+    assert compare(golden, faulty, [GAS], "t").dev == found.max_dev
+
+
 def test_first_and_largest_difference() -> None:
     """The time of the first difference in any channel, the largest difference of each."""
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
