@@ -82,7 +82,7 @@ def result_columns(
     hazards: Iterable[str], compared: Sequence[str], metrics: Sequence[Sequence[str]] = ()
 ) -> tuple[Column, ...]:
     """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, and
-    name, unit and meaning of its metrics."""
+    its metrics as `metric_columns` has them."""
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -91,7 +91,7 @@ def result_columns(
             Column(column, "number", "the channel's", f"largest difference of `{name}` from golden")
             for name, column in deviation_columns(compared).items()
         ),
-        *(Column(name, "number", unit, about) for name, unit, about in metrics),
+        *(Column(name, "number", unit, about) for name, unit, about, _ in metrics),
         *(
             Column(column, "number", "the channel's", f"largest difference of `{name}` up to the drive's end")
             for name, column in driven_columns(compared, metrics).items()
@@ -101,11 +101,11 @@ def result_columns(
 
 
 def metric_columns(manifest: TargetManifest) -> list[list[str]]:
-    """Name, unit and meaning of the columns of a target's metrics; first when the drive ended, where a hazard
-    can end it."""
+    """Name, unit, meaning and worse direction of the columns of a target's metrics; first when the drive
+    ended, where a hazard can end it."""
     ends = any(hazard.terminal for hazard in manifest.rules)
-    end = [[T_END, "s", "when a terminal hazard ended the drive: later steps are in no metric"]]
-    return [*(end if ends else ()), *([m.name, m.unit, m.about] for m in manifest.measures)]
+    end = [[T_END, "s", "when a terminal hazard ended the drive: later steps are in no metric", "lower"]]
+    return [*(end if ends else ()), *([m.name, m.unit, m.about, m.worse] for m in manifest.measures)]
 
 
 def is_text(column: str) -> bool:

@@ -36,8 +36,8 @@ def row(
 ) -> dict[str, object]:
     """One row by column, in any order; without the largest differences where the run left no trace.
 
-    `hazards` are those that the target checks; `ends` says that one of them can end the drive. None stands for
-    nothing; flags are 0 or 1; times are seconds of simulation since its start.
+    `hazards` are those that the target checks; `ends` says that one of them can end the drive. None stands
+    for nothing; flags are 0 or 1; times are seconds of simulation since its start.
     """
     activation = record.activation
     ok = record.status is Status.OK

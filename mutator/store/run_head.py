@@ -52,7 +52,7 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": 2, "chunks": 3, "metrics": 3}  # of each item
+_SIZES = {"goldens": 2, "chunks": 3, "metrics": 4}  # of each item
 
 
 class Head(dict[str, Any]):

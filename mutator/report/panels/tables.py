@@ -17,6 +17,7 @@ from mutator.outcomes.rows import (
 )
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
+from mutator.statistics.metric_tables import metrics_sheet
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.sheets import run_sheets
 
@@ -85,7 +86,9 @@ def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     """The statistics of a run, beside published counts if its study has some of its fault types."""
     published = run.study.published(run) if run.study else None
     alerts = {name: record.alerts for name, record in run.folder.records().items()}
-    return run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
+    sheets = run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
+    metrics = metrics_sheet(run.frame, run.folder.head.get("metrics", ()))
+    return (*sheets, metrics) if metrics.lines else sheets
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:
