@@ -23,7 +23,9 @@ module needs the standard library and numpy alone, and nothing else of mutator.
 """
 
 import json
+import math
 import random
+import reprlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -56,18 +58,21 @@ class Run:
     """One run of a closed loop. A subclass has `__init__(self, scenario, seed)`, which builds the loop, and
     `step(self)`, which drives it on by `step_s` and ends with `self.record(...)`.
 
-    `scenario` is a `Scenario`, `seed` an int. Nothing global is seeded; see `seed_globals`.
+    `scenario` is a `Scenario`, `seed` an int. Nothing global is seeded; see `seed_globals`. A subclass may
+    use any name but `step_s`, `t`, `done`, `end`, `record`, `hazard`, `alert`, `write`, `open` and `main`.
     """
 
-    # names with two underscores, so that a subclass may use any other
+    # all else that it holds has two underscores: such names are this class's own
     def __init__(self, *, step_s: float, duration_s: float) -> None:
-        """A run of `duration_s`, which ends sooner where `end` is called."""
-        self.step_s = step_s
-        self.__steps = round(duration_s / step_s)
-        if self.__steps < 1:
-            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected one step at least")
+        """A run of `duration_s`, to the nearest step, which ends sooner where `end` is called."""
         self.__channels: tuple[str, ...] = ()
         self.__rows: list[tuple[float, ...]] = []
+        self.__duration_s = _length("duration_s", duration_s)
+        self.__since, self.__passed = 0.0, 0  # time and steps when the length of a step was last set
+        self.__step_s = 0.0
+        self.step_s = step_s
+        if self.__steps < 1:
+            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected one step at least")
         self.__ended = False
         self.__hazards: dict[str, float | None] = {}
         self.__alerts: list[dict[str, Any]] = []
@@ -78,9 +83,23 @@ class Run:
         raise NotImplementedError(f"{type(self).__name__} has no step()")
 
     @property
+    def step_s(self) -> float:
+        """Length of a step in s. Where steps differ, set it in each before `record`: it holds for the step
+        that is being driven, and for those after it until it is set again."""
+        return self.__step_s
+
+    @step_s.setter
+    def step_s(self, step_s: float) -> None:
+        step_s = _length("step_s", step_s)
+        if self.__rows and step_s != self.__step_s:  # times of equal steps are no sums
+            self.__since, self.__passed = self.t, len(self.__rows)
+        self.__step_s = step_s
+        self.__steps = self.__passed + round((self.__duration_s - self.__since) / step_s)
+
+    @property
     def t(self) -> float:
         """Time in s since the start: of the step that is being driven, until it is recorded."""
-        return len(self.__rows) * self.step_s
+        return self.__since + (len(self.__rows) - self.__passed) * self.__step_s
 
     @property
     def done(self) -> bool:
@@ -103,7 +122,8 @@ class Run:
             raise GlueError(
                 f"at {self.t:g} s: channels {', '.join(odd)}; expected the same in each step, without {TIME}"
             )
-        self.__rows.append((self.t, *(float(channels[name]) for name in self.__channels)))
+        at = f"at {self.t:g} s: "
+        self.__rows.append((self.t, *(_number(at + name, channels[name]) for name in self.__channels)))
 
     def hazard(self, name: str, now: bool) -> None:
         """Judge a hazard of which the manifest only has the name: to be called in each step, before `record`.
@@ -122,6 +142,8 @@ class Run:
 
     def write(self, out: Path) -> None:
         """Write the trace, then the record, into the folder `out`: of equal runs, equal bytes."""
+        if not self.__rows:
+            raise GlueError("nothing is recorded; expected one step at least: `end` is for a step to call")
         out.mkdir(parents=True, exist_ok=True)
         columns = np.array(self.__rows, dtype=np.float64).T
         np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))
@@ -182,6 +204,22 @@ def read_scenario(path: Path) -> Scenario:
             raise GlueError(f"{path}:{number}: '{text}'; expected `key: value`, each key once")
         found[key] = _value(value.strip())
     return Scenario(found, path)
+
+
+def _number(what: str, value: Any) -> float:
+    try:
+        if not isinstance(value, str | bytes) and np.ndim(value) == 0:
+            return float(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise GlueError(f"{what} is {reprlib.repr(value)}; expected a number")
+
+
+def _length(what: str, value: Any) -> float:
+    number = _number(what, value)
+    if not 0 < number < math.inf:
+        raise GlueError(f"{what} is {number:g}; expected more than 0 s")
+    return number
 
 
 def _value(text: str) -> Any:

@@ -31,7 +31,8 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
     With `target`, the folder of a controller's source or `installed:NAME`, it is a first library for that
     controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is read,
     never imported. Without it, library and templates are copies of what ships with mutator.
-    MutatorError for a folder that holds anything, and for a target that is not there.
+    MutatorError for a folder that holds anything, and for a target that is not there; MutatorWarning for a
+    target in which nothing looks like a controller.
     """
     if target is None:
         write_library(Path(folder))

@@ -9,11 +9,12 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common.hashing import plain
@@ -156,12 +157,17 @@ def option(argument: str) -> str:
     return _OPTIONS.get(argument) or "--" + argument.replace("_", "-")
 
 
-def with_options(error: MutatorError) -> MutatorError:
-    """The error as the command line says it: options where the API names its arguments."""
+def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType({})) -> MutatorError:
+    """The error as the command line says it: options where the API names its arguments; `own` are those that
+    the command names in its own way."""
     if error.argument is None:
         return error
-    remedy = error.remedy and re.sub(r"`([a-z_]+)`", lambda found: option(found[1]), error.remedy)
-    place = error.where or option(error.argument)
+
+    def named(argument: str) -> str:
+        return own.get(argument) or option(argument)
+
+    remedy = error.remedy and re.sub(r"`([a-z_]+)`", lambda found: named(found[1]), error.remedy)
+    place = error.where or named(error.argument)
     return MutatorError(error.got, where=place, line=error.line, expected=error.expected, remedy=remedy)
 
 

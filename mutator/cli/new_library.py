@@ -8,8 +8,9 @@ import typer
 import mutator
 from mutator._common.text import counted
 from mutator.api.libraries import unfilled_places
-from mutator.cli.console import Terminal, short_path
+from mutator.cli.console import Terminal, short_path, with_options
 from mutator.cli.options import Json
+from mutator.errors import MutatorError
 
 INIT_EXAMPLES = """\b
 Examples:
@@ -42,7 +43,10 @@ def init(
     that ship with mutator, for the controller that ships. In DIR and below, mutator uses them.
     """
     terminal = Terminal(as_json)
-    mutator.init_library(folder, target=tree)
+    try:
+        mutator.init_library(folder, target=tree)
+    except MutatorError as error:
+        raise with_options(error, {"target": "--target"}) from None
     told: dict[str, Any] = {"folder": str(folder)}
     held = "fault_library/, templates/"
     if tree is not None:

@@ -11,11 +11,7 @@ _KNOWN = (  # how a thread's name begins, what it is, what turns it off
         'set `MALLOC_CONF: "background_thread:false"` under `env` of the manifest (that of pyarrow, '
         "which comes with pandas, is off already)",
     ),
-    (
-        "ThreadPoolExecutor",
-        "of a pool in Python",
-        "do that work in the step itself; `mutator check --drive` names the line that starts it",
-    ),
+    ("ThreadPoolExecutor", "of a pool in Python", "do that work in the step itself"),
 )
 _UNNAMED = (
     "of a library",
@@ -23,17 +19,14 @@ _UNNAMED = (
     "and have the library use no pool (`cv2.setNumThreads(0)`, `torch.set_num_threads(1)`, "
     "`use_threads=False` of pyarrow)",
 )
-_OTHER = (
-    "",
-    "start it after the run, or not at all; `mutator check --drive` names the line that starts it",
-)
+_OTHER = ("", "start it after the run, or not at all")
 
 
 def too_many(others: Sequence[str]) -> str:
-    """What is said of a process that has these threads beside its main one."""
-    told = [*dict.fromkeys(f"{_named(name)} {_about(name)[0]}".rstrip() for name in others)]
-    listed = [*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])]
-    return f"it has {len(others) + 1} threads, and only one can be forked: beside its own {', '.join(listed)}"
+    """What is said of a process that has these threads besides its main one."""
+    told = [*dict.fromkeys(map(_told, others))]
+    listed = ", ".join([*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])])
+    return f"it has {len(others) + 1} threads, and only one can be forked: besides the main one, {listed}"
 
 
 def turned_off(others: Sequence[str]) -> str:
@@ -41,8 +34,9 @@ def turned_off(others: Sequence[str]) -> str:
     return "; ".join(dict.fromkeys(_about(name)[1] for name in others))
 
 
-def _named(name: str) -> str:
-    return f"'{name}'" if name else "one without a name"
+def _told(name: str) -> str:
+    what = _about(name)[0]
+    return (f"'{name}'" if name else "one without a name") + (f" ({what})" if what else "")
 
 
 def _about(name: str) -> tuple[str, str]:

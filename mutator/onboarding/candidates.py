@@ -78,7 +78,9 @@ def _of_module(module: Module, looped: Counter[str]) -> Iterator[LoopCandidate]:
 
 
 def _may_step(function: Function) -> bool:
-    """Whether it is public, and no property, class method or empty."""
+    """Whether it is public, and no property, class method, coroutine or empty."""
+    if isinstance(function, ast.AsyncFunctionDef):
+        return False
     if function.name.startswith("_") and function.name not in _STEP:
         return False
     hidden = {"property", "classmethod", "abstractmethod", "overload"}

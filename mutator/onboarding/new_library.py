@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from mutator._common.shipped import make_empty
 from mutator._common.text import counted
+from mutator.errors import MutatorWarning
 from mutator.onboarding.candidates import LoopCandidate, loop_candidates
 from mutator.onboarding.marks import MARK
 from mutator.onboarding.survey import Survey
@@ -28,7 +30,8 @@ _FILES = {
 
 
 def write_library_for(found: Survey, folder: Path) -> None:
-    """Write the files into a new or empty folder; MutatorError for one that holds anything."""
+    """Write the files into a new or empty folder; MutatorError for one that holds anything. A MutatorWarning
+    says so if the source has nothing that may be a controller's step."""
     make_empty(folder)
     words = _words(found, folder.resolve())
     templates = Environment(
@@ -45,6 +48,17 @@ def write_library_for(found: Survey, folder: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         text = templates.get_template(f"{template}.j2").render(words)
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
+    if not words["candidates"]:
+        warnings.warn(_nothing_found(found), MutatorWarning, stacklevel=3)
+
+
+def _nothing_found(found: Survey) -> str:
+    """That no controller was found, and why."""
+    why = [f"{place} cannot be read: {problem}" for place, problem in found.unread[:MOST_SHOWN]]
+    if found.modules:
+        why.insert(0, f"no function in {counted(len(found.modules), 'file')} looks like a step")
+    reasons = "; ".join(why) or "no Python but tests and the like"
+    return f"{found.installed or found.root}: no controller found: {reasons}; fill in the files by hand"
 
 
 def _as_yaml(text: str) -> str:

@@ -35,9 +35,10 @@ def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: boo
     ordered = [(HASH, place) for place in sets(manifest)]
     by_hashes = [*((HASH, place_of(one)) for one in hashes), *ordered]
     by_others = [(one["kind"], place_of(one)) for one in others]
-    found = (by_hashes or by_others) if by_hash else (by_others or by_hashes)
+    found = by_hashes if by_hash else (by_others or by_hashes)
     remedies = dict.fromkeys(_REMEDIES[kind] for kind, _ in found[:_MOST])
-    return [place for _, place in found[:_MOST]], "; ".join(remedies) or _UNKNOWN
+    unknown = _REMEDIES[HASH] if by_hash else _UNKNOWN
+    return [place for _, place in found[:_MOST]], "; ".join(remedies) or unknown
 
 
 def sets(manifest: TargetManifest) -> list[Place]:

@@ -2,7 +2,7 @@
 
 Each scenario is driven twice without a fault, with two hash seeds. The second time a probe counts at every
 statement that faults are put at, and calls that keep a target from being deterministic are noted. Where the
-two differ, a third run, without all that, shows what made the difference.
+two differ, further runs, without all that and with either hash seed, show what made the difference.
 """
 
 import os
@@ -155,7 +155,8 @@ class _Drive:
         if first.problem or again.problem or watched.problem or first.digest == again.digest:
             remedy = "mend the target, the scenario or the manifest: no campaign starts"
             return Finding(name=name, level=Level.FAIL, found=problem, remedy=remedy)
-        return self._not_deterministic(name, golden, by_hash=again.digest == watched.digest)
+        same = self._look(self._run(self._job("same", scenario, self.setting)))
+        return self._not_deterministic(name, golden, by_hash=same.digest == first.digest)
 
     def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
         """Where the runs first differ, and what is likely to blame."""

@@ -1,5 +1,7 @@
 """What keeps a target or its faults from the engines that fork, said before a campaign."""
 
+from dataclasses import replace
+
 from mutator._common.files import ScratchFolder
 from mutator._common.text import counted
 from mutator.engines.fork_pool import Refused
@@ -13,6 +15,7 @@ from mutator.workspace import Workspace
 
 NAME = "fast engines"
 _WITHOUT = "campaigns run all the same, on the reference engine"
+_DRIVE = "`mutator check --drive` names the lines that start threads in Python"
 _LISTED = 3  # reasons
 
 
@@ -20,7 +23,8 @@ def loading(manifest: TargetManifest) -> Finding:
     """Whether the target can be forked once it is loaded, which is tried: its modules are imported."""
     with ScratchFolder("mutator-check-") as scratch:
         base = prepare_base(manifest, scratch / "base")
-        return finding(not_loadable(manifest, base, scratch / "server"))
+        told = finding(not_loadable(manifest, base, scratch / "server"))
+    return replace(told, remedy=f"{told.remedy}; {_DRIVE}") if "thread" in told.found else told
 
 
 def finding(refusal: Refused | None) -> Finding:

@@ -70,7 +70,7 @@ def judge_golden(first: CheckRun, again: CheckRun) -> str:
         return "two runs that differ in nothing but PYTHONHASHSEED gave different bytes"
     if first.hazards:
         name, time = first.hazards[0]
-        return f"reaches {name} at {time} s without any fault"
+        return f"reaches {name} at {time:g} s without any fault"
     return ""
 
 

@@ -84,23 +84,25 @@ class Reach:
         """What no run came to, of all that were taken in."""
         return [
             self._finding(
-                "statements",
-                counted(self._statements, "statement"),
+                "statement",
+                self._statements,
                 [one.place for one in self.unexecuted],
                 "a fault there is never active: anchor it elsewhere, or add a scenario that comes to it",
             ),
             self._finding(
-                "triggers",
-                counted(self._triggers, "trigger"),
+                "trigger",
+                self._triggers,
                 [one.place for one in self.untriggered],
                 "an experiment that waits for it is never active: add a scenario that reaches it, or leave "
                 "it out of the campaigns",
             ),
         ]
 
-    def _finding(self, name: str, whole: str, left: Sequence[Place], remedy: str) -> Finding:
+    def _finding(self, noun: str, count: int, left: Sequence[Place], remedy: str) -> Finding:
+        name, whole = f"{noun}s", counted(count, noun)
         if not left:
-            return Finding(name=name, level=Level.OK, found=f"{whole}, all are reached")
+            found = f"{whole}, {'which is' if count == 1 else 'all are'} reached" if count else "none"
+            return Finding(name=name, level=Level.OK, found=found)
         found = f"{len(left)} of {whole} never reached in {', '.join(self._driven)}"
         places = tuple(left[:_MOST])
         return Finding(name=name, level=Level.WARN, found=found, remedy=remedy, places=places)

@@ -74,7 +74,8 @@ def test_check_says_what_prevents_the_fast_engines(cli: Cli, root: Path) -> None
     answer = cli("check")
     assert answer.code == 0
     assert "fast engines: nothing can be forked: once it is loaded, it has 2 threads" in answer.out
-    assert "beside its own 'poll'" in answer.out
+    assert "besides the main one, 'poll'" in answer.out
+    assert "`mutator check --drive` names the lines that start threads" in answer.out
     assert "no problem, 1 warning: 3 specs" in answer.out
     levels = {f["name"]: (f["level"], f["found"]) for f in cli("doctor", "--json").json}
     level, found = levels["fast engines, toycar"]

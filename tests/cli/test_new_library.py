@@ -94,6 +94,8 @@ def test_a_first_library_runs_once_its_marks_are_gone(
     cli("init", "faults", "--target", tree(files))
     (written,) = (nowhere / "faults/fault_library/targets").iterdir()
     assert manifest in written.read_text()
+    (entry,) = (nowhere / "faults/fault_library/overlays").glob("*/*.py")
+    assert f"# {entry.name}, which builds and drives the loop" in written.read_text()
     for path in (nowhere / "faults").rglob("*.*"):
         path.write_text(MARK.sub("", path.read_text()))
     monkeypatch.chdir(nowhere / "faults")
@@ -146,6 +148,31 @@ def test_check_lists_every_place_to_fill_in(
         assert sum(line.startswith(place) for line in lines) == 1, place
 
 
+EMPTY = "no Python but tests and the like"
+NOTHING: dict[str, tuple[dict[str, str], str]] = {
+    "empty": ({}, EMPTY),
+    "tests": ({"tests/test_pilot.py": CONTROLLER, "test_all.py": CONTROLLER}, EMPTY),
+    "unparsable": ({"broken.py": "def step(:\n"}, "found: broken.py:1 cannot be read: invalid syntax"),
+    "values": ({"values.py": "x = 1\n"}, "no function in 1 file looks like a step"),
+}
+
+
+@pytest.mark.parametrize("name", NOTHING)
+def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable[..., Path]) -> None:
+    """A library for it is written, and a warning says that nothing was found to put into it, and why."""
+    files, told = NOTHING[name]
+    folder = tree(files)
+    answer = cli("init", "faults", "--target", folder)
+    assert answer.code == 0
+    assert f"warning: {folder}: no controller found: " in answer.err
+    assert told in answer.err
+
+
+def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., Path]) -> None:
+    """Where a step was found nothing is said, also if another file cannot be read."""
+    assert cli("init", "faults", "--target", tree(FOREIGN["syntax errors"])).err == ""
+
+
 @pytest.mark.parametrize("name", ["my tree: {v#2}", "123", "null", "1e3"])
 def test_a_tree_may_have_any_name(
     name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
@@ -194,9 +221,15 @@ def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     assert not any("openpilot" in path.read_text() for path in (nowhere / "faults").rglob("*.*"))
 
 
-def test_init_refuses_a_target_that_is_not_there(cli: Cli, nowhere: Path) -> None:
-    """A missing folder is wrong input, and no library is begun for it."""
-    answer = cli("init", "faults", "--target", "nowhere")
+@pytest.mark.parametrize(
+    ("target", "told"),
+    [("nowhere", "no folder nowhere"), ("installed:no.where", "no installed package 'no.where'")],
+)
+def test_init_refuses_a_target_that_is_not_there(target: str, told: str, cli: Cli, nowhere: Path) -> None:
+    """A missing folder or package is wrong input, told by the option that names it; no library is begun for
+    it."""
+    answer = cli("init", "faults", "--target", target)
     assert answer.code == 2
-    assert "no folder nowhere" in answer.err
+    assert f"error: --target: {told}" in answer.err
+    assert "--manifest" not in answer.err
     assert not (nowhere / "faults").exists()

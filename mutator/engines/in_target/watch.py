@@ -17,7 +17,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import partial, update_wrapper
 from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
@@ -43,7 +43,7 @@ class Watcher:
         self.noted: dict[tuple[str, int], dict[str, Any]] = {}
         self._threads: set[str] = set()
         self._quiet = False
-        self._seeded: set[int] = set()  # ids of shared generators that were given a seed
+        self._seeded: set[Any] = set()  # shared generators that were given a seed
 
     def begin(self) -> None:
         self._watch_numpy()  # first: what it takes from `secrets` is its own
@@ -52,6 +52,7 @@ class Watcher:
                 self._watch(time, one, CLOCK, f"time.{one}() reads the clock")
         for name in _STILL:
             self._watch(time, name, CLOCK, f"time.{name}() reads the clock", _without_time)
+        self._watch(os, "times", CLOCK, "os.times() reads the clock")
         self._watch_dates()
         self._watch(os, "urandom", DRAW, "os.urandom() draws from the system")
         setattr(random, "_urandom", os.urandom)  # noqa: B010
@@ -68,8 +69,10 @@ class Watcher:
 
     def note(self, kind: str, what: str, *, direct: bool = False) -> None:
         """Note the innermost line of the tree on the stack; `direct`: only if it is the caller itself."""
-        frame: FrameType | None = sys._getframe(2)
-        via = ""
+        frame: FrameType | None = sys._getframe()
+        here, via = sys._getframe().f_code.co_filename, ""
+        while frame is not None and frame.f_code.co_filename == here:
+            frame = frame.f_back
         while frame is not None:
             file = frame.f_code.co_filename
             if file.startswith(self._tree):
@@ -116,12 +119,11 @@ class Watcher:
         if original is None:
             return
 
-        def watched(*args: Any, **named: Any) -> Any:
+        def before(*args: Any, **named: Any) -> None:
             if counts(*args, **named):
                 self.note(kind, what, direct=direct)
-            return original(*args, **named)
 
-        setattr(home, name, watched)
+        setattr(home, name, _Watched(original, before))
 
     def _watch_dates(self) -> None:
         """The classes cannot be changed: others that are like them stand in their place, in a module that
@@ -132,8 +134,8 @@ class Watcher:
             original = getattr(datetime, name)
             like = _Like(name, (original,), {"__module__": "datetime", "like": original})
             for method in methods:
-                call = self._noting(getattr(original, method), f"datetime.{name}.{method}() reads the clock")
-                setattr(like, method, staticmethod(call))
+                setattr(like, method, getattr(original, method))  # which makes an original
+                self._watch(like, method, CLOCK, f"datetime.{name}.{method}() reads the clock")
             setattr(watched, name, like)
         load = builtins.__import__
 
@@ -153,13 +155,6 @@ class Watcher:
             return load(name, globals, locals, fromlist, level)
 
         builtins.__import__ = load_for
-
-    def _noting(self, original: Callable[..., Any], what: str) -> Callable[..., Any]:
-        def watched(*args: Any, **named: Any) -> Any:
-            self.note(CLOCK, what)
-            return original(*args, **named)
-
-        return watched
 
     def _watch_threads(self) -> None:
         original = threading.Thread.start
@@ -182,15 +177,14 @@ class Watcher:
                 self._watch(module, name, DRAW, f"{named}.{name}() {shared}", unseeded)
 
     def _is_unseeded(self, generator: Any, *_: Any, **__: Any) -> bool:
-        return id(generator) not in self._seeded
+        return generator not in self._seeded
 
     def _seeding(self, original: Callable[..., Any], generator: Any) -> Callable[..., Any]:
-        def seed(*args: Any, **named: Any) -> Any:
+        def before(*args: Any, **named: Any) -> None:
             if any(value is not None for value in (*args[:1], *named.values())):
-                self._seeded.add(id(generator))
-            return original(*args, **named)
+                self._seeded.add(generator)
 
-        return seed
+        return _Watched(original, before)
 
     def _watch_seed(self, kind: Any) -> None:
         """Generators of the standard library are seeded when they are made."""
@@ -227,6 +221,22 @@ class Watcher:
             setattr(home, "RandomState", like)  # noqa: B010
         # whatever else is made without a seed asks this function for one
         self._watch(bit_generator, "randbits", DRAW, what)
+
+
+class _Watched:
+    """A function, and what is done before each call of it. Like the built-in functions that it stands for it
+    is no method where it is a class's attribute, and a copy of it is itself."""
+
+    def __init__(self, original: Callable[..., Any], before: Callable[..., None]) -> None:
+        self._original, self._before = original, before
+        update_wrapper(self, original)
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        self._before(*args, **named)
+        return self._original(*args, **named)
+
+    def __reduce__(self) -> str:
+        return self._original.__name__
 
 
 class _Like(type):

@@ -106,6 +106,8 @@ def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], fla
         (["--seed", "-1"], "--seed -1; expected a whole number"),
         (["--seed"], "no --seed"),
         (["--duration_s", "0.01"], "one step at least"),
+        (["--duration_s", "0"], "duration_s is 0; expected more than 0 s"),
+        (["--duration_s", "long"], "duration_s is 'long'; expected a number"),
     ],
 )
 def test_a_wrong_argument_is_told(arguments: list[str], flags: list[str], words: str) -> None:
@@ -149,6 +151,89 @@ def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
     run.record(a=1.0)
     with pytest.raises(GlueError, match=r"at 0.5 s: channels [ab]"):
         run.record(**later)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, "1", "near", b"1", [1.0], np.zeros(1), np.zeros((2, 3)), 1j, pytest.param(10**400, id="huge")],
+)
+def test_what_is_recorded_is_a_number(value: object) -> None:
+    """Anything else is told with its channel and time."""
+    run = Run(step_s=0.5, duration_s=1.0)
+    run.record(a=1.0, gap=2.0)
+    with pytest.raises(GlueError, match=r"^at 0.5 s: gap is .*; expected a number$"):
+        run.record(a=1.0, gap=value)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [True, 3, np.float32(2.5), np.array(4), float("inf")])
+def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
+    """Numbers of Python and numpy, and what is one: true, infinite, an array without dimensions."""
+    run = Run(step_s=0.5, duration_s=1.0)
+    run.record(a=value)
+    run.write(tmp_path)
+    with np.load(tmp_path / "trace.npz") as trace:
+        assert trace["a"].tolist() == [float(value)]
+
+
+@pytest.mark.parametrize("length", [0, -0.1, float("nan"), float("inf"), None])
+def test_steps_have_a_length(length: float) -> None:
+    """Steps without an end, or without a length, are refused, from the start or later."""
+    with pytest.raises(GlueError, match=r"step_s is .*; expected"):
+        Run(step_s=length, duration_s=1.0)
+    run = Run(step_s=0.5, duration_s=1.0)
+    with pytest.raises(GlueError, match=r"step_s is .*; expected"):
+        run.step_s = length
+
+
+def test_a_run_that_ends_before_it_began_is_told(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever calls `end` in the constructor has nothing recorded, and is told so."""
+
+    class Ended(Ball):
+        def __init__(self, scenario, seed):
+            super().__init__(scenario, seed)
+            self.end()
+
+    with pytest.raises(GlueError, match="nothing is recorded"):
+        Ended.main(arguments)
+
+
+LENGTHS = [0.1, 0.25, 0.05, 0.1, 0.1, 0.4, 0.1]
+
+
+@pytest.mark.parametrize("first", [0.1, 0.7])
+def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
+    """A step that sets `step_s` before it records has that length, and the next begins behind it; the run is
+    as long as it was to be, to the nearest step."""
+
+    class Uneven(Run):
+        def __init__(self, scenario, seed):
+            super().__init__(step_s=first, duration_s=1.0)
+            self.lengths = iter(LENGTHS)
+
+        def step(self):
+            began = self.t
+            self.step_s = next(self.lengths)
+            assert self.t == began
+            self.record(length=self.step_s)
+
+    Uneven.main(arguments)
+    with np.load(Path(arguments[5]) / "trace.npz") as trace:
+        assert trace["length"].tolist() == LENGTHS[:6]
+        assert trace["t"] == pytest.approx([0.0, 0.1, 0.35, 0.4, 0.5, 0.6])
+
+
+def test_times_of_equal_steps_are_no_sums() -> None:
+    """With one length for all, a step's time is its number times the length, to the last bit, also where the
+    length is set in each."""
+    run = Run(step_s=0.1, duration_s=100.0)
+    times = []
+    while not run.done:
+        times.append(run.t)
+        run.step_s = 0.1
+        run.record(a=0.0)
+    assert times == [number * 0.1 for number in range(1000)]
 
 
 def test_time_is_recorded_anyhow() -> None:

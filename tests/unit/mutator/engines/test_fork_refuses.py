@@ -23,7 +23,7 @@ def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
     execution = fork.run(fork.job(at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert execution.why == (
-        "once it is loaded, it has 2 threads, and only one can be forked: beside its own 'poll'"
+        "once it is loaded, it has 2 threads, and only one can be forked: besides the main one, 'poll'"
     )
 
 

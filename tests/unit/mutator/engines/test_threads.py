@@ -31,9 +31,14 @@ def test_threads_are_found_by_name() -> None:
 @pytest.mark.parametrize(
     ("names", "told", "remedy"),
     [
-        (["jemalloc_bg_thd"], "2 threads, .* 'jemalloc_bg_thd' of the memory allocator", "MALLOC_CONF"),
-        (["", ""], "3 threads, .* beside its own one without a name of a library$", "OMP_NUM_THREADS"),
-        (["poll"], "2 threads, .* beside its own 'poll'$", "--drive"),
+        (["jemalloc_bg_thd"], r"2 .* 'jemalloc_bg_thd' \(of the memory allocator jemalloc\)$", "MALLOC_CONF"),
+        (["", ""], r"3 .* besides the main one, one without a name \(of a library\)$", "OMP_NUM_THREADS"),
+        (["poll"], "2 .* besides the main one, 'poll'$", "start it after the run"),
+        (
+            ["ThreadPoolExecutor-0_0"],
+            r"'ThreadPoolExecutor-0_0' \(of a pool in Python\)$",
+            "in the step itself",
+        ),
     ],
 )
 def test_each_thread_is_told_with_what_turns_it_off(names: list[str], told: str, remedy: str) -> None:

@@ -14,6 +14,10 @@ NOTED = {
     "monotonic()": "time.monotonic() reads the clock",
     "time.perf_counter_ns()": "time.perf_counter_ns() reads the clock",
     "time.strftime('%Y')": "time.strftime() reads the clock",
+    "os.times()": "os.times() reads the clock",
+    "Held().clock()": "time.perf_counter() reads the clock",
+    "1 / (type(datetime.now()) is datetime.like)": "datetime.datetime.now() reads the clock",
+    "Held().now()": "datetime.datetime.now() reads the clock",
     "datetime.now()": "datetime.datetime.now() reads the clock",
     "random.gauss(0, 1)": "random.gauss() draws from the generator that all of random share",
     "random.Random()": "random.Random() is made without a seed",
@@ -35,14 +39,23 @@ SOUND = (
     "1 / isinstance(datetime(2020, 1, 1), datetime)",
     "hash(3)",
     "random.seed(3), random.random()",
+    "Held().seed(3)",
+    "1 / (copy.deepcopy(Held.clock) is Held.clock)",
+    "1 / (pickle.loads(pickle.dumps(Held.clock)) is Held.clock)",
+    "1 / (Held.clock.__name__ == 'perf_counter')",
     "np.random.seed(3), np.random.rand()",
 )
 IMPORTS = """\
-import os, random, threading, time, uuid
+import copy, os, pickle, random, threading, time, uuid
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from time import monotonic
 import numpy as np
+
+class Held:
+    clock = time.perf_counter
+    now = datetime.now
+    seed = random.seed
 
 """
 SCRIPT = """\

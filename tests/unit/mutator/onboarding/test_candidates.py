@@ -103,8 +103,16 @@ def test_a_file_named_for_a_controller_counts() -> None:
 
 
 @pytest.mark.parametrize(
-    "source", ["", "x = 1\n", "def step(x):\n    '''Only words.'''\n", "class A:\n    pass\n"]
+    "source",
+    [
+        "",
+        "x = 1\n",
+        "def step(x):\n    '''Only words.'''\n",
+        "class A:\n    pass\n",
+        "async def step(x):\n    y = x + 1\n    return y\n",
+    ],
 )
 def test_nothing_to_step(source: str) -> None:
-    """Modules without functions that do something have no candidate."""
+    """Modules without functions that do something have no candidate; a coroutine is none, as calling it
+    drives nothing."""
     assert candidates(a=source) == ()

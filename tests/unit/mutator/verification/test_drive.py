@@ -9,6 +9,7 @@ from mutator.errors import MutatorError
 from mutator.verification import drive
 from mutator.verification.drive import check_drive
 from mutator.verification.findings import Finding, Level
+from mutator.verification.reach import Reach
 from mutator.workspace import Workspace
 
 SCENARIO = ["A"]
@@ -94,6 +95,25 @@ def test_what_is_not_deterministic_is_told_with_its_line(
     assert found.remedy
 
 
+@pytest.mark.parametrize("made", ["names()", "held['names']"], ids=["returned", "in a dict"])
+def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made: str) -> None:
+    """What differs by the hash seed alone is told so, with the remedy for hashes and without a line, also
+    where a set of constants has another order in bytecode that was loaded than in fresh one."""
+    names = "{'x', 'y', 'zed', 'q'}"
+    change(toy, "sensing.py", "class Sensor", f"def names():\n    return {names}\n\n\nclass Sensor")
+    change(
+        toy,
+        "sensing.py",
+        "        self.publish((gap,",
+        f"        held = {{'names': {names}}}\n        shift = 0.0\n"
+        f"        for place, name in enumerate({made}):\n"
+        "            shift += 1e-9 * place * ord(name[0])\n        self.publish((gap + shift,",
+    )
+    found = driven(toy)["golden A"]
+    assert "with two hash seeds, and not with one, they first differ in channel " in found.found
+    assert (found.places, "sorted(...)" in found.remedy) == ((), True)
+
+
 @pytest.mark.parametrize("long", [False, True], ids=["brief", "long"])
 def test_a_thread_pool_is_told_with_its_line(
     toy: Workspace, long: bool, monkeypatch: pytest.MonkeyPatch
@@ -129,6 +149,7 @@ def test_a_thread_pool_is_told_with_its_line(
     line = line_of(toy, "self.pool.submit")
     assert str(place).startswith(f"toycar/driver.py:{line} in Driver.drive: starts the thread 'ThreadPool")
     assert "do that work in the step itself" in fast.remedy
+    assert "--drive" not in fast.remedy  # that is what runs
 
 
 def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> None:
@@ -193,6 +214,15 @@ def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> No
         path.write_text(path.read_text().replace("after_assign: gap}", "after_assign: gap, nth: 2}"))
     found = driven(toy)["statements"]
     assert [place.what.partition(":")[0] for place in found.places] == ["sensor/distance/nearer"]
+
+
+@pytest.mark.parametrize(
+    ("count", "told"), [(0, "none"), (1, "1 trigger, which is reached"), (2, "2 triggers, all are reached")]
+)
+def test_what_was_reached_is_counted(toy: Workspace, count: int, told: str) -> None:
+    """None, one and several are each told in words of their own."""
+    finding = Reach(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
+    assert (finding.name, finding.found) == ("triggers", told)
 
 
 def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:

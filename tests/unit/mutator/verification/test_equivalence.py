@@ -159,7 +159,7 @@ def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_pa
     why nothing was forked, the folder is as one of the reference engine, and its audit finds nothing."""
     summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
     assert (summary.proof, summary.exit_code) == (None, 0)
-    assert summary.not_forked.endswith("only one can be forked: beside its own 'poll'")
+    assert summary.not_forked.endswith("only one can be forked: besides the main one, 'poll'")
     assert not (tmp_path / "run" / "proof").exists()
     assert verify(tmp_path / "run", workspace=threaded).passed
     other = run_campaign(threaded, "small", tmp_path / "other", engine="reference", choices=Choices(limit=1))

@@ -67,7 +67,7 @@ def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -
     [
         ("case[\"gap\"] += number", "case[\"gap\"] += hash('x') % 9 + number", "nothing but PYTHONHASHSEED"),
         ("np.savez(to / \"log.npz\",", "np.savez(to / \"log.npz\", t0=np.random.rand(),", "different bytes"),
-        ("case[\"gap\"] += number", "case[\"gap\"] -= 39.9 + number", "reaches H1 at 0.0 s without"),
+        ("case[\"gap\"] += number", "case[\"gap\"] -= 39.9 + number", "reaches H1 at 0 s without"),
         ("import json\n", "import json\nimport nosuch\n", "crashed: ModuleNotFoundError"),
         ("np.savez(to / \"log.npz\",", "np.savez(to / \"other.npz\",", "not a readable trace"),
         ("now = world.advance", "now = 0\n        now = world.advance", "matches 2 statements"),
