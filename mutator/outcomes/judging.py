@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mutator.outcomes.golden import Trace, alerts_of, load_record, load_trace, on_steps
+from mutator.errors import MutatorError
+from mutator.outcomes.golden import BadOutput, Trace, alerts_of, load_record, load_trace, on_steps
 from mutator.outcomes.verdicts import Events
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
@@ -43,7 +44,7 @@ def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any])
     values = values_of(manifest, trace)
     hazards, ends, metrics = [], [], []
     for hazard in manifest.rules:
-        robust = stl.robustness(hazard.stl, values, manifest.step_s) if hazard.stl else None
+        robust = _robustness(hazard, values, manifest) if hazard.stl else None
         first = _first(hazard, values, robust, record)
         if first is not None:
             hazards.append((hazard.name, first))
@@ -75,6 +76,14 @@ def values_of(manifest: TargetManifest, trace: Trace) -> Values:
         if value.name not in values and all(name in values for name in names_in(value.text)):
             values[value.name] = over_time.numbers(value.text, values)
     return values
+
+
+def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.ndarray:
+    try:
+        return stl.robustness(hazard.stl, values, manifest.step_s)
+    except MutatorError as error:
+        where = manifest.trace_file
+        raise BadOutput(error.got, where=where, expected=error.expected, remedy=error.remedy) from None
 
 
 def _first(

@@ -35,9 +35,10 @@ class Metric:
 class Hazard:
     """A hazard and how it is found in a trace. One without `when` and `stl` is what the record says.
 
-    It comes where `when` has held for `for_s` seconds, or where the STL formula `stl` is violated. `margin`
-    is how far a step is from it, in `unit` (of `stl`, its robustness). Once `terminal` holds, the drive is
-    over: later steps are in no metric ('' never; `True`: from the hazard on). Hazards count all the same.
+    It comes where `when` has held for `for_s` seconds, or where the STL formula `stl` is violated (and all is
+    seen that it looks at). `margin` is how far a step is from it, in `unit` (of `stl`, its robustness). Once
+    `terminal` holds, the drive is over: later steps are in no metric ('' never; `True`: from the hazard on).
+    Hazards count all the same.
     """
 
     name: str
@@ -81,7 +82,8 @@ class HazardModel(StrictModel, title="A hazard"):
     stl: str | None = Field(
         None,
         description="Instead of `when`: a formula of signal temporal logic that must hold, as rtamt has it "
-        "(`pip install rtamt`). The hazard comes at the first step where it does not.",
+        "(`pip install rtamt`), with even steps. The hazard comes at the first step where it does not; with "
+        "a formula that looks ahead, as long after that step as it looks ahead.",
     )
     for_s: float = Field(
         0.0, ge=0.0, allow_inf_nan=False, description="How long it must last to be a hazard."
@@ -119,14 +121,19 @@ class MetricModel(StrictModel, title="A metric"):
 
 
 def read_hazards(
-    models: list[str] | dict[str, HazardModel], known: Collection[str], source: Source, *, recorded: bool
+    models: list[str] | dict[str, HazardModel],
+    known: Collection[str],
+    source: Source,
+    *,
+    recorded: bool,
+    step_s: float,
 ) -> tuple[Hazard, ...]:
     """The hazards of a manifest. `known` are the names that formulas may use; `recorded` says that the target
-    leaves a record. MutatorError with the line of whatever is wrong."""
+    leaves a record; a step has `step_s` seconds. MutatorError with the line of whatever is wrong."""
     if isinstance(models, list):
         hazards = tuple(Hazard(name=name) for name in models)
     else:
-        hazards = tuple(_hazard(name, model, known, source) for name, model in models.items())
+        hazards = tuple(_hazard(name, model, known, source, step_s) for name, model in models.items())
     if not recorded and (left := [hazard.name for hazard in hazards if hazard.recorded]):
         keys: Keys = ("hazards", left[0]) if isinstance(models, dict) else ("hazards",)
         raise source.error(
@@ -138,7 +145,7 @@ def read_hazards(
     return hazards
 
 
-def _hazard(name: str, model: HazardModel, known: Collection[str], source: Source) -> Hazard:
+def _hazard(name: str, model: HazardModel, known: Collection[str], source: Source, step_s: float) -> Hazard:
     keys: Keys = ("hazards", name)
     if model.when is not None and model.stl is not None:
         raise source.error((*keys, "stl"), "`when` and `stl`", expected="one of them", remedy="remove one")
@@ -156,7 +163,7 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
     formula = model.stl or ""
     if formula:
         with source.placing((*keys, "stl")):
-            stl.check(formula, known)
+            stl.check(formula, known, step_s)
     terminal = model.terminal
     return Hazard(
         name=name,

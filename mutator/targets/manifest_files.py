@@ -206,7 +206,9 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         channels=channels,
         record_file=model.record,
         observation=observation,
-        rules=read_hazards(model.hazards, known, source, recorded=model.record is not None),
+        rules=read_hazards(
+            model.hazards, known, source, recorded=model.record is not None, step_s=model.step_s
+        ),
         metrics=read_metrics(model.metrics, known, source),
         scene=None if model.scene is None else read_scene(model.scene, known, source),
         alerts=tuple(model.alerts),

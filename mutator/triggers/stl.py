@@ -1,20 +1,31 @@
 """Signal temporal logic, as rtamt reads it: an extra (`pip install rtamt`)."""
 
+import logging
 import re
 from collections.abc import Collection, Mapping
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from mutator._common.text import suggestion
 from mutator.errors import MutatorError
+from mutator.triggers.conditions import TIME
 
 _NAME = re.compile(r"\b[A-Za-z_]\w*\b")
 _OUT = "robustness_of_it"
+_PLACE = re.compile(r"1:(\d+): Syntax")
+_BOUNDED = ("TimedAlways", "TimedEventually", "TimedUntil")
+_UNBOUNDED = ("Always", "Eventually", "Until")
+_NEXT = ("Next", "StrongNext")
+_SAME_LENGTH = 0.01  # of a step; times are sums of steps, or were rounded
 
 
-def check(formula: str, variables: Collection[str]) -> None:
-    """MutatorError for a formula that rtamt cannot read, and where rtamt is not installed."""
-    _parsed(formula, variables, step_s=1.0)
+def check(formula: str, variables: Collection[str], step_s: float) -> None:
+    """MutatorError for a formula that cannot be evaluated in steps of `step_s`, and where rtamt is not
+    installed."""
+    # NaN goes through any arithmetic
+    _evaluated(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
 
 
 def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
@@ -24,20 +35,42 @@ def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
 
 
 def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
-    """How far the trace up to each step is from violating the formula (below 0: it does).
+    """How far each step is from violating the formula (below 0: it does).
 
-    `values` has an array for each variable, sampled in steps of `step_s`. A formula that looks ahead is
-    judged when it has seen all that it looks at.
+    `values` has an array for each variable, and the time of each step. A formula that looks ahead tells of a
+    step once all that it looks at is there: what it says of step i stands at i + how far it looks, and `inf`
+    before. MutatorError where steps are not `step_s` long, for the logic knows steps, not times.
     """
-    names = names_in(formula, values)
-    specification = _parsed(formula, names, step_s)
-    rows = zip(*(values[name].tolist() for name in names), strict=True)
-    return np.array(
-        [specification.update(i, list(zip(names, row, strict=True))) for i, row in enumerate(rows)]
-    )
+    time = values[TIME]
+    lengths = np.diff(time)
+    uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _SAME_LENGTH * step_s))
+    if uneven.size:
+        raise MutatorError(
+            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, and {formula!r} to judge it by",
+            expected=f"steps of {step_s:g} s, the manifest's `step_s`: a formula of signal temporal logic "
+            "counts steps",
+            remedy="record even steps, or say the hazard with `when`",
+        )
+    return _evaluated(formula, values, step_s)
 
 
-def _parsed(formula: str, variables: Collection[str], step_s: float) -> Any:
+def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
+    specification = _specification(step_s)
+    formula = " ".join(formula.split())
+    names, steps = names_in(formula, values), len(values[TIME])
+    # rtamt asks for two steps at least: the last is there twice, and what it says of the copy is left out
+    rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
+    try:
+        _parse(specification, formula, names)
+        ahead = _ahead(specification.ast.specs[-1], specification.offline_interpreter)
+        told = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
+    except Exception as error:  # of rtamt: KeyError, ValueError, its own, and whatever arithmetic raises
+        raise _refusal(error, formula, values, step_s) from None
+    judged = [number for _, number in told[: max(0, steps - ahead)]]
+    return np.array([np.inf] * min(ahead, steps) + judged, dtype=float)
+
+
+def _specification(step_s: float) -> Any:
     try:
         import rtamt  # type: ignore[import-untyped]
     except ImportError:
@@ -47,24 +80,57 @@ def _parsed(formula: str, variables: Collection[str], step_s: float) -> Any:
             remedy="pip install rtamt, or say it with `when`",
         ) from None
     specification = rtamt.StlDiscreteTimeSpecification()
-    for name in (*names_in(formula, variables), _OUT):
-        specification.declare_var(name, "float")
-    specification.set_sampling_period(round(step_s * 1e6), "us", 0.1)
-    specification.spec = f"{_OUT} = {formula}"
-    try:
-        specification.parse()
-        specification.pastify()
-    except KeyError as error:
-        raise _refuse(f"unknown name {error}", formula, variables) from None
-    except rtamt.RTAMTException as error:
-        raise _refuse(str(error).removeprefix("RTAMT Exception: ").strip(), formula, variables) from None
+    specification.set_sampling_period(Fraction(step_s).limit_denominator(10**9), "s", 0.1)
     return specification
 
 
-def _refuse(what: str, formula: str, variables: Collection[str]) -> MutatorError:
+def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
+    declared = {*names, _OUT}
+    for name in declared:
+        specification.declare_var(name, "float")
+    specification.spec = f"{_OUT} = {formula}"
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)  # rtamt warns of a name that it does not know: it is refused here
+    try:
+        specification.parse()
+    finally:
+        logging.disable(before)
+    specification.offline_interpreter.set_ast(specification.ast)
+    if unknown := sorted(specification.ast.vars - declared):
+        raise KeyError(unknown[0])
+
+
+def _ahead(node: Any, interpreter: Any) -> int:
+    """How many steps a formula looks ahead; ValueError for one without end."""
+    kind = type(node).__name__
+    if kind in _UNBOUNDED:
+        raise ValueError(f"unbounded {kind.lower()}")
+    below: int = max((_ahead(child, interpreter) for child in node.children), default=0)
+    if not hasattr(node, "begin"):
+        return below + (kind in _NEXT)
+    begin, end = interpreter.time_unit_transformer(node)
+    if begin > end:
+        raise ValueError("a time that ends before it begins")
+    return below + (int(end) if kind in _BOUNDED else 0)
+
+
+def _refusal(error: Exception, formula: str, variables: Collection[str], step_s: float) -> MutatorError:
+    """What rtamt says, in words for who wrote the formula."""
+    said = str(error).removeprefix("RTAMT Exception: ").strip()
+    remedy = "correct the formula"
+    if place := _PLACE.match(said):
+        rest = formula[int(place[1]) - len(f"{_OUT} = ") :]
+        said = f"unexpected {rest!r}" if rest else "an end too soon"
+    elif isinstance(error, KeyError):
+        name = str(error.args[0])
+        said, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
+    elif "unbounded" in said:
+        remedy = "say how far it looks, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
+    elif "sampling period" in said:
+        said, remedy = f"a time that is no multiple of the step, {step_s:g} s,", "take one that is"
     return MutatorError(
-        f"{what} in {formula!r}",
+        f"{said} in {formula!r}",
         expected="a formula of signal temporal logic that looks back, or ahead for a given time, over "
         + ", ".join(variables),
-        remedy="rewrite it: `historically(x < 3)` instead of `always(x < 3)`",
+        remedy=remedy,
     )

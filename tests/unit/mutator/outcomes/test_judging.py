@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.golden import compare, load_record, load_trace
+from mutator.outcomes.golden import BadOutput, compare, load_record, load_trace
 from mutator.outcomes.judging import Judged, judge_run, load_judged
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
@@ -185,15 +185,25 @@ def test_steps_of_any_length(write: Write) -> None:
 
 
 def test_a_formula_of_temporal_logic(write: Write) -> None:
-    """It is violated where the trace so far violates it; its robustness is the margin."""
+    """The hazard comes as long after the step that violates it as the formula looks ahead; the robustness is
+    the margin."""
     pytest.importorskip("rtamt")
-    found = judged(write('hazards: {LATE: {stl: "(gap < 2) implies eventually[0:2](gap > 3)", unit: m}}\n'))
+    rule = "(gap < 2) implies eventually[0:2](gap > 3)"
+    found = judged(write(f'hazards: {{LATE: {{stl: "{rule}", unit: m}}}}\n'))
     assert found.hazards == (("LATE", 3.0),)  # below 2 m at 1 s, and not above 3 m by 3 s
-    assert "margin_late" in dict(found.metrics)
+    assert dict(found.metrics) == {"margin_late": -1.0}  # of 1 s; what 4 s and 5 s lack was not recorded
     with pytest.raises(MutatorError, match=r"cart.yaml:20: unknown name 'speeed' in"):
         write('hazards: {LATE: {stl: "historically(speeed < 3)"}}\n')
-    with pytest.raises(MutatorError, match="unbounded always"):
-        write('hazards: {LATE: {stl: "always(speed < 3)"}}\n')
+    with pytest.raises(MutatorError, match=r"cart.yaml:20: a time that is no multiple of the step, 1 s"):
+        write('hazards: {LATE: {stl: "historically[0:0.5](speed < 3)"}}\n')
+
+
+def test_temporal_logic_needs_even_steps(write: Write) -> None:
+    """A run with steps of another length cannot be judged so: that is an output that does not fit."""
+    pytest.importorskip("rtamt")
+    manifest = write('hazards: {LATE: {stl: "speed < 3"}}\n')
+    with pytest.raises(BadOutput, match="a step of 2 s at 4 s"):
+        judged(manifest, time=np.array([0.0, 1, 2, 3, 4, 6]))
 
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
