@@ -9,7 +9,7 @@ from mutator.engines.kinds import ENGINES, FORK, REFERENCE
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
-_WORTH_IT = 40  # experiments; of fewer, the equivalence check alone would repeat most
+WORTH_IT = 40  # experiments; of fewer, the equivalence check alone would repeat most
 
 
 def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:
@@ -17,9 +17,9 @@ def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int)
 
     MutatorError when the one asked for is unknown or cannot run this target here.
     """
-    why = not_forkable(manifest)
     if asked is None:
-        return REFERENCE if why or experiments < _WORTH_IT else FORK
+        return REFERENCE if not_worth_forking(manifest, experiments) else FORK
+    why = not_forkable(manifest)
     if asked not in ENGINES:
         raise MutatorError(f"engine '{asked}'", argument="engine", expected=f"one of {', '.join(ENGINES)}")
     if ENGINES[asked].forks and why:
@@ -31,6 +31,12 @@ def make_engine(name: str, setting: Setting) -> Engine:
     """An engine of that name."""
     engine: Engine = resolve_name(ENGINES[name].factory)(setting)
     return engine
+
+
+def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
+    """Why so many experiments are not forked unless that is asked for; empty if they are."""
+    few = f"that pays off from {WORTH_IT} experiments on" if experiments < WORTH_IT else ""
+    return not_forkable(manifest) or few
 
 
 def not_forkable(manifest: TargetManifest) -> str:

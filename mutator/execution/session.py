@@ -23,7 +23,7 @@ from mutator.campaigns.plans import Choices, make_run_folder
 from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base
-from mutator.engines.registry import choose_engine
+from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
@@ -56,9 +56,7 @@ class Summary:
     results: Path | None  # results.csv; None when there was no room for it
     proof: equivalence.Proof | None  # None: nothing that the reference engine has not run
     seal: str | None  # of a finished run
-    not_forked: (
-        str  # why an engine that forks has forked nothing, so that nothing was proved; empty otherwise
-    )
+    not_forked: str  # why nothing was forked, and nothing proved; empty where that was asked for, too
     elapsed_s: float
 
     @property
@@ -99,7 +97,9 @@ class Session:
         self.proof: tuple[equivalence.Sample, ...] = ()
         self._manifest = workspace.manifest(folder.head["target"])
         # of the whole plan, so that all shards of it, and the run of one machine, have a proof, or none has
-        self.engine = choose_engine(engine, self._manifest, folder.head["experiments"])
+        experiments = folder.head["experiments"]
+        self.engine = choose_engine(engine, self._manifest, experiments)
+        self._not_forked = "" if engine else not_worth_forking(self._manifest, experiments)
         self.problem = ""
         self.interrupted = False
         self._began = time.monotonic()
@@ -159,7 +159,7 @@ class Session:
             self._close_segments()
             built = results.ensure(self.folder.path)
         proven = equivalence.judge(self.folder, records)
-        not_forked = ""
+        not_forked = "" if proven else self._not_forked
         if proven and done == self.folder.planned and (why := equivalence.needless(self.folder)) is not None:
             proven, not_forked = None, why
             with self._noting_full_disk():

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
+_OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns
 STILLS_BYTES = 4_000_000  # of pictures in the page; more are links
 
 
@@ -82,18 +83,20 @@ def tables_of(folder: RunFolder, rows: Sequence[Row]) -> tuple[dict[str, Any], d
     rows, lines = [rows[i] for i in order], [lines[i] for i in order]
     experiments = {e.id: e for e in plan_file.read_all(folder.path)}
     planned = [experiments.get(row.experiment_id) for row in rows]
-    return table(rows, lines), details(planned, shapes(_patches(folder, rows)), rows)
+    made = table(rows, lines, alerts=folder.has_alerts)
+    return made, details(planned, shapes(_patches(folder, rows)), rows)
 
 
 def reading_order(row: Row) -> tuple[str, ...]:
     return (row.module, row.fault_type, row.scenario, row.method, row.trigger, row.experiment_id)
 
 
-def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]]) -> dict[str, Any]:
+def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bool = True) -> dict[str, Any]:
     """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
-    `t_hazard`."""
+    `t_hazard`. Those of alerts only for a target that has `alerts`."""
+    left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
-        name: [line[name] for line in lines] for name in (lines[0] if lines else ())
+        name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
     }
     columns["kind"] = [f"{r.module}/{r.fault_type}" for r in rows]
     columns["fault"] = [r.fault for r in rows]

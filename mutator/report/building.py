@@ -13,7 +13,7 @@ from mutator.report.browse import browse_data
 from mutator.report.page import Content, markdown, page_html
 from mutator.report.panel import FOLDER
 from mutator.report.panels import PANELS
-from mutator.report.panels.tables import NOTES
+from mutator.report.panels.tables import notes
 from mutator.report.stamp import is_current, made_from, remove_stamp, write_stamp
 from mutator.report.studies import ReportedRun
 from mutator.store.run_folder import RunFolder
@@ -70,7 +70,7 @@ def _content(run: ReportedRun) -> Content:
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
         outcomes=outcome_counts(run.rows),
         planned=_planned(run.folder),
-        notes=NOTES.replace("*", ""),
+        notes=notes(run.folder).replace("*", ""),
         panels=panels,
         browse=browse_data(run.folder, run.rows, run.out, run.workspace),
     )

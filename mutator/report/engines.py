@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from mutator._common.tables import Table
 from mutator.engines.jobs import RunMode
+from mutator.engines.registry import WORTH_IT
 from mutator.errors import CheckFailed
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
@@ -69,7 +70,10 @@ def _proof(folder: RunFolder) -> tuple[str, str, bool]:
         said = f"The proof failed, so nothing here is to be trusted: {err.got}."
         return said, f"FAILED: {err.got}", True
     if found is None:
-        return "All were run on the reference engine, so there is nothing to prove.", "none needed", False
+        said = "All were run on the reference engine, so there is nothing to prove."
+        if folder.head["experiments"] < WORTH_IT:
+            said += f" Forking pays off from {WORTH_IT} experiments on."
+        return said, "none needed", False
     same = f"{found.same} of {found.sampled} same"
     if not found.whole:
         said = f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run."

@@ -34,6 +34,7 @@ class Grid {
     this.place = place;
     place.style.setProperty("--rows", table.count); // a short table has a low window
     this.table = table;
+    this.columns = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // alerts: not of every target
     this.state = state;
     this.rows = [];
     this.current = 0; // place in `rows` of the row that has the keyboard
@@ -45,12 +46,12 @@ class Grid {
 
   #build() {
     const { el } = Dom;
-    this.heads = Grid.COLUMNS.map((column) => {
+    this.heads = this.columns.map((column) => {
       const button = el("button", { type: "button", onclick: () => this.#sortBy(column.name) }, column.title, el("span.arrow", { "aria-hidden": "true" }));
       return el(`th.${column.narrow ? "narrow" : "wide"}${column.time ? ".time" : ""}`, { scope: "col", style: `width: ${column.px}px`, "data-column": column.name }, button);
     });
     this.body = el("tbody");
-    const width = Grid.COLUMNS.reduce((sum, column) => sum + column.px, 0);
+    const width = this.columns.reduce((sum, column) => sum + column.px, 0);
     this.element = el("table.grid", { "aria-label": "Experiments", style: `--width: ${width}px` },
       el("thead", {}, el("tr", { "aria-rowindex": 1 }, this.heads)), this.body);
     this.body.addEventListener("click", (event) => {
@@ -121,7 +122,7 @@ class Grid {
     const shown = [];
     for (let at = first; at < last; at++) shown.push(this.#row(at));
     this.body.replaceChildren(...[space(first), ...shown, this.isOnPaper ? null : space(more)].filter(Boolean));
-    if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: Grid.COLUMNS.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
+    if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: this.columns.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
     if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, "No experiment fits these filters.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
   }
@@ -130,7 +131,7 @@ class Grid {
     const { el } = Dom;
     const row = this.rows[at], id = this.table.text(row, "experiment_id");
     const isCurrent = at === this.current, isOpen = id === this.state.experiment;
-    const cells = Grid.COLUMNS.map((column) => {
+    const cells = this.columns.map((column) => {
       const classes = `td.${column.narrow ? "narrow" : "wide"}${column.time ? ".time" : ""}`;
       if (!column.time) return el(classes, {}, column.cell ? column.cell(this.table, row) : this.table.text(row, column.name));
       const value = this.table.number(row, column.name);

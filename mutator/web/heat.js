@@ -29,9 +29,11 @@ class HeatMap {
       { name: "hazards-injected", title: "hazards / injected", part: isHazard, of: all },
       { name: "activated", title: "activated / injected", part: isActive, of: all },
       { name: "manifested", title: "manifested / activated", part: has("t_manifest"), of: isActive },
+    ];
+    if (table.columns.has("alerts")) made.push(
       { name: "alerts", title: "alerts / activated", part: isAlert, of: isActive },
       { name: "silent", title: "hazards without an alert / hazards", part: (row) => !isAlert(row), of: isHazard },
-    ];
+    );
     if (table.checked.length < 2) return made;
     const each = table.checked.map((hazard) => ({
       name: hazard, title: `${hazard} / activated`, of: isActive, part: has(`t_${hazard.toLowerCase()}`),

@@ -2,11 +2,16 @@
 
 import csv
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from mutator.report import building
+from mutator.report.panels import figures
+from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
     from .conftest import Page
@@ -301,3 +306,22 @@ def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scroll
 def rows_of(pdf: bytes) -> int:
     """How many rows the tables of a tagged PDF have."""
     return len(re.findall(rb"/S\s*/TR\b", pdf))
+
+
+def test_a_target_without_alerts_has_no_column_for_them(
+    page: "Page", run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither table, filters nor map speak of alerts where the target has none, and sorting still works."""
+    other = tmp_path / "run"
+    shutil.copytree(run, other, ignore=shutil.ignore_patterns("report"))
+    monkeypatch.setattr(RunFolder, "has_alerts", False)
+    monkeypatch.setattr(figures, "drawings", lambda frame: ())
+    building.write(other, None)
+    told = [*page.texts("#grid th"), *page.texts("[data-facet] > summary"), *page.texts("option")]
+    assert sum("alert" in text.lower() for text in told) >= 4
+    page.url = (other / "report" / "index.html").as_uri()
+    page.open("sort=-t_hazard")
+    told = [*page.texts("#grid th"), *page.texts("[data-facet] > summary"), *page.texts("option")]
+    assert len(told) > 15
+    assert [text for text in told if "alert" in text.lower() or "reaction" in text] == []
+    assert page.column("t_hazard")[0]

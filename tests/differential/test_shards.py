@@ -76,7 +76,7 @@ def test_shards_have_the_engine_of_the_whole(
 ) -> None:
     """A share of a plan that is worth forking is forked, too, however small: the merged run has the proof,
     and with it the seal, of the whole."""
-    monkeypatch.setattr(registry, "_WORTH_IT", RunFolder.open(runs["whole"]).planned)
+    monkeypatch.setattr(registry, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 

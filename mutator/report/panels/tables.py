@@ -20,14 +20,15 @@ from mutator.report.studies import ReportedRun
 from mutator.statistics.metric_tables import metrics_sheet
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.sheets import run_sheets
+from mutator.store.run_folder import RunFolder
 
 FOLDER = "tables"  # of the report
 NOTES = (
     "*Injected* counts the experiments that say something about their fault; a harness error, or a mutant "
     "that could not be made, is counted apart. *Activated*: an injected statement ran while triggered. "
-    "*Manifested*: an actuator output then differed from the fault-free run. *Hazard, no alert*: no counted "
-    "alert at all."
+    "*Manifested*: an actuator output then differed from the fault-free run."
 )
+NO_ALERT = " *Hazard, no alert*: no counted alert at all."
 FAULT_FREE = "The golden runs: first times of alerts and hazards, and how far each plotted channel goes."
 _GROUPS = (
     ("By fault type", "fault type", by_fault_type),
@@ -56,13 +57,18 @@ _HTML = """\
 """
 
 
+def notes(folder: RunFolder) -> str:
+    """What the heads of the counts mean."""
+    return NOTES + (NO_ALERT if folder.has_alerts else "")
+
+
 def tables_panel(run: ReportedRun) -> Panel:
     """Counts by fault type, scenario and method, then what statistics say of them."""
     runs = run.fault_free()
     note = own_alerts(runs)
     counts, sheets = _counts(run), [_noted(sheet, note) for sheet in _sheets(run)]
     write_sheets(sheets, run.out)
-    parts = [NOTES]
+    parts = [notes(run.folder)]
     for title, table in counts:
         parts += filter(None, (f"## {title}", note, table.as_markdown()))
     fault_free = fault_free_table(runs, alerts=run.folder.has_alerts) if runs else None

@@ -9,7 +9,7 @@ from mutator._common.files import write_json
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.rows import Row
 from mutator.report import browse
-from mutator.report.browse import column, details, media
+from mutator.report.browse import column, details, media, table
 from mutator.review.groups import shapes
 from mutator.store.run_folder import RunFolder
 
@@ -65,6 +65,16 @@ def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str],
     """Ids stay texts, empty cells stay empty, and what is no finite number is told by its name; names have a
     dictionary, which filters need, also where no two are equal, and are no numbers."""
     assert column(name, values) == made
+
+
+def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
+    """The page of a target without alerts carries no column that is always empty."""
+    line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
+    names = [
+        {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)
+    ]
+    assert names[0] - names[1] == {"alerts", "t_alert", "reaction_time"}
+    assert "detail" in names[1]
 
 
 def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., Experiment]) -> None:

@@ -124,7 +124,7 @@ def record_ids(run: Path) -> list[str]:
             "3 of 4 experiments came out the same on the reference engine, byte for byte. The rest",
             "not finished: 3 of 4 same",
         ),
-        (None, "so there is nothing to prove.", "none needed"),
+        (None, "there is nothing to prove. Forking pays off from 40 experiments on.", "none needed"),
     ],
 )
 def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
@@ -135,6 +135,16 @@ def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: 
     assert told.proof.endswith(said) == (proven != 3)
     assert told.state == state
     assert not told.failed
+
+
+def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
+    finish: Finish, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever had many experiments run on the reference engine wanted so."""
+    monkeypatch.setattr(engines, "WORTH_IT", 4)
+    told = engines.engine_summary(RunFolder.open(finish(None)))
+    assert told is not None
+    assert told.proof.endswith("so there is nothing to prove.")
 
 
 def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:

@@ -166,6 +166,21 @@ def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_pa
     assert summary.seal == other.seal
 
 
+@pytest.mark.parametrize(
+    ("engine", "note"),
+    [
+        (None, "none is needed, as no experiment was forked: that pays off from 40 experiments on"),
+        ("reference", ""),
+    ],
+)
+def test_few_experiments_are_said_not_to_be_worth_forking(
+    toycar: Workspace, tmp_path: Path, engine: str | None, note: str
+) -> None:
+    """Where the engine was left to the harness, which forks no small campaign, the end of the run says so."""
+    summary = run_campaign(toycar, "small", tmp_path / "run", engine=engine, choices=Choices(limit=1))
+    assert (summary.proof, summary.proof_note) == (None, note)
+
+
 @pytest.mark.slow
 def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path) -> None:
     """Runs of the proof that were driven before it was known that nothing is forked leave nothing, so that

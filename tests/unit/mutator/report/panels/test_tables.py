@@ -74,3 +74,12 @@ def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolde
     assert "| S1 | steer_saturated at 12.29 s | none | 1 to 1 |" in panel.markdown
     assert note in (run.path / "report" / "tables" / "summary_guided.md").read_text()
     assert note not in (run.path / "report" / "tables" / "hazard_orders.md").read_text()
+
+
+@pytest.mark.parametrize("alerts", [["fcw"], []])
+def test_alerts_are_told_only_of_a_target_that_has_some(run: RunFolder, alerts: list[str]) -> None:
+    """The report of a target without alerts explains no column that it does not have."""
+    head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
+    (run.path / "run.json").write_text(json.dumps(head))
+    markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
+    assert ("no alert" in markdown.lower()) == bool(alerts)
