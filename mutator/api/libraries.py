@@ -50,11 +50,11 @@ def upgrade_manifest(path: str | Path) -> Upgrade | None:
     """Write a target's manifest of an older schema anew, as one of today's; all that did not change stays.
 
     None for a manifest of today's schema, which is left alone. `lost` of the answer are comments within what
-    had to be written anew. MutatorError for a file that is no manifest.
+    had to be written anew. MutatorError for a file that is no manifest, which stays as it is.
     """
     upgrade = manifest_files.upgrade_manifest(Path(path))
     if upgrade is not None:
-        write_atomic(Path(path), upgrade.text.encode())
+        write_atomic(Path(path).resolve(), upgrade.text.encode())  # what a link leads to
     return upgrade
 
 

@@ -1,6 +1,6 @@
 """Filter expressions over table columns (`--only`, `--exclude`): parsed, never evaluated as code.
 
-fault_type == "chaff" and scenario in ("S1", "S2") and value > 100
+fault_type == "shifted" and scenario in ("S1", "S2") and value > 100
 match(fault_type, "ghost*") and not method == "random"
 """
 

@@ -47,7 +47,7 @@ class AtModel(StrictModel, title="A place"):
             raise source.error(
                 (*keys, "function"),
                 f"'{self.function}'",
-                expected="a qualified name such as Sonar.measure",
+                expected="a qualified name such as Sensor.measure",
             )
         anchor = Anchor(kind=kind, name=name, nth=self.nth)
         return FaultLocation(path=self.file, function=self.function, anchor=anchor)

@@ -90,7 +90,11 @@ for _kind, (_first, _pattern) in _CORE.items():
 
 def load(path: Path) -> Source:
     """Parse one YAML file strictly; MutatorError with file and line for anything wrong with it."""
-    text = _read_text(path)
+    return parse(_read_text(path), path)
+
+
+def parse(text: str, path: Path) -> Source:
+    """The same for the text of a file."""
     try:
         _check_events(text, path)
         node = yaml.compose(text, Loader=_Loader)

@@ -153,7 +153,7 @@ def upgrade_manifest(path: Path) -> Upgrade | None:
     if not isinstance(source.data, dict) or source.data.get("schema") != OLD:
         read(path, ManifestModel, SCHEMA)
         return None
-    read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
+    load_manifest(path, root=path.parent)  # its tree need not be there
     return upgraded_text(source)
 
 

@@ -2,12 +2,15 @@
 
 import re
 from dataclasses import dataclass, replace
+from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 import yaml
 
 from mutator._common.files import no_pipe
-from mutator.config.yaml_files import Keys, Source
+from mutator.config.yaml_files import Keys, Source, parse
+from mutator.errors import MutatorError
 
 OLD, NEW = "target/1", "target/2"
 # key of target/1 -> keys of target/2 that are written in its place
@@ -20,7 +23,8 @@ _REPLACED: dict[str, tuple[str, ...]] = {
     "compare": ("channels",),
     "plot": ("channels",),
 }
-_COMMENT = re.compile(r"(?:^|\s)#")
+_REQUIRED = ("trace_file", "time_channel", "record_file", "compare", "observation")
+_COMMENT = re.compile(r"(?:^|(?<=\s))#[^\r\n]*", re.MULTILINE)
 _OBSERVED = {
     "d_rel": ("m", "distance to the vehicle ahead"),
     "v_ego": ("m/s", "the car's own speed"),
@@ -33,31 +37,37 @@ _DERIVED = {
 
 
 def upgraded(source: Source) -> Source:
-    """The manifest as one of target/2; its values keep their lines. What is no manifest stays as it is."""
+    """The manifest as one of target/2; its values keep their lines. MutatorError for one that lacks what
+    target/1 asked for."""
     data, lines = dict(source.data), dict(source.lines)
-    if isinstance(observation := data.get("observation"), dict):
+    _check_complete(data, _REQUIRED, source, ())
+    if isinstance(observation := data["observation"], dict):
+        _check_complete(observation, ("t", *_OBSERVED), source, ("observation",))
         data["observation"] = _observation(observation, lines)
-    if isinstance(data.get("compare"), dict) and isinstance(data.get("plot", {}), dict):
+    if isinstance(data["compare"], dict) and isinstance(data.get("plot", {}), dict):
         data["channels"] = _channels(data, lines)
-    if "trace_file" in data and "time_channel" in data:
-        data["trace"] = {"file": data.pop("trace_file"), "time": data.pop("time_channel")}
-        lines[("trace",)] = lines["trace", "file"] = lines[("trace_file",)]
-    if "record_file" in data:
-        data["record"] = data.pop("record_file")
-        lines[("record",)] = lines[("record_file",)]
-    return replace(source, data=data, lines=lines)
+    data["trace"] = {"file": data.pop("trace_file"), "time": data.pop("time_channel")}
+    lines[("trace",)] = lines["trace", "file"] = lines[("trace_file",)]
+    data["record"] = data.pop("record_file")
+    lines[("record",)] = lines[("record_file",)]
+    return replace(source, data=data | {"schema": NEW}, lines=lines)
+
+
+def _check_complete(data: dict[str, Any], keys: tuple[str, ...], source: Source, at: Keys) -> None:
+    if missing := [key for key in keys if key not in data]:
+        raise source.error(
+            at, f"no `{missing[0]}`", expected=f"it in a manifest of {OLD}", remedy=f"add it, or write {NEW}"
+        )
 
 
 def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
     new = {key: value for key, value in old.items() if key not in ("t", *_OBSERVED)}
-    if "t" in old:
-        new["time"] = old["t"]
-        lines["observation", "time"] = lines["observation", "t"]
+    new["time"] = old["t"]
+    lines["observation", "time"] = lines["observation", "t"]
     new["values"] = {}
     for name, (unit, about) in _OBSERVED.items():
-        if name in old:
-            new["values"][name] = {"is": old[name], "unit": unit, "about": about}
-            lines["observation", "values", name] = lines["observation", name]
+        new["values"][name] = {"is": old[name], "unit": unit, "about": about}
+        lines["observation", "values", name] = lines["observation", name]
     formulas = {
         name: {"is": text, "unit": unit, "about": about} for name, (text, unit, about) in _DERIVED.items()
     }
@@ -65,10 +75,13 @@ def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 
 def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
-    """Of `compare` and `plot`, which leave `data`: actuators, and what the target told no role of."""
-    channels = {}
+    """Of `compare` and `plot`, which leave `data`: actuators, and what the target told no role of. What is in
+    both was compared."""
+    channels = dict[str, Any]()
     for key, role in (("compare", "actuator"), ("plot", "internal")):
         for name, channel in data.pop(key, {}).items():
+            if name in channels:
+                continue
             channels[name] = {**channel, "role": role} if isinstance(channel, dict) else channel
             for keys in [keys for keys in lines if keys[:2] == (key, name)]:
                 lines["channels", *keys[1:]] = lines[keys]
@@ -85,26 +98,65 @@ class Upgrade:
 
 
 def upgraded_text(source: Source) -> Upgrade:
-    """The file of a target/1 manifest with what changed written anew, and all else as it is."""
-    lines = no_pipe(source.path).read_text(encoding="utf-8").splitlines(keepends=True)
+    """The file of a target/1 manifest with what changed written anew, and all else as it is; or all of it
+    anew, where its keys do not stand on lines of their own. It says what `upgraded` says, or MutatorError."""
+    text = no_pipe(source.path).read_bytes().decode()
+    new = upgraded(source).data
+    for upgrade in (_line_by_line, _anew):
+        done = upgrade(text, source, new)
+        if _says(done.text, source.path) == new:
+            return done
+    raise MutatorError(
+        "cannot be written anew without a change of what it says",
+        where=source.path,
+        remedy=f"write it by hand: `schema: {NEW}`",
+    )
+
+
+def _says(text: str, path: Path) -> Any:
+    try:
+        return parse(text, path).data
+    except MutatorError:
+        return None
+
+
+def _anew(text: str, source: Source, new: dict[str, Any]) -> Upgrade:
+    dumped = "".join(_dumped(key, new[key]) for key in sorted(new, key=lambda key: key != "schema"))
+    return Upgrade(text=dumped, lost=tuple(comment for _, comment in _comments(text)))
+
+
+def _line_by_line(text: str, source: Source, new: dict[str, Any]) -> Upgrade:
+    lines = text.splitlines(keepends=True)
+    line_break = "\r\n" if "\r\n" in text else "\n"
+    comments = _comments(text)
     begins = sorted((line - 1, keys[0]) for keys, line in source.lines.items() if len(keys) == 1)
     ends = [_end_of(lines, begin) for begin, _ in begins[1:]] + [len(lines)]
-    new = {"schema": NEW} | {
-        key: value
-        for key, value in upgraded(source).data.items()
-        if key not in source.data or key == "observation"
+    new = {
+        key: value for key, value in new.items() if key not in source.data or key in ("schema", "observation")
     }
-    text, lost = ["".join(lines[: _end_of(lines, begins[0][0])])], list[str]()
+    parts, lost = ["".join(lines[: _end_of(lines, begins[0][0])])], list[str]()
     for (begin, key), end in zip(begins, ends, strict=True):
         replaced = _REPLACED.get(str(key), ())
-        above = begin - _end_of(lines, begin)
-        text.append("".join(lines[begin - above : begin]))
+        parts.append("".join(lines[_end_of(lines, begin) : begin]))
         if not replaced:
-            text.append("".join(lines[begin:end]))
+            parts.append("".join(lines[begin:end]))
             continue
-        text += [_dumped(name, new.pop(name)) for name in replaced if name in new]
-        lost += [line[line.index("#") :].strip() for line in lines[begin:end] if _COMMENT.search(line)]
-    return Upgrade(text="".join(text), lost=tuple(lost))
+        dumped = "".join(_dumped(name, new.pop(name)) for name in replaced if name in new)
+        parts.append(dumped.replace("\n", line_break))
+        parts += takewhile(lambda line: not line.strip(), reversed(lines[begin:end]))
+        lost += [comment for line, comment in comments if begin <= line < end]
+    return Upgrade(text="".join(parts), lost=tuple(lost))
+
+
+def _comments(text: str) -> list[tuple[int, str]]:
+    """Line (from 0) and text of each comment: no `#` in a value is one."""
+    masked = list(text)
+    for token in yaml.scan(text, Loader=yaml.SafeLoader):
+        if isinstance(token, yaml.ScalarToken):
+            begin, end = token.start_mark.index, token.end_mark.index
+            masked[begin:end] = ["\n" if letter == "\n" else "_" for letter in text[begin:end]]
+    bare = "".join(masked)
+    return [(bare.count("\n", 0, found.start()), found[0].strip()) for found in _COMMENT.finditer(bare)]
 
 
 def _end_of(lines: list[str], begin: int) -> int:

@@ -182,7 +182,7 @@ class Experiment {
     const { el } = Dom;
     const place = this.#content("pictures");
     if (!kept && !this.facts.filmed) {
-      place.parentElement.remove(); // a target without a camera
+      place.parentElement.remove(); // a target without films
       return;
     }
     const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");

@@ -1,6 +1,6 @@
 "use strict";
 // What is shown, kept in the address behind #, so that it can be shared and Back goes back:
-// #e=EXPERIMENT&q=words&kind=sensor%2Fbias&scenario=S1,S2&sort=-t_hazard&heat=warned
+// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=warned
 
 class State {
   /** `changed(state)` is called after every change, whoever made it. */

@@ -1,36 +1,107 @@
 """`mutator upgrade`: manifests of the older schema."""
 
+import json
 import shutil
 from dataclasses import fields
 from pathlib import Path
 
+import pytest
+import yaml
+
+from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 
 OLD = Path(__file__).parents[1] / "fixtures" / "run-2" / "toy"
 
 
-def test_an_older_manifest_is_written_anew(cli, tmp_path: Path) -> None:
-    """It says the same as before, comments elsewhere stay, and those that could not are printed."""
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A manifest of target/1, in a library with its tree."""
     shutil.copytree(OLD, tmp_path / "toy")
-    path = tmp_path / "toy" / "fault_library" / "targets" / "toycar.yaml"
-    text = (
-        path.read_text()
-        .replace("step_s:", "# of the world\nstep_s:")
-        .replace("compare:", "compare:  # pedals")
-    )
-    path.write_text(text)
+    return tmp_path / "toy" / "fault_library" / "targets" / "toycar.yaml"
+
+
+def changed(before: TargetManifest, after: TargetManifest) -> list[str]:
+    same = [f.name for f in fields(before) if f.name != "source"]
+    return [name for name in same if getattr(before, name) != getattr(after, name)]
+
+
+def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
+    """It says the same as before, comments elsewhere stay, and those that could not are printed."""
+    text = path.read_text().replace("step_s:", "# of the world\nstep_s:")
+    text = text.replace("compare:", "compare:  # pedals").replace("target/1\n", "target/1\n\n")
+    path.write_text(text.replace("t: now\n", 't: "now  # b"\n'))
     before = load_manifest(path)
     answer = cli("upgrade", path)
     assert (answer.code, answer.err) == (0, "")
     assert answer.out.splitlines()[1:] == ["  left out: # pedals"]
-    after = load_manifest(path)
-    same = [f.name for f in fields(before) if f.name != "source"]
-    assert [name for name in same if getattr(before, name) != getattr(after, name)] == []
+    assert changed(before, load_manifest(path)) == []
     kept = path.read_text()
-    assert kept.startswith("schema: target/2\n")
+    assert kept.startswith("schema: target/2\n\nname: toycar\n")
     assert "# of the world\nstep_s:" in kept
     assert "nothing to do" in cli("upgrade", path).out
     assert path.read_text() == kept
+
+
+@pytest.mark.parametrize("indent", [None, 1])
+def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | None) -> None:
+    """Where keys do not stand on lines of their own, all is written anew and says the same."""
+    path.write_text(json.dumps(yaml.safe_load(path.read_text()), indent=indent) + "  # all of it\n")
+    before = load_manifest(path)
+    answer = cli("upgrade", path)
+    assert (answer.code, answer.err) == (0, "")
+    assert answer.out.splitlines()[1:] == ["  left out: # all of it"]
+    assert path.read_text().startswith("schema: target/2\n")
+    assert changed(before, load_manifest(path)) == []
+
+
+def test_what_is_compared_and_plotted_is_an_actuator(cli, path: Path) -> None:
+    """A channel that stands in both sections keeps what `compare` says of it."""
+    path.write_text(path.read_text().replace("plot:\n", 'plot:\n  gas: {unit: "%"}\n'))
+    loaded = load_manifest(path)
+    assert cli("upgrade", path).code == 0
+    for manifest in (loaded, load_manifest(path)):
+        assert next((c.name, c.unit) for c in manifest.compared) == ("gas", "-")
+
+
+def test_line_breaks_and_links_stay(cli, path: Path) -> None:
+    """A file with the line breaks of Windows keeps them, and a link goes on leading to it."""
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    link = path.with_name("link.yaml")
+    link.symlink_to(path.name)
+    assert cli("upgrade", link).code == 0
+    assert link.is_symlink()
+    data = path.read_bytes()
+    assert data.startswith(b"schema: target/2\r\n")
+    assert data.count(b"\n") == data.count(b"\r\n")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("time_channel: time\n", "no `time_channel`\n  expected: it in a manifest of target/1"),
+        ("record_file: said.json\n", "no `record_file`"),
+        ("  v_lead: world.lead_speed\n", "toycar.yaml:30: no `v_lead`"),
+        ("    alone: [--alone]\n", "toycar.yaml:13"),  # a mapping without entries
+        ("name: toycar\n", "name"),
+    ],
+)
+def test_a_manifest_that_lacks_something_stays(cli, path: Path, line: str, message: str) -> None:
+    """What cannot be loaded is not written: the error names what is missing."""
+    path.write_text(path.read_text().replace(line, ""))
+    before = path.read_bytes()
+    answer = cli("upgrade", path)
+    assert answer.code == 2
+    assert message in answer.err
+    assert path.read_bytes() == before
+
+
+def test_a_value_that_loads_nowhere_stays(cli, path: Path) -> None:
+    """A manifest is checked as when it is used, formulas and placeholders too."""
+    path.write_text(path.read_text().replace('"{out}", --number', '"{oot}", --number'))
+    before = path.read_bytes()
+    assert "{oot}" in cli("upgrade", path).err
+    assert path.read_bytes() == before
 
 
 def test_what_is_no_manifest_is_left_alone(cli, tmp_path: Path) -> None:
