@@ -57,7 +57,9 @@ FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
 # Also `[text]: page.md`, and images; not what is on the web.
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 # What differs from machine to machine: how long it took, and the seal, in which are all versions.
-VARYING = re.compile(r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b|(?<=^seal: )[0-9a-f]{64}$")
+VARYING = re.compile(
+    r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b|\d\.\d s each|(?<=^seal: )[0-9a-f]{64}$"
+)
 
 
 # A package called mutator on an index is not this project.
