@@ -129,7 +129,7 @@ def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
 
 
 def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
-    """Column of each compared channel: `max_dev_` and its first word (`steer` of `steer_torque`), or its
+    """Column of each compared channel: `max_dev_` and its first word (`wheel` of `wheel_turn`), or its
     whole name where another channel begins with the same word."""
     words = [name.split("_")[0] for name in channels]
     return {
