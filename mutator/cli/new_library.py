@@ -7,7 +7,6 @@ import typer
 
 import mutator
 from mutator._common.text import counted
-from mutator.api.libraries import unfilled_places
 from mutator.cli.console import Terminal, short_path, with_options
 from mutator.cli.options import Json
 from mutator.errors import MutatorError
@@ -42,6 +41,8 @@ def init(
     scenario, fault and campaign, with places to fill in. Without it, copies of the library and templates
     that ship with mutator, for the controller that ships. In DIR and below, mutator uses them.
     """
+    from mutator.api.libraries import unfilled_places
+
     terminal = Terminal(as_json)
     try:
         mutator.init_library(folder, target=tree)
