@@ -57,6 +57,17 @@ def test_differences_up_to_the_end_of_the_drive() -> None:
     assert compare(golden, faulty, [GAS], "t").dev == found.max_dev
 
 
+def test_steps_at_other_times_alone_are_no_difference() -> None:
+    """A channel that keeps its own times is compared on these; a run that ends earlier still differs."""
+    own, times = np.array([0.0, 0.2]), T + 0.01
+    golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
+    faulty = {**golden, "t": times}
+    assert compare(golden, faulty, [GAS], "t").t_first is None
+    assert compare(golden, {**faulty, "t": times[:3]}, [GAS], "t").t_first == T[3]
+    later = {**golden, "gas@": own + 0.05}
+    assert compare(golden, later, [GAS], "t").t_first == 0.0
+
+
 def test_first_and_largest_difference() -> None:
     """The time of the first difference in any channel, the largest difference of each."""
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
