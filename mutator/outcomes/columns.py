@@ -146,7 +146,8 @@ def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) ->
 
 
 def check_names(manifest: TargetManifest) -> None:
-    """MutatorError, at its line of the manifest, for a hazard whose columns have the name of another one."""
+    """MutatorError, at its line of the manifest, for a hazard or metric whose columns have the name of
+    another one, or would be taken for a hazard's flag and time."""
     taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
     taken |= {*DERIVED, T_END, *driven_columns([c.name for c in manifest.compared], [[T_END]]).values()}
     named = isinstance(manifest.source.data.get("hazards"), dict)
@@ -161,11 +162,11 @@ def check_names(manifest: TargetManifest) -> None:
             )
         taken |= names
     for metric in manifest.measures:
-        if metric.name in taken:
+        if {metric.name, f"t_{metric.name}", metric.name.removeprefix("t_")} & taken:
             raise manifest.source.error(
                 ("metrics", metric.name),
                 f"'{metric.name}'",
-                expected="a name that no other column of the results has",
+                expected="a name that no other column of the results has, with or without `t_` before it",
                 remedy="rename it",
             )
         taken.add(metric.name)

@@ -95,6 +95,24 @@ def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: 
         toy.manifest("toy")
 
 
+@pytest.mark.parametrize(
+    ("metrics", "at"),
+    [
+        (["t_h1"], "t_h1"),
+        (["peak", "t_peak"], "t_peak"),  # together they would look like a hazard
+        (["t_peak", "peak"], "peak"),
+        (["end"], "end"),  # beside t_end
+    ],
+)
+def test_a_metric_may_not_take_another_column(toy: Workspace, metrics: list[str], at: str) -> None:
+    """A metric is refused where its column exists already, or would make a hazard of another one."""
+    path = toy.library / "targets" / "toy.yaml"
+    lines = [f"  {name}: {{max: speed, unit: m/s, worse: higher, about: x}}" for name in metrics]
+    path.write_text("\n".join([path.read_text().rstrip(), "metrics:", *lines, ""]))
+    with pytest.raises(MutatorError, match=f"'{at}'; expected a name that no other column"):
+        toy.manifest("toy")
+
+
 @pytest.mark.parametrize("name", ["h1", "H2", "too_fast"])
 def test_no_name_is_special(toy: Workspace, name: str) -> None:
     """Any other name will do."""
