@@ -54,8 +54,8 @@ class Trial(ExperimentResult):
     def golden_hazards(self) -> tuple[tuple[str, float], ...]:
         """Hazards (name, time in s) that the fault-free run reaches itself, so that they are not the fault's
         doing; a campaign would refuse such a scenario. MutatorError when its record cannot be read."""
-        found = load_judged(self.manifest, self.single.golden).hazards
-        return tuple(sorted(found, key=lambda hazard: hazard[1]))
+        _, judged = load_judged(self.manifest, self.single.golden)
+        return tuple(sorted(judged.hazards, key=lambda hazard: hazard[1]))
 
     def traces(self) -> TraceFrames:
         """Golden and faulty run as pandas frames; MutatorError when the faulty run left no trace."""

@@ -17,7 +17,7 @@ from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
-from mutator.outcomes.judging import judge_run
+from mutator.outcomes.judging import load_judged
 from mutator.outcomes.verdicts import first_events, judge
 from mutator.targets.manifest import TargetManifest
 
@@ -155,19 +155,15 @@ class Runner:
             bare = _bare(experiment, status, detail, built, activation)
             return replace(bare, error=error_of(execution.raised))
         activation = activation_of(execution.probe)
-        channels = self.manifest.compared
         reference = self.goldens.trace(experiment)
         try:
-            needed = [*dict.fromkeys((*channels, *self.manifest.judged))]
-            faulty = golden.load_trace(self.manifest, execution.out, needed)
-            said = golden.load_record(self.manifest, execution.out)
+            faulty, judged = load_judged(self.manifest, execution.out)
         except BadOutput as err:
             if activation is None:
                 raise
             return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation)
-        judged = judge_run(self.manifest, faulty, said)
         time = self.manifest.time_channel
-        difference = golden.compare(reference, faulty, channels, time, judged.t_end)
+        difference = golden.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
         hazards = first_events(judged.hazards, activation)

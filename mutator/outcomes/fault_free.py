@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mutator._common.tables import Table
-from mutator.outcomes.golden import load_trace
-from mutator.outcomes.judging import load_judged
+from mutator.outcomes.golden import load_record, load_trace
+from mutator.outcomes.judging import judge_run
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 
@@ -30,14 +30,15 @@ def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultF
     found = []
     for scenario, changes in sorted(folder.head["goldens"]):
         place = folder.golden(scenario, tuple(changes))
-        judged, trace = load_judged(manifest, place), load_trace(manifest, place)
+        trace = load_trace(manifest, place)
+        judged = judge_run(manifest, trace, load_record(manifest, place))
         plotted = [channel.name for channel in manifest.plotted if channel.name in trace]
         found.append(
             FaultFreeRun(
                 scenario=scenario,
                 changes=tuple(changes),
-                hazards=tuple(judged.hazards),
-                alerts=tuple(judged.alerts),
+                hazards=judged.hazards,
+                alerts=judged.alerts,
                 ranges=tuple((name, *_range(trace[name])) for name in plotted),
             )
         )

@@ -10,7 +10,6 @@ import numpy as np
 
 from mutator.errors import MutatorError
 from mutator.outcomes.golden import BadOutput, Trace, alerts_of, load_record, load_trace, on_steps
-from mutator.outcomes.verdicts import Events
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers import over_time, stl
@@ -28,15 +27,18 @@ class Judged:
     that has no value is left out. Times are in s.
     """
 
-    hazards: Events
-    alerts: Events
+    hazards: tuple[tuple[str, float], ...]
+    alerts: tuple[tuple[str, float], ...]
     t_end: float | None
     metrics: tuple[tuple[str, float], ...]
 
 
-def load_judged(manifest: TargetManifest, out: Path) -> Judged:
-    """What the run in the output folder `out` came to; BadOutput for one that left no trace or record."""
-    return judge_run(manifest, load_trace(manifest, out, manifest.judged), load_record(manifest, out))
+def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
+    """The run in the output folder `out`: the channels that its verdict needs, and what it came to. BadOutput
+    for one that left no trace or record, or none that can be judged."""
+    needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]
+    trace = load_trace(manifest, out, needed)
+    return trace, judge_run(manifest, trace, load_record(manifest, out))
 
 
 def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:

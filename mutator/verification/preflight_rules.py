@@ -38,16 +38,15 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
         last = f" ({log.splitlines()[-1]})" if log and execution.raised is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
-        golden.load_trace(manifest, execution.out, manifest.compared)
-        judged = load_judged(manifest, execution.out)
+        _, judged = load_judged(manifest, execution.out)
     except BadOutput as err:
         return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
     return CheckRun(
         problem="",
         digest=digest_of(manifest, execution.out),
         trace=golden.trace_digest(manifest, execution.out),
-        alerts=tuple(judged.alerts),
-        hazards=tuple(judged.hazards),
+        alerts=judged.alerts,
+        hazards=judged.hazards,
         triggered=was_triggered(execution.probe),
         cpu_s=execution.cpu_s,
         modules=execution.modules,

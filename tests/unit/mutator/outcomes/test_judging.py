@@ -238,7 +238,7 @@ def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
         frame = pd.DataFrame({"time": T, "gap": GAP, "force": SPEED})
         frame = frame.join(pd.DataFrame({"t_seen": t_seen, "seen": seen}))
         frame.to_csv(path, index=False) if kind == "csv" else frame.to_parquet(path)
-    found = load_judged(manifest, tmp_path)
+    _, found = load_judged(manifest, tmp_path)
     assert found.hazards == (("HIT", 3.0), ("SEEN", 4.0))
     trace = load_trace(manifest, tmp_path, manifest.channels)
     assert trace["gap"].tolist() == GAP.tolist()
@@ -257,7 +257,7 @@ def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) ->
     rows = ["time,gap,force,t_heat,heat", "0,3,1,0,1", ",,,0.5,2", "1,2,1,1,3", ",,,1.5,9", "2,1,1,2,9"]
     (tmp_path / "trace.csv").write_text("\n".join(rows) + "\n")
     manifest = load_manifest(tmp_path / "cart.yaml")
-    assert load_judged(manifest, tmp_path).hazards == (("HOT", 2.0),)
+    assert load_judged(manifest, tmp_path)[1].hazards == (("HOT", 2.0),)
     assert load_trace(manifest, tmp_path, manifest.channels)["gap"].tolist() == [3.0, 2.0, 1.0]
 
 
