@@ -1,14 +1,12 @@
 """Which triggers a campaign uses, as its file says it: contexts of a table, or a list of its own."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import check_condition
@@ -154,7 +152,8 @@ def listed_triggers(
     trigger that stands there twice."""
     found: dict[str, Trigger] = {}
     for i, one in enumerate(listed):
-        trigger = _made(one, partial(_condition, source, manifest, i), armed_after_s, one.hold_s or hold_s)
+        with source.placing((*_LIST, i, "when")):
+            trigger = _made(one, manifest.observation.variables, armed_after_s, one.hold_s or hold_s)
         if trigger.name in found:
             got = f"'{trigger.name}' a second time"
             raise source.error((*_LIST, i), got, expected="each trigger once", remedy="remove one")
@@ -163,21 +162,12 @@ def listed_triggers(
 
 
 def _made(
-    listed: ListedTrigger, condition: Callable[[str], str], armed_after_s: float, hold_s: float | None
+    listed: ListedTrigger, variables: Collection[str], armed_after_s: float, hold_s: float | None
 ) -> Trigger:
     if listed.at_s is not None:
         return at_time(listed.at_s, name=f"at {listed.at_s:g} s", hold_s=hold_s)
     trigger = always(armed_after_s=armed_after_s)
     if listed.when is not None:
-        text = condition(listed.when)
+        text = check_condition(listed.when, variables=variables)
         trigger = Trigger(name=text, condition=text, armed_after_s=armed_after_s)
     return replace(trigger, hold=Hold.FOR, hold_s=hold_s) if hold_s else trigger
-
-
-def _condition(source: Source, manifest: TargetManifest, i: int, text: str) -> str:
-    try:
-        return check_condition(text, variables=manifest.observation.variables)
-    except MutatorError as error:
-        raise source.error(
-            (*_LIST, i, "when"), error.got, expected=error.expected, remedy=error.remedy
-        ) from None

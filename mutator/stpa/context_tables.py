@@ -212,12 +212,8 @@ def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
 
 
 def _condition(text: str, constants: Mapping[str, float], source: Source, row: str) -> str:
-    try:
+    with source.placing(("contexts", row, "when")):
         return check_condition(text, constants)
-    except MutatorError as error:
-        raise source.error(
-            ("contexts", row, "when"), error.got, expected=error.expected, remedy=error.remedy
-        ) from None
 
 
 def load_hazards(path: Path) -> HazardList:

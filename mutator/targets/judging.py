@@ -8,8 +8,9 @@ from typing import Literal, get_args
 from pydantic import Field
 
 from mutator.config.yaml_files import Keys, Source, StrictModel
+from mutator.targets.formulas import condition, formula
 from mutator.triggers import stl
-from mutator.triggers.conditions import check_condition, check_formula, parse
+from mutator.triggers.conditions import parse
 
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
 _AGGREGATES = get_args(Aggregate)
@@ -159,21 +160,20 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
                 expected="it beside `when`",
                 remedy="remove it",
             )
-    when = _condition(model.when, known, source, (*keys, "when"))
-    formula = model.stl or ""
-    if formula:
+    when = condition(model.when, known, source, (*keys, "when"))
+    if model.stl:
         with source.placing((*keys, "stl")):
-            stl.check(formula, known, step_s)
+            stl.check(model.stl, known, step_s)
     terminal = model.terminal
     return Hazard(
         name=name,
         about=model.about,
         when=when,
-        stl=formula,
+        stl=model.stl or "",
         for_s=model.for_s,
-        margin=_formula(model.margin, known, source, (*keys, "margin")) or _margin_of(when),
+        margin=formula(model.margin, known, source, (*keys, "margin")) or _margin_of(when),
         unit=model.unit,
-        terminal=_condition(terminal, known, source, (*keys, "terminal"))
+        terminal=condition(terminal, known, source, (*keys, "terminal"))
         if isinstance(terminal, str)
         else ("True" if terminal else ""),
     )
@@ -212,28 +212,14 @@ def _metric(name: str, model: MetricModel, known: Collection[str], source: Sourc
             remedy="make a metric of each",
         )
     (aggregate,) = given
-    check = _condition if aggregate == "duration" else _formula
+    check = condition if aggregate == "duration" else formula
     return Metric(
         name=name,
         aggregate=aggregate,
         formula=check(getattr(model, aggregate), known, source, (*keys, aggregate)),
-        where=_condition(model.where, known, source, (*keys, "where")),
+        where=condition(model.where, known, source, (*keys, "where")),
         unit=model.unit,
         worse=model.worse,
         about=model.about,
         source=model.source,
     )
-
-
-def _condition(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    if text is None:
-        return ""
-    with source.placing(keys):
-        return check_condition(text, variables=known, over_time=True)
-
-
-def _formula(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    if text is None:
-        return ""
-    with source.placing(keys):
-        return check_formula(text, known, over_time=True)

@@ -1,7 +1,6 @@
 """The target manifest: all that the harness knows of a controller tree."""
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +16,7 @@ from mutator.targets.observation import Observation
 from mutator.targets.placeholders import filled
 from mutator.targets.scene import Scene
 from mutator.targets.source_tree import SourceTree, matches, read_tree
+from mutator.triggers import stl
 from mutator.triggers.conditions import names_in
 
 FILM = "film"  # folder in the output of a run that is filmed
@@ -112,7 +112,9 @@ class TargetManifest:
     @cached_property
     def judged(self) -> tuple[Channel, ...]:
         """The channels that hazards and metrics are judged by."""
-        needed = self.observation.inputs(_names_of(self.rules, self.metrics))
+        channels = [channel.name for channel in self.channels]
+        known = self.observation.judgeable(channels)
+        needed = self.observation.inputs(_names_of(self.rules, self.metrics, known))
         return tuple(channel for channel in self.channels if channel.name in needed)
 
     @cached_property
@@ -170,10 +172,9 @@ class TargetManifest:
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args), stepwise=None)
 
 
-def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric]) -> set[str]:
-    """What the formulas of hazards and metrics ask for. Of an STL formula every word: channels are found
-    among them."""
+def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:
+    """What the formulas of hazards and metrics ask for, `known` being all that they can."""
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
-    words = (word for rule in rules for word in re.findall(r"\w+", rule.stl))
-    return {name for text in texts if text for name in names_in(text)}.union(words)
+    in_stl = (name for rule in rules for name in stl.names_in(rule.stl, known))
+    return {name for text in texts if text for name in names_in(text)}.union(in_stl)

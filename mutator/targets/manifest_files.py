@@ -1,6 +1,5 @@
 """Target manifests as YAML: `fault_library/targets/<name>.yaml`, checked and read into a `TargetManifest`."""
 
-import re
 from collections.abc import Collection
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene import SceneModel, read_scene
 from mutator.targets.upgrade import NEW, OLD, Upgrade, upgraded, upgraded_text
+from mutator.triggers import stl
 
 SCHEMA = NEW
 
@@ -265,8 +265,8 @@ def _check_recorded(source: Source, hidden: Collection[str]) -> None:
         entries = source.data.get(key)
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             for field, text in entry.items() if isinstance(entry, dict) else ():
-                words = re.findall(r"[^\W\d]\w*", text) if isinstance(text, str) else []
-                if field not in ("about", "unit", "source") and (found := [w for w in words if w in hidden]):
+                found = stl.names_in(text, hidden) if isinstance(text, str) else ()
+                if found and field not in ("about", "unit", "source"):
                     raise source.error(
                         (key, name, field),
                         f"'{found[0]}', which is observed and not recorded",

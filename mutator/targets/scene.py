@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.triggers.conditions import check_condition, check_formula
+from mutator.targets.formulas import condition, formula
 
 Shape = Literal["box", "circle"]
 
@@ -97,17 +97,15 @@ def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source
         raise source.error(
             (*keys, "width_m"), "the width of a circle", expected="`length_m` alone", remedy="remove it"
         )
-    with source.placing((*keys, "visible")):
-        visible = check_condition(model.visible, variables=known, over_time=True)
     return Actor(
         name=name,
         shape=model.shape,
         length=model.length_m,
         width=model.width_m or model.length_m,
-        x=_formula(model.x, known, source, (*keys, "x")),
-        y=_formula(model.y, known, source, (*keys, "y")),
-        heading=_formula(model.heading, known, source, (*keys, "heading")),
-        visible=visible,
+        x=formula(model.x, known, source, (*keys, "x")),
+        y=formula(model.y, known, source, (*keys, "y")),
+        heading=formula(model.heading, known, source, (*keys, "heading")),
+        visible=condition(model.visible, known, source, (*keys, "visible")),
         about=model.about,
     )
 
@@ -126,11 +124,6 @@ def _line(name: str, model: _LineModel, known: Collection[str], source: Source) 
     return Line(
         name=name,
         points=tuple((x, y) for x, y in model.points_m or ()),
-        y="" if model.y is None else _formula(model.y, known, source, (*keys, "y")),
+        y=formula(model.y, known, source, (*keys, "y")),
         dashed=model.dashed,
     )
-
-
-def _formula(text: str, known: Collection[str], source: Source, keys: Keys) -> str:
-    with source.placing(keys):
-        return check_formula(text, known, over_time=True)

@@ -1,0 +1,23 @@
+"""Conditions and formulas of a manifest over what a run records."""
+
+from collections.abc import Collection
+
+from mutator.config.yaml_files import Keys, Source
+from mutator.triggers.conditions import check_condition, check_formula
+
+
+def condition(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
+    """A condition in its canonical text ('' where there is none), over the names `known`; MutatorError at the
+    place `keys` of the manifest."""
+    if text is None:
+        return ""
+    with source.placing(keys):
+        return check_condition(text, variables=known, over_time=True)
+
+
+def formula(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
+    """A formula, as `condition`."""
+    if text is None:
+        return ""
+    with source.placing(keys):
+        return check_formula(text, known, over_time=True)
