@@ -37,7 +37,7 @@ TRY_EXAMPLES = """\b
 Examples:
   mutator try radar/chaff --scenario S1 --trigger C2
   mutator try radar/chaff -s S1 --value 40 --trigger 10   exactly 40 m, from 10 s on
-  mutator try my_fault.yaml --scenario S5               a spec of one's own
+  mutator try my_fault.yaml --scenario S5               your own spec
 """
 
 

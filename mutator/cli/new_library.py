@@ -1,4 +1,4 @@
-"""`init` and `upgrade`: a library of one's own, and its manifests in today's schema."""
+"""`init` and `upgrade`: a new library to edit, and manifests brought up to date."""
 
 from pathlib import Path
 from typing import Annotated, Any

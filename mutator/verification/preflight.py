@@ -68,7 +68,8 @@ def run_checks(
         raise CheckFailed(
             f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
             where=folder.path / FILE,
-            remedy="mend target, templates or canary; the campaign does not start before all pass",
+            remedy="mend target, templates or canary; `mutator check --drive` tells more. The campaign does "
+            "not start before all pass",
         )
     preflight_cache.store(preflight_cache.entry(checks.digest), folder.path, FILE)
     return results

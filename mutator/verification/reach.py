@@ -36,10 +36,10 @@ class Wanted:
 
 @dataclass(frozen=True, kw_only=True)
 class Awaited:
-    """A trigger of a context table, as campaigns arm it."""
+    """A trigger of a context table or of a campaign's list, as campaigns arm it."""
 
     trigger: Trigger
-    place: Place  # in the table
+    place: Place  # in the table or the campaign
 
 
 class Reach:

@@ -1,4 +1,4 @@
-"""`init`: a library of one's own, and a first one for a foreign controller."""
+"""`init`: a new library to edit, and a first one for a foreign controller."""
 
 import re
 from collections.abc import Callable
