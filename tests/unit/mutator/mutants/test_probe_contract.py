@@ -1,0 +1,217 @@
+"""The probe's contract: what it writes it finds again, and it reads what a probe reports."""
+
+import json
+import math
+import random
+import re
+import types
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Activation, Hold, Trigger
+from mutator.mutants import probe as contract
+from mutator.mutants.rendering import render
+from mutator.web import asset
+from mutator.workspace import Workspace
+
+TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s=0.25)
+
+
+MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
+
+
+def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
+    """The text of a probe that is rendered as a mutant's is."""
+    models, observation = clone.fault_models(), clone.manifest("openpilot").observation
+    values = contract.template_values(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
+    return render(models.probe, values, models.folder / "_fi.py.j2")
+
+
+def module(clone: Workspace) -> Any:
+    """A fresh probe as a module."""
+    made = types.ModuleType("_fi")
+    exec(source(clone), made.__dict__)
+    return made
+
+
+def see(fi: Any, *, near: bool) -> None:
+    """Observe a step, and ask whether the first injection is active."""
+    fi.observe(t=1.0 if near else 0.5, d_rel=20.0 if near else 200.0, v_ego=20.0, v_lead=15.0)
+    assert fi.active(IDS[0]) is near
+
+
+def test_the_decision_is_the_probes(clone: Workspace) -> None:
+    """Asked directly, a probe is first active when `observe` says so."""
+    code = compile(source(clone), "_fi", "exec")
+    armed_t, holds = contract.decision(code)
+    module: dict[str, Any] = {}
+    exec(code, module)
+    draw = random.Random(7)
+    for _ in range(200):
+        values = (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0)
+        module["_run"] = module["_Run"]()
+        module["observe"](*values)
+        assert module["_run"].active == (values[0] >= armed_t and holds(*values))
+
+
+def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
+    """What the contract writes it recognizes: import, observation, guards, and the ids in them."""
+    lines = {
+        contract.import_statement("car"): ("probe", 0, False),
+        contract.tagged(contract.observe_call([("t", "now.time")]), contract.OBSERVE_TAG): (
+            "observe",
+            0,
+            False,
+        ),
+        contract.tagged('if _fi.active("0a1b2c3d"):', "0a1b2c3d"): ("0a1b2c3d", 0, True),
+        contract.tagged('if not _fi.active("0a1b2c3d"):', "0a1b2c3d", 12): ("0a1b2c3d", 12, True),
+        contract.tagged("    x = 1", "0a1b2c3d"): ("0a1b2c3d", 0, True),
+    }
+    for line, (name, guarded, of_fault) in lines.items():
+        for end in ("", "\n", "\r\n"):
+            tag = contract.tag_of((line + end).encode())
+            assert tag is not None
+            assert (tag.id, tag.guarded, tag.of_fault) == (name, guarded, of_fault)
+            assert tag.asks_probe == ("if " in line)
+            assert tag.code.decode() == line.partition("  #")[0]
+        assert contract.instrumented_line(f"x = 1\n{line}\n".encode()) == 1
+        assert contract.adds_fault(f"+{line}") is of_fault
+        assert list(contract.tagged_additions(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
+
+
+def test_what_is_no_tag(clone: Workspace) -> None:
+    """A tag ends its line, in lower case; a comment that only resembles one is the target's own."""
+    for line in (
+        b"x = 1",
+        b"x = 1  # fi",
+        b"x = 1  # fi:",
+        b"x  # fi:ABC",
+        b"x  # fi:abc, say",
+        b"y  # fi:a guard:",
+    ):
+        assert contract.tag_of(line) is None
+    assert contract.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
+
+
+def test_settings_are_all_that_differs(clone: Workspace) -> None:
+    """Probes of two triggers are equal but for their settings, and these are found by their names."""
+    other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
+    rests, found = [], []
+    for trigger in (TRIGGER, other):
+        patch = "".join(f"+{line}\n" for line in source(clone, trigger).splitlines())
+        spans = list(contract.settings(patch, 0, len(patch)))
+        found.append({name: patch[begin:end] for begin, end, name in spans})
+        for begin, end, _ in reversed(spans):
+            patch = patch[:begin] + patch[end:]
+        rests.append(patch)
+    assert rests[0] == rests[1]
+    assert found[1] == {
+        "mutant": "0123456789abcdef",
+        "id": "4e5f6071",
+        "hold": "for",
+        "hold_s": "2.5",
+        "armed_after_s": "1.0",
+        "condition": "t >= 3.0",
+    }
+
+
+def test_a_hold_time_is_needed(clone: Workspace) -> None:
+    """A trigger that holds for a time must say how long."""
+    observation = clone.manifest("openpilot").observation
+    with pytest.raises(MutatorError, match="holds for a time"):
+        contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
+
+
+def test_a_condition_asks_for_what_the_target_observes(clone: Workspace) -> None:
+    """Any other name is refused, and those that are known are listed."""
+    observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
+    with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
+        contract.template_values("m", trigger, Hold.WHILE, (), observation, 0.1)
+
+
+NEVER = {"first": None, "last": None, "count": 0}
+RAN = {"first": 0.5, "last": 2.0, "count": 3}
+
+
+@pytest.mark.parametrize(
+    "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
+)
+def test_no_activation(report: dict[str, Any]) -> None:
+    """Reports without an executed injection have no activation."""
+    assert contract.activation_of(report) is None
+
+
+def test_reports_are_read(clone: Workspace) -> None:
+    """Injections count together; the report of a mutant that never triggers reads like a probe's own."""
+    early = {"first": 0.25, "last": 0.75, "count": 1}
+    report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
+    assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
+    fi = module(clone)
+    for read in (contract.was_triggered, contract.activation_of):
+        assert read(fi.report()) == read(contract.silent_report(MUTANT))  # type: ignore[operator]
+    see(fi, near=True)
+    assert contract.was_triggered(fi.report())
+    assert not contract.was_triggered(None)
+
+
+SOUND = {
+    "mutant": "m",
+    "triggered": {"first": 0.5, "last": 2.0, "steps": 9},
+    "injections": {"a": RAN, "b": NEVER},
+}
+
+
+def test_sound_reports(clone: Workspace) -> None:
+    """Nothing is wrong with what a probe reports, be it of a fault that was active or of one that was not."""
+    assert contract.report_problem(SOUND, "m", ("a", "b")) == ""
+    fi = module(clone)
+    for near in (False, True):
+        see(fi, near=near)
+        assert contract.report_problem(json.loads(json.dumps(fi.report())), MUTANT, IDS) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (None, "no report"),
+        ("x", "no report"),
+        ([1], "no report"),
+        ({"mutant": "n"}, "not the one of this mutant"),
+        ({"mutant": None}, "not the one of this mutant"),
+        ({"injections": None}, "not its own"),
+        ({"injections": {"a": RAN}}, "not its own"),
+        ({"injections": {"a": RAN, "b": NEVER, "c": NEVER}}, "not its own"),
+        ({"injections": {"a": RAN, "b": None}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"first": None}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"first": math.nan}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"last": math.inf}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"last": 0.25}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"last": "2"}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": 2.0}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": True}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": -1}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": RAN | {"count": 0}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": NEVER | {"count": False}}}, "the injections is damaged"),
+        ({"injections": {"a": RAN, "b": {}}}, "the injections is damaged"),
+        ({"triggered": {}}, "the trigger is damaged"),
+        ({"triggered": {"first": None, "last": None, "steps": 0}}, "the trigger is damaged"),
+        ({"triggered": 7}, "the trigger is damaged"),
+        ({"triggered": None}, "its trigger was not"),
+    ],
+)
+def test_damaged_reports(change: Any, said: str) -> None:
+    """Whatever is not as a probe reports it is told: keys, types, numbers, what contradicts itself."""
+    report = SOUND | change if isinstance(change, dict) else change
+    assert said in contract.report_problem(report, "m", ("a", "b"))
+
+
+def test_pages_are_told_the_tags() -> None:
+    """The script that shows diffs spells no tag: the page carries the mark and the probe's own tags."""
+    words = contract.tag_words()
+    for tag in words["probe"]:
+        assert contract.tagged("x", tag) == f"x  {words['mark']}{tag}"
+    assert words["probe"] == [contract.IMPORT_TAG, contract.OBSERVE_TAG]
+    assert "fi:" not in asset("diff.js")
+    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("diff.js"))
