@@ -1,10 +1,10 @@
 "use strict";
-// One experiment opened beside the table: what happened, plots, what was changed, and how to do it again.
+// One experiment opened beside the list: what happened, its path and replay, what was changed, how to do it again.
 
 class Experiment {
-  /** `move(by)` goes on in the table, `close()` shuts this. */
+  /** `move(by)` goes on in the list, `place()` says where in it this is, `close()` shuts this. */
   constructor(place, table, state, facts, actions) {
-    Object.assign(this, { place, table, state, facts, actions });
+    Object.assign(this, { place, table, state, facts, actions, title: document.title });
     this.mode = innerWidth > 1100 ? "split" : "unified";
     this.row = -1;
   }
@@ -16,19 +16,23 @@ class Experiment {
   /** Show the experiment of the state, or nothing. */
   async show() {
     const id = this.state.experiment, row = id ? this.table.find(id) : -1;
-    document.body.classList.toggle("has-experiment", Boolean(id));
     if (!id) {
       this.place.hidden = true;
       this.row = -1;
+      document.title = this.title;
       return;
     }
-    if (row >= 0 && row === this.row && this.isOpen) return;
+    if (row >= 0 && row === this.row && this.isOpen) {
+      this.#showPlace(); // the list may have been filtered
+      return;
+    }
     const wasOpen = this.isOpen, hadFocus = this.place.contains(document.activeElement);
     const button = document.activeElement?.getAttribute("aria-label"); // what goes on is pressed several times
     this.row = row;
     this.place.hidden = false;
     if (row < 0) this.#none(id);
-    else this.#fill(row);
+    else this.#fill();
+    this.#showPlace();
     this.place.scrollTop = 0;
     // what had the keyboard is gone: without it, keys would scroll the page beneath
     if (!wasOpen || hadFocus) {
@@ -45,21 +49,27 @@ class Experiment {
   #buttons() {
     const { el } = Dom;
     const button = (text, name, todo) => el("button", { type: "button", "aria-label": name, title: name, onclick: todo }, text);
-    return el("div.buttons", {},
+    return el("div.buttons", {}, el("span.place.quiet"),
       button("↑", "Previous experiment (k)", () => this.actions.move(-1)),
       button("↓", "Next experiment (j)", () => this.actions.move(1)),
       button("Close", "Close (Esc)", () => this.actions.close()));
   }
 
+  #showPlace() {
+    this.place.querySelector(".place").textContent = this.actions.place();
+  }
+
   #none(id) {
     const { el } = Dom;
-    this.place.replaceChildren(el("header", {}, el("h2", { tabindex: -1 }, "No such experiment"), this.#buttons()),
+    document.title = this.title;
+    this.place.replaceChildren(el("header", {}, el("h2", { tabindex: -1, id: "experiment-title" }, "No such experiment"), this.#buttons()),
       el("p", {}, "This report has none whose id begins with ", el("code", {}, id), "."));
   }
 
-  #fill(row) {
+  #fill() {
     const { el } = Dom;
     const id = this.text("experiment_id");
+    document.title = `${this.text("fault")} in ${this.text("scenario")} - ${this.title}`;
     const section = (title, name) => el(`section.${name}`, {}, el("h3", {}, title), el("div.content", {}, el("p.quiet", {}, "…")));
     this.place.replaceChildren(
       el("header", {},
@@ -69,11 +79,12 @@ class Experiment {
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
       this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
       el("section.happened", {}, el("h3", {}, "What happened"), this.#events()),
-      section("Golden against faulty", "plots-of"),
+      typeof Path === "undefined" ? "" : section("Path of the fault", "path"),
+      section(typeof Replay === "undefined" ? "Golden against faulty" : "Replay", "replay"),
+      section("Pictures", "pictures"),
       section("What was changed", "change"),
       section("Injected lines alone", "snippet"),
       section("The fault's spec, its value drawn", "spec"),
-      section("Pictures", "pictures"),
       el("section.again", {}, el("h3", {}, "Do it again"), this.#commands()),
       el("details", {}, el("summary", {}, "All results"), this.#results()));
   }
@@ -137,14 +148,30 @@ class Experiment {
   /** What is unpacked when it is first needed: diff, spec, pictures, series. */
   async #fillLate(row) {
     const id = this.text("experiment_id");
-    const [details, media, series] = await Promise.all([Details.read(), Packed.read("media"), Series.inPage(id)]);
+    this.#path();
+    const [details, media, series] = await Promise.all([Details.read(), Packed.read("media"), Experiment.#series(id)]);
     if (this.row !== row) return; // another one was opened meanwhile
     this.#change(details.patch(row));
     const spec = details.spec(row);
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
     this.#pictures(id, media && media[id]);
-    if (series) Series.show(this.#content("plots-of"), series);
+    const place = this.#content("replay");
+    if (series && typeof Replay !== "undefined") Replay.show(place, series, this.facts);
+    else if (series) Series.show(place, series);
     else this.#noSeries(id, this.facts.onDemand.has(id));
+  }
+
+  /** The series of an experiment; null where there is none. */
+  static #series(id) {
+    return typeof SeriesFile === "undefined" ? Series.inPage(id) : SeriesFile.load(id);
+  }
+
+  /** How far the fault came; `Path` gets the results of this experiment as `text(name)` and `number(name)`. */
+  #path() {
+    if (typeof Path === "undefined") return;
+    const { table, row } = this;
+    const results = { text: (name) => table.text(row, name), number: (name) => table.number(row, name) };
+    Path.strip(this.#content("path"), results, this.facts);
   }
 
   #change(patch) {
@@ -198,7 +225,7 @@ class Experiment {
 
   #noSeries(id, isThere) {
     const { el } = Dom;
-    const place = this.#content("plots-of");
+    const place = this.#content("replay");
     const said = el("p", { role: "status" });
     const load = async () => {
       try {

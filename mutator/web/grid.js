@@ -161,6 +161,12 @@ class Grid {
     else this.focus();
   }
 
+  /** Which of the rows an experiment is, and of how many: `3 of 16`. */
+  placeOf(experiment) {
+    const at = this.rows.indexOf(this.table.find(experiment)), all = this.rows.length.toLocaleString("en");
+    return at < 0 ? "not in this list" : `${(at + 1).toLocaleString("en")} of ${all}`;
+  }
+
   /** Scroll so that the current row is seen. */
   reveal() {
     const head = this.element.tHead.offsetHeight, top = this.current * Grid.ROW_PX;

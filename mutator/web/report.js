@@ -2,6 +2,7 @@
 // The browsable part of the report: its parts made, tied to the state, and the keyboard.
 
 const Report = (() => {
+  const WIDE = "(min-width: 1000px)"; // room for the list beside an experiment, as report.css has it
   const find = (id) => document.getElementById(id);
 
   /** The run folder as a command names it: where this page was opened from, if that is a disk. */
@@ -15,15 +16,17 @@ const Report = (() => {
   async function start() {
     const data = await Packed.read("table");
     const given = JSON.parse(find("facts").textContent);
-    const facts = { run: runFolder, filmed: given.filmed, onDemand: new Set(given.series) };
+    const facts = { ...given, run: runFolder, onDemand: new Set(given.series) };
     const table = new Rows.Table(data);
     let drawn = null;
     const state = new State(() => update());
     const heat = new HeatMap(find("heat"), find("measure"), table, state);
     const filters = new Filters(find("facets"), find("chips"), table, state);
     const grid = new Grid(find("grid"), table, state);
-    const experiment = new Experiment(find("experiment"), table, state, facts, { move: (by) => grid.move(by), close });
-    const search = find("search");
+    const actions = { move: (by) => grid.move(by), close, place: () => grid.placeOf(state.experiment) };
+    const experiment = new Experiment(find("experiment"), table, state, facts, actions);
+    const search = find("search"), wide = matchMedia(WIDE);
+    let scrolled = 0; // where the page stood before an experiment took its place
 
     /** Show the state. Rows are found and sorted again only when what they depend on has changed. */
     function update() {
@@ -40,7 +43,18 @@ const Report = (() => {
           : `${table.count.toLocaleString("en")} experiment${table.count === 1 ? "" : "s"}`;
         if (search.value !== state.query) search.value = state.query;
       } else grid.show(grid.rows);
+      arrange();
+    }
+
+    /** The opened experiment beside the list, or over all of the page where the screen is narrow. */
+    function arrange() {
+      const isOpen = Boolean(state.experiment), wasOpen = experiment.isOpen;
+      if (isOpen && !wasOpen) scrolled = scrollY;
+      document.body.classList.toggle("has-experiment", isOpen);
+      for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !wide.matches;
       experiment.show();
+      if (isOpen && !wasOpen) grid.reveal();
+      if (!isOpen && wasOpen) scrollTo({ top: scrolled, behavior: "instant" });
     }
 
     function close() {
@@ -56,16 +70,16 @@ const Report = (() => {
     });
     find("search").parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
     keyboard({ state, grid, experiment, search, close });
-    links(state);
+    links(grid, () => state.experiment && close());
+    wide.addEventListener("change", arrange);
     addEventListener("beforeprint", () => grid.print(true));
     addEventListener("afterprint", () => grid.print(false));
     update();
-    if (state.experiment) grid.reveal();
     document.documentElement.dataset.ready = "yes";
   }
 
   /** Links to filters work as a change of state, links to sections leave it alone. */
-  function links(state) {
+  function links(grid, close) {
     document.addEventListener("click", (event) => {
       const link = event.target.closest('a[href^="#"]');
       if (!link || event.ctrlKey || event.metaKey || event.shiftKey) return;
@@ -77,7 +91,9 @@ const Report = (() => {
         find("experiments").scrollIntoView();
       } else if (find(to)) {
         event.preventDefault();
+        if (!find("experiments").contains(find(to))) close(); // an opened experiment stands in place of the other sections
         find(to).scrollIntoView();
+        if (to === "grid") grid.focus();
       }
     });
   }

@@ -90,12 +90,46 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
     page.page.wait_for_selector("#experiment", state="hidden")
 
 
+def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
+    """Its head says which of the filtered rows it is, the title follows, and a click in the list goes on."""
+    page.choose("outcome", "hazard")
+    count, title = len(page.column("ending")), page.page.title()
+    page.page.evaluate("scrollTo(0, 200)")
+    page.page.click("#grid tr[data-at] >> nth=1")
+    assert page.page.inner_text("#experiment .place") == f"2 of {count}"
+    assert (
+        page.page.title()
+        == f"{page.page.inner_text('#experiment h2')} in {page.column('scenario')[1]} - {title}"
+    )
+    boxes = [page.page.locator(name).bounding_box() for name in ("#grid", "#experiment")]
+    assert boxes[0]["x"] + boxes[0]["width"] <= boxes[1]["x"], "beside it, not beneath it"
+    assert page.page.locator("#grid tr.open").get_attribute("data-at") == "1"
+    page.page.click("#grid tr[data-at] >> nth=2")
+    assert page.page.inner_text("#experiment .place") == f"3 of {count}"
+    page.page.go_back()
+    page.page.go_back()
+    page.page.wait_for_selector("#experiment", state="hidden")
+    assert page.page.title() == title
+    assert page.page.evaluate("scrollY") == 200
+    page.page.click("#grid tr[data-at] >> nth=1")
+    page.page.click(".bar a:has-text('Tables')")
+    assert not page.page.is_visible("#experiment")
+    assert page.page.locator("#tables").is_visible()
+
+
+def test_two_keys_lead_to_the_list(page: "Page") -> None:
+    """The first stop of Tab skips to the list of experiments."""
+    page.page.keyboard.press("Tab")
+    page.page.keyboard.press("Enter")
+    assert page.page.evaluate("document.activeElement.dataset.at") == "0"
+
+
 def test_series_are_loaded_from_their_file(page: "Page", run: Path) -> None:
     """An experiment whose series is a file shows its plots, marks and strip; one without says the command."""
     [file] = (run / "report" / "series").glob("*.js")
     page.open(f"e={file.stem}")
     page.page.wait_for_selector("#experiment .plot")
-    text = page.page.inner_text("#experiment .plots-of")
+    text = page.page.inner_text("#experiment .replay")
     assert "largest difference 0.3" in text
     assert "4 channels without a difference" in text
     assert page.page.locator("#experiment .plot .mark.hazard").count() == 1
@@ -103,8 +137,8 @@ def test_series_are_loaded_from_their_file(page: "Page", run: Path) -> None:
     page.page.hover("#experiment .plot")
     assert "→" in page.page.inner_text("#experiment .readout")
     page.page.keyboard.press("j")
-    page.page.wait_for_selector("#experiment .plots-of .command")
-    assert "--trace" in page.page.inner_text("#experiment .plots-of .command")
+    page.page.wait_for_selector("#experiment .replay .command")
+    assert "--trace" in page.page.inner_text("#experiment .replay .command")
 
 
 def plots(page: "Page", high: float, marks: list[list[object]]) -> list[str]:
