@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from mutator.exports import Format
     from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
     from mutator.report.film import Shot
-    from mutator.store.records import Progress
+    from mutator.store.progress import Progress
     from mutator.workspace import Workspace
 
 __version__ = VERSION
@@ -69,7 +69,7 @@ _HOMES = {
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.report.film": ("Shot",),
-    "mutator.store.records": ("Progress",),
+    "mutator.store.progress": ("Progress",),
     "mutator.workspace": ("Workspace",),
 }
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}

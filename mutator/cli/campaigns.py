@@ -25,14 +25,15 @@ from mutator.cli.options import (
     ShardOf,
     with_place,
 )
-from mutator.cli.progress import duration
 from mutator.cli.run_folders import show_counts
 from mutator.errors import MutatorError
+from mutator.execution.phases import duration
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
     from mutator.campaigns.plans import Cost
-    from mutator.execution.session import Summary
+    from mutator.execution.session import Notify, Summary
+    from mutator.report.building import Report
 
 CampaignName = Annotated[
     str, typer.Argument(metavar="CAMPAIGN", help="A campaign of the library, or a campaign file.")
@@ -173,27 +174,36 @@ def run(
                 progress=notify,
                 workspace=workspace,
             )
+            written = _report(out, made, notify)
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
     assert made.summary is not None  # it has just run
+    _print_end(terminal, out, made, made.summary, written)
+    if made.summary.exit_code:
+        raise typer.Exit(made.summary.exit_code)
+
+
+def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
+    """Write the report of a run that has results."""
+    if not (run.summary and run.summary.results):
+        return None
+    notify(mutator.Progress(stage="report"))
     try:
-        _print_end(terminal, out, made, made.summary)
+        return run.report()
     except MutatorError:  # nobody holds the folder any more: `clean` may have come
-        if not made.finish_deletion():
+        if not run.finish_deletion():
             raise
         raise MutatorError(
             "deleted by another command while its report was written",
             where=out,
             remedy="run the campaign again",
         ) from None
-    if made.summary.exit_code:
-        raise typer.Exit(made.summary.exit_code)
 
 
-def _print_end(terminal: Terminal, out: Path, run: "Run", summary: "Summary") -> None:
+def _print_end(
+    terminal: Terminal, out: Path, run: "Run", summary: "Summary", written: "Report | None"
+) -> None:
     """The end of a run: table, report, and what is left to do."""
-    with terminal.wait("writing the report"):  # it may drive a few experiments again
-        written = run.report() if summary.results else None
     report = (
         [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []
     )

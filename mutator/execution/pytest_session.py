@@ -18,7 +18,8 @@ from mutator._common.shortages import Shortage, shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
-from mutator.execution.session import Session, Summary, open_session
+from mutator.execution.phases import Lines
+from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
@@ -232,6 +233,7 @@ class PlainController(Controller):
                 choices=Choices(),
                 reviewed=self._reviewed,
                 accept_versions=self._accept_versions,
+                notify=_told(session.config),
             )
             self.begun = self._open.enter_context(opened)
             self.begun.prepare()
@@ -262,6 +264,14 @@ class PlainController(Controller):
             terminalreporter.section("campaign")
         for line in self._closing_lines:
             terminalreporter.write_line(line)
+
+
+def _told(config: pytest.Config) -> Notify | None:
+    """Tells the stages that pytest has no items for; nothing with `-q`."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is None or config.get_verbosity() < 0:
+        return None
+    return Lines(reporter.write_line)
 
 
 def _lines(summary: Summary) -> list[str]:

@@ -12,7 +12,8 @@ from mutator.campaigns.plans import Choices
 from mutator.execution.distribution import Distributor
 from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Notify, Session, Summary, open_session
-from mutator.store.records import Tail
+from mutator.store.progress import Progress, Tail
+from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
 LOCAL = LocalWorkers()
@@ -62,12 +63,12 @@ def run_campaign(
 @contextmanager
 def _followed(session: Session) -> Iterator[None]:
     """Report progress while the session runs."""
-    tail = Tail(session.folder.path, session.folder.planned)
+    stages = _stages(session)
     stop = threading.Event()
 
     def follow() -> None:
         while not stop.wait(_NOTIFY_S):
-            session.notify(tail.poll())
+            session.notify(next(stages))
 
     thread = threading.Thread(target=follow, daemon=True)
     thread.start()
@@ -76,4 +77,18 @@ def _followed(session: Session) -> Iterator[None]:
     finally:
         stop.set()
         thread.join()
-        session.notify(tail.poll())
+        session.notify(next(stages))
+
+
+def _stages(session: Session) -> Iterator[Progress]:
+    """Where the run is now, each time one asks: the experiments, and when all have a record, the proof."""
+    folder = session.folder
+    experiments = Tail("experiments", folder.path / "records", folder.planned)
+    while (progress := experiments.poll()).done < progress.total:
+        yield progress
+    yield progress
+    proof = Tail("proof", folder.path / equivalence.FOLDER, len(equivalence.sampled(folder)))
+    while session.proof:
+        yield proof.poll()
+    while True:
+        yield experiments.poll()

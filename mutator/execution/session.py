@@ -29,7 +29,7 @@ from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.store import digests
-from mutator.store.records import Progress, label
+from mutator.store.progress import Progress, label
 from mutator.store.run_folder import RunFolder
 from mutator.targets.requirements import check_requirements
 from mutator.verification import equivalence
@@ -150,7 +150,7 @@ class Session:
 
     def finish(self) -> Summary:
         """Build the table from what there is now, and say what the run has come to."""
-        self.notify(Progress(stage="results"))
+        self.notify(Progress(stage="tables"))
         records = self.folder.records() if self._records is None else self._records
         wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
         done = len(records) - len(wrong)

@@ -1,7 +1,7 @@
 """The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -27,7 +27,7 @@ from mutator.mutants.building import InvalidMutant, build
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.digests import Digest
-from mutator.store.records import Progress
+from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
@@ -195,41 +195,35 @@ class _Checks:
 
     def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], CheckRun]:
         """Every run of every check, `workers` at a time."""
-        jobs = dict(self._jobs())
-        runs: dict[tuple[str, Any], CheckRun] = {}
         work = self.folder.work / "checks"
         for scratch in (work, self._kept):
             remove_folder(scratch)
         work.mkdir(parents=True)
         base = prepare_base(self.manifest, self.folder.base)
         engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
-        notify(Progress(stage="checks", total=len(jobs)))
         pool = ThreadPoolExecutor(max(1, workers))
         try:
-            futures: dict[Future[CheckRun], tuple[str, Any]] = {
-                pool.submit(self._run, engine, name, job): name for name, job in jobs.items()
-            }
-            for future in as_completed(futures):
-                name = futures[future]
-                runs[name] = future.result()
-                notify(Progress(stage="checks", detail=name[0], done=len(runs), total=len(jobs)))
-            self._judged_canary = self._judge_canary(engine, runs[_CANARY, self.canary.id])
+            judged = pool.submit(self._judge_canary, engine)
+            futures = {name: pool.submit(self._run, engine, name, job) for name, job in self._jobs().items()}
+            nulls = [future for name, future in futures.items() if name[0] == _NULL]
+            _follow("checks", [judged, *nulls], notify)
+            _follow("golden", [future for name, future in futures.items() if name[0] != _NULL], notify)
+            self._judged_canary = judged.result()
+            return {name: future.result() for name, future in futures.items()}
         finally:
             pool.shutdown(cancel_futures=True)
             remove_folder(work)
-        return runs
 
-    def _judge_canary(self, engine: ReferenceEngine, known: CheckRun) -> tuple[str, str]:
-        """As `canary.judge`; the first of its runs is `known`."""
+    def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
+        """As `canary.judge`."""
 
         def run(experiment: Experiment) -> CheckRun:
-            if experiment.id == self.canary.id:
-                return known
             return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
 
         return canary.judge(canary.tries(self.workspace, self.manifest, self.canary), run, self.hazard)
 
-    def _jobs(self) -> Iterator[tuple[tuple[str, Any], Job]]:
+    def _jobs(self) -> dict[tuple[str, Any], Job]:
+        jobs: dict[tuple[str, Any], Job] = {}
         null = build(self.manifest, self.models, None, always())
         for key in self.keys:
             scenario, changes = key
@@ -239,10 +233,10 @@ class _Checks:
                 "changes": changes,
             }
             name = golden_key(*key)
-            yield (_GOLDEN, key), Job(name=f"a-{name}", **common)
-            yield (_AGAIN, key), Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
-            yield (_NULL, key), Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
-        yield (_CANARY, self.canary.id), canary.job(self.workspace, self.manifest, self.canary)
+            jobs[_NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
+            jobs[_GOLDEN, key] = Job(name=f"a-{name}", **common)
+            jobs[_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
+        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != _NULL))  # the checks first
 
     def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = engine.work / job.name
@@ -295,6 +289,15 @@ class _Checks:
                 problems.setdefault(str(err), []).append(fault.spec)
         text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
         return _result("anchors", text, f"{len(self.variants)} variants found their statements")
+
+
+def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
+    """Wait for what is under way, and tell how much of it is done."""
+    pace = Pace(stage, len(futures))
+    notify(pace.at(0))
+    for done, future in enumerate(as_completed(futures), 1):
+        future.result()
+        notify(pace.at(done))
 
 
 def _result(name: str, problem: str, found: str) -> CheckResult:

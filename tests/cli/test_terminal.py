@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from mutator.cli.console import Terminal
-from mutator.cli.progress import campaign_progress, duration
+from mutator.cli.progress import campaign_progress
+from mutator.execution.phases import duration
 from mutator.mutants.readable_diffs import readable
-from mutator.store.records import Progress
+from mutator.store.progress import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 
@@ -83,7 +84,7 @@ def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     assert capsys.readouterr().err.splitlines() == [
-        "checks before the campaign 1/7",
+        "checks 1/7",
         "experiments 3/60, 16.8 a minute, hazard 2, sdc 1, 3 min 20 s left",
     ]
 
@@ -103,3 +104,13 @@ def test_a_diff_for_reading_leaves_the_probe_out() -> None:
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note
     assert readable(text) == (text, "")
+
+
+def test_each_stage_has_its_name_and_its_own_remaining_time(capsys: pytest.CaptureFixture[str]) -> None:
+    """A log names each stage of a run as it begins, and the time that it takes by itself."""
+    with campaign_progress(Terminal()) as notify:
+        for stage in ("plan", "checks", "golden", "proof", "tables", "report"):
+            timed = {"done": 7, "total": 23, "remaining_s": 8.0} if stage == "proof" else {}
+            notify(Progress(stage=stage, **timed))
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["planning", "checks", "golden runs", "proof 7/23, 8 s left", "tables", "report"]

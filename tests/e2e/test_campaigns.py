@@ -20,7 +20,7 @@ from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
-from mutator.store.records import Progress
+from mutator.store.progress import Progress
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]
@@ -77,7 +77,7 @@ def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
     told: list[Progress] = []
     summary = run_campaign(toycar, "small", out, workers=2, notify=told.append)
     assert contents(tree) == before
-    assert {stage.stage for stage in told} == {"plan", "checks", "experiments", "results"}
+    assert {stage.stage for stage in told} == {"plan", "checks", "golden", "experiments", "tables"}
     assert told[-2].done == 12
     assert {p.name for p in out.iterdir()} == {
         "run.json",

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -72,6 +73,8 @@ def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
     assert answer.returncode == 0, answer.stdout
     assert "6 passed" in answer.stdout
     assert "12 of 12 experiments done, 12 now" in answer.stdout
+    stages = re.findall("^(checks|golden|tables)", answer.stdout, re.MULTILINE)
+    assert stages == ["checks", "golden", "tables"]
     again = pytest_campaign(toy, *words, "-n", "2")
     assert again.returncode == 0, again.stdout
     assert "12 of 12 experiments done, 0 now" in again.stdout

@@ -10,7 +10,8 @@ import pytest
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Outcome, Record, RunError, Status
 from mutator.store.lines import LineWriter
-from mutator.store.records import SCHEMA, Tail, read_records
+from mutator.store.progress import Tail
+from mutator.store.records import SCHEMA, read_records
 
 HEAD = {"schema": SCHEMA, "plan": "p"}
 MakeRecord = Callable[..., Record]
@@ -124,7 +125,7 @@ def test_records_of_before_there_were_checksums_are_read(tmp_path: Path, record:
 def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> None:
     """Progress counts outcomes of complete lines as they come, each experiment once."""
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
-    tail = Tail(tmp_path, total=4)
+    tail = Tail("experiments", tmp_path / "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)
     writer = LineWriter(tmp_path / "records" / "0002-gw0.jsonl", HEAD)
     writer.append(asdict(record("b" * 16, status=Status.HARNESS_ERROR, outcome=None)))

@@ -1,0 +1,78 @@
+"""A run's progress in words: its stage, how much of it is done, how fast it goes, how long it will take."""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mutator.store.progress import Progress
+
+LINE_EVERY_S = 15.0  # a line now and then in a log file shows that the run is alive
+
+STAGES = {
+    "plan": "planning",
+    "checks": "checks",
+    "golden": "golden runs",
+    "experiments": "experiments",
+    "proof": "proof",
+    "tables": "tables",
+    "report": "report",
+}
+
+
+class Lines:
+    """Writes a line at each new stage, then one every `LINE_EVERY_S`."""
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        self._write = write
+        self._stage = ""
+        self._next_s = 0.0
+
+    def __call__(self, progress: "Progress") -> None:
+        now = time.monotonic()
+        if progress.stage == self._stage and now < self._next_s:
+            return
+        self._stage, self._next_s = progress.stage, now + LINE_EVERY_S
+        parts = [f"{title(progress)} {count(progress)}".rstrip()]
+        known = (rate(progress), endings(progress.outcomes), remaining(progress))
+        self._write(", ".join([*parts, *(part for part in known if part)]))
+
+
+def title(progress: "Progress") -> str:
+    """The name of the stage."""
+    return STAGES.get(progress.stage, progress.stage)
+
+
+def count(progress: "Progress") -> str:
+    """`12/60`, where there is something to count."""
+    return f"{progress.done}/{progress.total}" if progress.total else ""
+
+
+def rate(progress: "Progress") -> str:
+    """`1.5 a second` or, where it takes longer, `24.0 a minute`: how fast it goes, when that is known."""
+    if progress.per_s is None:
+        return ""
+    if progress.per_s < 1.0:
+        return f"{60 * progress.per_s:.1f} a minute"
+    return f"{progress.per_s:.1f} a second"
+
+
+def endings(outcomes: Counter[str]) -> str:
+    """`hazard 12, sdc 30, masked 2`: the outcomes so far."""
+    return ", ".join(f"{name} {outcomes[name]}" for name in sorted(outcomes) if outcomes[name])
+
+
+def remaining(progress: "Progress") -> str:
+    """How long the stage will still take, when that is known."""
+    return "" if progress.remaining_s is None else f"{duration(progress.remaining_s)} left"
+
+
+def duration(seconds: float) -> str:
+    """`45 s`, `3 min 20 s`, `2 h 05 min`."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"

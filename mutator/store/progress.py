@@ -1,0 +1,89 @@
+"""How far a run is: its stage, how much of it is done, how fast it goes and how long it will still take."""
+
+import json
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mutator.model import Status
+
+
+@dataclass(kw_only=True)
+class Progress:
+    """How far a run is. `outcomes` counts outcomes of ok experiments and the other statuses by name.
+
+    The stages: `plan`, `checks`, `golden` (golden runs), `experiments`, `proof`, `tables`, `report`, in turn.
+    Rate and remaining time are those of the stage; `total` is 0 where there is nothing to count.
+    """
+
+    stage: str
+    detail: str = ""
+    done: int = 0
+    total: int = 0
+    outcomes: Counter[str] = field(default_factory=Counter)
+    per_s: float | None = None  # steps a second since the stage began
+    remaining_s: float | None = None
+
+
+class Pace:
+    """The rate of a stage, measured from here on; `done` of `total` steps were done before."""
+
+    def __init__(self, stage: str, total: int, done: int = 0) -> None:
+        self._stage, self._total, self._before = stage, total, done
+        self._began = time.monotonic()
+
+    def at(self, done: int, *, detail: str = "", outcomes: Counter[str] | None = None) -> Progress:
+        """The progress when `done` steps are done."""
+        elapsed = time.monotonic() - self._began
+        per_s = (done - self._before) / elapsed if done > self._before and elapsed else None
+        return Progress(
+            stage=self._stage,
+            detail=detail,
+            done=done,
+            total=self._total,
+            outcomes=outcomes or Counter(),
+            per_s=per_s,
+            remaining_s=(self._total - done) / per_s if per_s else None,
+        )
+
+
+class Tail:
+    """Follows the records in a folder of a run as they are appended, reading each byte once."""
+
+    def __init__(self, stage: str, folder: Path, total: int) -> None:
+        self._folder = folder
+        self._offsets: dict[Path, int] = {}
+        self._labels: dict[str, str] = {}
+        self._read()
+        self._pace = Pace(stage, total, len(self._labels))
+
+    def poll(self) -> Progress:
+        """Where the stage is now."""
+        self._read()
+        return self._pace.at(len(self._labels), outcomes=Counter(self._labels.values()))
+
+    def _read(self) -> None:
+        for path in self._folder.glob("*.jsonl"):
+            offset = self._offsets.get(path, 0)
+            with path.open("rb") as file:
+                file.seek(offset)
+                data = file.read()
+            end = data.rfind(b"\n") + 1
+            self._offsets[path] = offset + end
+            for line in data[:end].splitlines():
+                self._count(line)
+
+    def _count(self, line: bytes) -> None:
+        try:
+            data = json.loads(line)
+            name = label(data["status"], data["outcome"])
+            if name != Status.HARNESS_ERROR or data["experiment_id"] not in self._labels:
+                self._labels[data["experiment_id"]] = name
+        except (ValueError, KeyError):  # a head, or damage that read_records will tell
+            return
+
+
+def label(status: str, outcome: str | None) -> str:
+    """What Progress counts: the outcome of what ran, else the status."""
+    return str(outcome or status)

@@ -1,0 +1,18 @@
+"""How fast a stage goes, and how long it will still take."""
+
+import pytest
+
+from mutator.store import progress
+from mutator.store.progress import Pace
+
+
+def test_a_stage_is_timed_from_its_own_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps that were done before the stage count as done, but not towards its rate."""
+    now = 100.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    pace = Pace("proof", 23, done=3)
+    assert (pace.at(3).per_s, pace.at(3).remaining_s) == (None, None)
+    now = 108.0
+    told = pace.at(7, detail="S1")
+    assert (told.stage, told.done, told.total, told.detail) == ("proof", 7, 23, "S1")
+    assert (told.per_s, told.remaining_s) == (0.5, 32.0)
