@@ -65,7 +65,7 @@ EXAMPLES = f"""\b
 Examples:
   mutator list                                    what the library holds
   mutator try radar/chaff --scenario S1           one fault: diff, verdict, plot
-  mutator run quickstart --out runs/first -n 2    a campaign, resumed by the same command
+  mutator run quickstart --out runs/first         a campaign, resumed by the same command
   mutator show 3f9a                               one of its experiments, by the start of its id
 
 \b

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
+from mutator._common.cores import usable_cores
 from mutator._common.text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
@@ -39,6 +40,8 @@ CampaignName = Annotated[
     str, typer.Argument(metavar="CAMPAIGN", help="A campaign of the library, or a campaign file.")
 ]
 
+ONE_PER_CORE = "Default: one for each usable core."
+
 
 def register(app: typer.Typer) -> None:
     """Add the verbs to the command line."""
@@ -57,7 +60,10 @@ Examples:
 def plan(
     campaign: CampaignName,
     out: OutRun,
-    workers: Annotated[int, typer.Option("-n", "--workers", min=1, help="Expect a run with so many.")] = 2,
+    workers: Annotated[
+        int | None,
+        typer.Option("-n", "--workers", min=1, help=f"Expect a run with so many. {ONE_PER_CORE}"),
+    ] = None,
     only: Only = None,
     exclude: Exclude = None,
     limit: Limit = None,
@@ -80,7 +86,7 @@ def plan(
         made = mutator.plan(campaign, out, choices=chosen, workspace=workspace)
     folder = out.resolve()
     anew = not_forkable(made, workspace)
-    cost, groups = made.cost(workers), made.groups()
+    cost, groups = made.cost(workers or usable_cores()), made.groups()
     if as_json:
         kinds = [
             {"module": m, "fault_type": f, "method": how, "experiments": n}
@@ -105,7 +111,7 @@ def plan(
         terminal.say(f"on the reference engine: {', '.join(variants)}: {why}")
     terminal.say(f"expected: {_cost_line(cost)}")
     terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {made.digest[:16]})")
-    command = ["mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
+    command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
     terminal.say(f"run it: {shlex.join(command)}")
 
 
@@ -122,9 +128,9 @@ def _cost_line(cost: "Cost") -> str:
 
 RUN_EXAMPLES = """\b
 Examples:
-  mutator run quickstart --out runs/first -n 2
+  mutator run quickstart --out runs/first
   mutator run my_campaign.yaml --out runs/mine --limit 20
-  mutator run quickstart --out runs/part1 --shard 1/3
+  mutator run quickstart --out runs/part1 --shard 1/3 -n 4
   mutator run quickstart --out runs/s1 --only 'scenario == "S1" and method == "guided"'
 
 Interrupted or killed, the same command goes on where it stopped.
@@ -136,8 +142,11 @@ def run(
     campaign: CampaignName,
     out: OutRun,
     workers: Annotated[
-        int, typer.Option("-n", "--workers", min=0, help="Worker processes; 0: this process alone.")
-    ] = 0,
+        int | None,
+        typer.Option(
+            "-n", "--workers", min=0, help=f"Worker processes; 0: this process alone. {ONE_PER_CORE}"
+        ),
+    ] = None,
     only: Only = None,
     exclude: Exclude = None,
     limit: Limit = None,
@@ -167,7 +176,7 @@ def run(
                 campaign,
                 out,
                 choices=chosen,
-                workers=workers,
+                workers=usable_cores() if workers is None else workers,
                 engine=engine,
                 reviewed=reviewed,
                 accept_versions=accept_versions,

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 from packaging.requirements import Requirement
 
+from mutator._common.cores import usable_cores
+from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.targets.requirements import MISSING, check_requirements, shortcoming
 from mutator.verification.fast_engines import loading
@@ -67,8 +69,10 @@ def _packages() -> Iterator[Finding]:
 
 
 def _cores() -> Finding:
-    usable = len(os.sched_getaffinity(0))
-    return Finding(name="cores", level=Level.OK, found=f"{usable} usable: `mutator run ... -n {usable}`")
+    usable = usable_cores()
+    return Finding(
+        name="cores", level=Level.OK, found=f"{usable} usable, so `run` has {counted(usable, 'worker')}"
+    )
 
 
 def _memory() -> Finding:

@@ -5,13 +5,13 @@ statement that faults are put at, and calls that keep a target from being determ
 two differ, further runs, without all that and with either hash seed, show what made the difference.
 """
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from mutator._common.cores import usable_cores
 from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.experiments import Expansion
@@ -87,7 +87,7 @@ class _Drive:
 
     def findings(self) -> list[Finding]:
         """Everything, in the order in which it is worth reading."""
-        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        with ThreadPoolExecutor(usable_cores()) as pool:
             jobs = [job for name in self.scenarios for job in self._jobs(name)]
             runs = dict(zip((job.name for job in jobs), pool.map(self._run, jobs), strict=True))
             goldens = {name: self._golden(name, runs) for name in self.scenarios}

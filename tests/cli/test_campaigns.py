@@ -15,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from mutator.cli import campaigns
+from mutator.errors import MutatorError
 from mutator.review import gate
 from mutator.store.run_folder import CONTENT
 
@@ -71,6 +73,24 @@ def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
     assert "sensor/lane" not in answer.out
     assert (Path("p") / "plan.csv").read_text().startswith("experiment_id,")
     assert not (Path("p") / "records").exists()
+
+
+def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without -n, `plan` expects and `run` starts as many workers as there are usable cores."""
+    monkeypatch.setattr(campaigns, "usable_cores", lambda: 3)
+    started: list[int] = []
+
+    def run(*_: object, workers: int, **__: object) -> None:
+        started.append(workers)
+        raise MutatorError("enough")
+
+    monkeypatch.setattr("mutator.run", run)
+    planned = cli("plan", "toy", "--out", "p")
+    assert "with 3 workers" in planned.out
+    assert "run it: mutator run toy --out p\n" in planned.out
+    for words in ([], ["-n", "0"], ["-n", "1"]):
+        assert cli("run", "toy", "--out", "p", *words).err.startswith("error: enough")
+    assert started == [3, 0, 1]
 
 
 @pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
@@ -136,7 +156,7 @@ def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> N
 def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
     """The same command on a complete run changes nothing and is fine."""
     before = results(run)
-    answer = cli("run", "toy", "--out", run, *CHOSEN)
+    answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0")
     assert answer.code == 0
     assert "12 of 12 experiments done, 0 now" in answer.out
     assert results(run) == before
@@ -144,7 +164,7 @@ def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
 
 def test_run_as_json(cli: Cli, run: Path) -> None:
     """A program gets numbers and paths, and nothing else on standard output."""
-    answer = cli("run", "toy", "--out", run, *CHOSEN, "--json").json
+    answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0", "--json").json
     assert (answer["planned"], answer["done"], answer["ran"]) == (12, 12, 0)
     assert sum(answer["outcomes"].values()) == 12
     assert Path(answer["report"]).exists()
@@ -169,7 +189,7 @@ def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
 
     While it runs, a second command in the same folder is refused.
     """
-    words = ["run", "toy", "--out", "runs/cut", "--limit", "12"]
+    words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "12"]
     command = [sys.executable, "-m", "mutator", *words]
     unchecked = str(root / "no-cache")  # so there is time for the second command, during the checks
     environment = os.environ | {"MUTATOR_ROOT": str(root), "XDG_CACHE_HOME": unchecked}
@@ -184,7 +204,7 @@ def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
     assert second.returncode == 2
     assert "in use" in second.stderr
     assert process.returncode == 130
-    assert "go on: mutator run toy --out runs/cut --limit 12" in out + err
+    assert "go on: mutator run toy --out runs/cut -n 0 --limit 12" in out + err
     assert "Traceback" not in err
     again = mutator(root, *words)
     assert again.returncode == 0
@@ -356,7 +376,9 @@ def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) 
     for file in (next((copy / "records").iterdir()), next((copy / "patches").rglob("*.patch"))):
         file.write_bytes(file.read_bytes()[:-9])
     assert cli("verify", copy, "--repair").code == 1
-    resumed = cli("run", "toy", "--out", copy, *CHOSEN, "--engine", "fork")  # so that there is a proof
+    resumed = cli(
+        "run", "toy", "--out", copy, *CHOSEN, "-n", "0", "--engine", "fork"
+    )  # so that there is a proof
     assert resumed.code == 0, resumed.err
     assert {path.name for path in copy.iterdir()} == KNOWN - {"workers", "work"}
     link = tmp_path / "link"

@@ -23,7 +23,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
         patch.setenv("MUTATOR_ROOT", str(root))
-        assert main(["run", "toy", "--out", "runs/a", "--only", 'fault_type == "lane"', "--limit", "4"]) == 0
+        assert (
+            main(
+                ["run", "toy", "--out", "runs/a", "--only", 'fault_type == "lane"', "--limit", "4", "-n", "0"]
+            )
+            == 0
+        )
     return root
 
 

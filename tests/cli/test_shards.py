@@ -9,13 +9,13 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 
 def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
     """A share says how much of it is done; `merge` says what it made, and refuses to make it twice."""
-    ran = cli("run", "small", "--out", "part", "--shard", "1/2", "--limit", 4)
+    ran = cli("run", "small", "--out", "part", "-n", "0", "--shard", "1/2", "--limit", 4)
     assert ran.code == 0, ran.err
     assert "2 of 2 experiments done" in ran.err + ran.out
     missing = cli("merge", "part", "--out", "whole")
     assert missing.code == 2
     assert "no folder of shard 2/2" in missing.err
-    assert cli("run", "small", "--out", "rest", "--shard", "2/2", "--limit", 4).code == 0
+    assert cli("run", "small", "--out", "rest", "-n", "0", "--shard", "2/2", "--limit", 4).code == 0
     merged = cli("merge", "part", "rest", "--out", "whole", "--json")
     assert merged.code == 0, merged.err
     assert merged.json == {"run": "whole", "shards": 2, "experiments": 4, "seal": merged.json["seal"]}

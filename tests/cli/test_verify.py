@@ -13,7 +13,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 @pytest.fixture
 def sealed(cli: Cli, root: Path) -> str:
     """The seal of the run folder `run`, as `mutator run` prints it."""
-    ran = cli("run", "small", "--out", "run", "--limit", 4, "--engine", "fork")
+    ran = cli("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "fork")
     assert ran.code == 0, ran.err
     found = re.search(r"^seal: ([0-9a-f]{64})$", ran.out, re.MULTILINE)
     assert found
@@ -35,7 +35,7 @@ def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
 
 def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
     """By `run`, again when nothing is left to do, as JSON, and in the report."""
-    again = cli("run", "small", "--out", "run", "--json")
+    again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
     planned = cli("plan", "small", "--out", "planned")
@@ -58,7 +58,7 @@ def test_a_damaged_run_is_repaired_and_run_again(cli: Cli, sealed: str) -> None:
     assert found.code == 1 and found.err == ""
     for text in ("a damaged line", "log.npz: changed", "repaired: ", ".patch: a patch with SHA-256"):
         assert text in found.out
-    again = cli("run", "small", "--out", "run")
+    again = cli("run", "small", "--out", "run", "-n", "0")
     assert again.code == 0, again.err
     assert f"seal: {sealed}" in again.out
     assert cli("verify", "run", "--expect", sealed).code == 0

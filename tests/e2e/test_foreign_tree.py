@@ -31,7 +31,7 @@ def test_a_foreign_tree_by_both_engines(cli: Cli, pole: Workspace, tmp_path: Pat
     experiment drives again to the same record, and the report has nothing of what the target has not."""
     tables = {}
     for engine in ("reference", "fork"):
-        code, said = cli("run", "upright", "--out", tmp_path / engine, "--engine", engine)
+        code, said = cli("run", "upright", "--out", tmp_path / engine, "-n", "0", "--engine", engine)
         assert code == 0 and "18 of 18 experiments done" in said
         tables[engine] = (tmp_path / engine / "results.csv").read_bytes()
     assert "proof: 18 of 18 experiments came out the same" in said

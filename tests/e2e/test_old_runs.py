@@ -190,7 +190,7 @@ def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch
         file.write("\n")
     with (library / "fault_library" / "targets" / "toycar.yaml").open("a") as file:
         file.write("\n")
-    code, _, err = cli("run", "small", "--out", copy, "--root", library)
+    code, _, err = cli("run", "small", "--out", copy, "-n", "0", "--root", library)
     assert code == 2
     assert made_by in err or "changed since this run was planned: target, manifest" in err
     after = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")

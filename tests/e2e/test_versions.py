@@ -106,7 +106,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
 def test_another_python_is_refused(cli: Cli, half: Path) -> None:
     """Exit code 2, both versions named, what to do said; nothing is driven and nothing is written."""
     before = contents(half)
-    code, _, err = cli("run", "small", "--out", half)
+    code, _, err = cli("run", "small", "--out", half, "-n", "0")
     assert code == 2
     assert f"driven with other versions: {PYTHONS}" in err and "--accept-versions" in err
     assert contents(half) == before
@@ -118,7 +118,7 @@ def test_another_python_is_accepted_and_noted(
     """With the option the run is finished, its fault-free runs are driven again and agree, its results are
     those of an undisturbed run; run.json, the report and `show` say who drove what."""
     before = len(driven)
-    code, _, err = cli("run", "small", "--out", half, "--accept-versions")
+    code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
     assert code == 0, err
     assert before == 4 and sorted(driven[:4]) == sorted(driven[4:])
     assert run_campaign(toy, "small", tmp_path / "whole").exit_code == 0
@@ -134,14 +134,14 @@ def test_another_python_is_accepted_and_noted(
     for name, version in by.items():
         code, out, _ = cli("show", name, "--run", half, "--no-plot")
         assert code == 0 and f"run with: {version}, " in out
-    assert cli("run", "small", "--out", half)[0] == 0  # nothing is left to drive
+    assert cli("run", "small", "--out", half, "-n", "0")[0] == 0  # nothing is left to drive
 
 
 def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the fault-free runs come out otherwise, accepting does not help, and nothing is written."""
     before = contents(half)
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
-    code, _, err = cli("run", "small", "--out", half, "--accept-versions")
+    code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
     assert code == 1 and "is not the one this run began with" in err
     assert contents(half) == before
 

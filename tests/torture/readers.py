@@ -74,7 +74,7 @@ def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Tol
 
 def run(place: Place) -> Told:
     """`run` or `resume`: the same command."""
-    code, out, err = cli("run", *place.campaign, "--out", place.run, "--json")
+    code, out, err = cli("run", *place.campaign, "--out", place.run, "-n", "0", "--json")
     if code != 0:
         return Told(code=code, said=out + err)
     found = json.loads(out)

@@ -24,7 +24,7 @@ QUICK = ("api", "compare", "show", "verify", "export csv", "export mutation-elem
 def finished(home: Path, at: Path) -> World:
     """A run of the toy with proof, plot, trace, report, comparison and exports."""
     words = (*SMALL, "--engine", "fork")
-    done(*("run", *words, "--out", home / "run"))
+    done("run", *words, "-n", "0", "--out", home / "run")
     name = hazardous(home / "run")
     done("rerun", name, "--run", home / "run", "--trace")
     done("export", home / "run", "--format", "junit")
@@ -36,7 +36,7 @@ def finished(home: Path, at: Path) -> World:
 def forged(home: Path, at: Path) -> World:
     """A run of the toy whose damages are those of somebody who computes all digests anew."""
     words = (*SMALL, "--engine", "fork")
-    done("run", *words, "--out", home / "run")
+    done("run", *words, "-n", "0", "--out", home / "run")
     shutil.rmtree(home / "run" / "report")
     place = _place(home, at, words, hazardous(home / "run"))
     return World(home=home, place=place, readers=READERS, damages=FORGERIES)
@@ -51,7 +51,7 @@ def shards(home: Path, at: Path) -> World:
     """Two halves of a run of the toy, to be merged."""
     for number in (1, 2):
         out = home / f"shard{number}"
-        done("run", *SMALL, *REFERENCE, "--shard", f"{number}/2", "--out", out)
+        done("run", *SMALL, *REFERENCE, "-n", "0", "--shard", f"{number}/2", "--out", out)
     place = Place(folder=at, shards=(at / "shard1", at / "shard2"))
     return World(home=home, place=place, readers={"merge": merge})
 
@@ -59,7 +59,7 @@ def shards(home: Path, at: Path) -> World:
 def shipped(home: Path, at: Path) -> World:
     """A run on the controller that ships, read without driving."""
     words = (*SHIPPED, *REFERENCE)
-    done("run", *words, "--out", home / "run")
+    done("run", *words, "-n", "0", "--out", home / "run")
     place = _place(home, at, words, hazardous(home / "run"))
     return World(home=home, place=place, readers={name: READERS[name] for name in QUICK})
 

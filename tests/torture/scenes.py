@@ -122,13 +122,13 @@ def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
         told=partial(run, replace(place, campaign=longer)),
     )
     whole = homes / "finished"
-    done("run", *words, "--out", whole / "run")
+    done("run", *words, "--out", whole / "run", "-n", "0")
     yield scene(name="report", words=("report", place.run), told=partial(_written, place), home=whole)
     damaged = _damaged(shutil.copytree(whole, homes / "damaged"))
     yield scene(name="repair", words=("verify", place.run, "--repair"), told=again, home=damaged)
     for shard in shards:
         part = f"{shard.name[-1]}/2"
-        done("run", *SMALL, *REFERENCE, "--shard", part, "--out", homes / "shards" / shard.name)
+        done("run", *SMALL, *REFERENCE, "--shard", part, "--out", homes / "shards" / shard.name, "-n", "0")
     merging = ("merge", *shards, "--out", place.run)
     yield scene(name="merge", words=merging, told=partial(_merged, place), home=homes / "shards")
 

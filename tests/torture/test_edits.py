@@ -53,7 +53,7 @@ class Edits:
         shutil.rmtree(self.place.folder, ignore_errors=True)
         self._kill(chance)
         with self._edited(kind, chance) as (what, words):
-            code, out, err = cli("run", *WORDS, *words, "--out", self.place.run)
+            code, out, err = cli("run", *WORDS, *words, "--out", self.place.run, "-n", "0")
             result = (self.place.run / "results.csv").read_bytes() if code == 0 else None
         told = Told(code=code, said=out + err, result=result)
         end, why = judged(told, Told(code=0, said="", result=self.right.result[-1]), [""])

@@ -1,0 +1,30 @@
+"""How many cores may be used."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from mutator._common import cores
+
+
+@pytest.mark.parametrize(
+    ("quota", "usable"),
+    [
+        ("max 100000\n", 8),
+        ("250000 100000\n", 2),
+        ("10000 100000\n", 1),
+        ("1600000 100000\n", 8),
+        ("?", 8),
+        (None, 8),
+    ],
+)
+def test_a_quota_counts(
+    quota: str | None, usable: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many as the process is bound to, less where a container has a smaller quota, and at least one."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(8)))
+    monkeypatch.setattr(cores, "_QUOTA", tmp_path / "cpu.max")
+    if quota is not None:
+        (tmp_path / "cpu.max").write_text(quota)
+    assert cores.usable_cores() == usable
