@@ -22,6 +22,7 @@ from mutator.stpa.analysis import Analysis, load_analysis
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
+from mutator.targets.severity import Scale, load_scale
 
 _LIBRARY = "fault_library"
 _TEMPLATES = "templates"
@@ -95,6 +96,21 @@ class Workspace:
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
         check_names(manifest)
         return manifest
+
+    def scale_of(self, manifest: TargetManifest) -> Scale | None:
+        """What makes classes of severity of the target's contacts; None where it tells of none. MutatorError
+        at the manifest for a scale that the library does not have."""
+        if manifest.contact is None:
+            return None
+        known = self._files("severity")
+        if manifest.contact.scale not in known:
+            raise manifest.source.error(
+                ("severity", "scale"),
+                f"'{manifest.contact.scale}'",
+                expected=f"a scale in {self.library / 'severity'}: {', '.join(known) or 'there is none'}",
+                remedy="correct the name, or write the scale",
+            )
+        return load_scale(known[manifest.contact.scale])
 
     @property
     def targets(self) -> Mapping[str, Path]:

@@ -312,6 +312,10 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "alerts": list(manifest.alerts),
         "compared": [channel.name for channel in manifest.compared],
         "metrics": metric_columns(manifest),
+        "about_hazards": [
+            {"name": one.name, "about": one.about, "terminal": bool(one.terminal)} for one in manifest.rules
+        ],
+        "severity": scale.plain() if (scale := workspace.scale_of(manifest)) else None,
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
         "golden_files": list(manifest.outputs),
         "canary": canary,

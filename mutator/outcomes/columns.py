@@ -4,9 +4,9 @@ The hazards and the compared channels of a target have columns of their own; all
 target. What is known of an experiment before it runs is in the plan, too.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from mutator.model import Experiment
 from mutator.targets.manifest import TargetManifest
@@ -57,6 +57,16 @@ _TO_REACTION = (
     ),
 )
 T_END = "t_end"
+SEVERITY = Column("severity", "text", "", "class of the contact that ended the drive; empty without one")
+SINCE = (
+    Column("fault_tolerant_time", "number", "s", "first hazard minus activation"),
+    Column(
+        "manifest_to_hazard",
+        "number",
+        "s",
+        "first hazard minus manifestation; empty where the hazard came first",
+    ),
+)
 EXTRA = (
     Column("variant", "text", "", "the variant of the spec"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
@@ -74,15 +84,18 @@ PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim"
 # Columns that readers of the table add to it; no hazard may take their names.
 _DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards")
 DERIVED = (*_DERIVED_TEXTS, "hazard", "t_hazard")
-_TEXTS = {column.name for column in (*_TO_MANIFEST, *_TO_REACTION, *EXTRA) if column.type == "text"}
+_TEXTS = {column.name for column in (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *EXTRA) if column.type == "text"}
 _TEXTS |= {*_DERIVED_TEXTS}
 
 
 def result_columns(
-    hazards: Iterable[str], compared: Sequence[str], metrics: Sequence[Sequence[str]] = ()
+    hazards: Iterable[str],
+    compared: Sequence[str],
+    metrics: Sequence[Sequence[str]] = (),
+    severity: Sequence[Column] = (),
 ) -> tuple[Column, ...]:
-    """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, and
-    its metrics as `metric_columns` has them."""
+    """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, its
+    metrics as `metric_columns` has them, and the `severity_columns` of the run."""
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -96,8 +109,17 @@ def result_columns(
             Column(column, "number", "the channel's", f"largest difference of `{name}` up to the drive's end")
             for name, column in driven_columns(compared, metrics).items()
         ),
+        *severity,
         *EXTRA,
     )
+
+
+def severity_columns(head: Mapping[str, Any]) -> tuple[Column, ...]:
+    """What run.json says of severity, as columns: none of runs that are older than it, no class for a target
+    that tells nothing of contacts."""
+    if "severity" not in head:
+        return ()
+    return (SEVERITY, *SINCE) if head["severity"] else SINCE
 
 
 def metric_columns(manifest: TargetManifest) -> list[list[str]]:
@@ -149,6 +171,7 @@ def check_names(manifest: TargetManifest) -> None:
     """MutatorError, at its line of the manifest, for a hazard or metric whose columns have the name of
     another one, or would be taken for a hazard's flag and time."""
     taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
+    taken |= {SEVERITY.name, *(column.name for column in SINCE)}
     taken |= {*DERIVED, T_END, *driven_columns([c.name for c in manifest.compared], [[T_END]]).values()}
     named = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):

@@ -12,6 +12,7 @@ from mutator.errors import MutatorError
 from mutator.outcomes.golden import BadOutput, Trace, alerts_of, load_record, load_trace, on_steps
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import DELTA_V
 from mutator.triggers import over_time, stl
 from mutator.triggers.conditions import TIME, names_in
 
@@ -44,24 +45,30 @@ def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
 def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:
     """What a run came to. `trace` has at least the channels that the manifest judges by."""
     values = values_of(manifest, trace)
-    hazards, ends, metrics = [], [], []
+    hazards, metrics = [], []
+    ends: dict[str, float] = {}
     for hazard in manifest.rules:
         robust = _robustness(hazard, values, manifest) if hazard.stl else None
         first = _first(hazard, values, robust, record)
         if first is not None:
             hazards.append((hazard.name, first))
-        ends += _ends(hazard, first, values)
+        if (end := _end(hazard, first, values)) is not None:
+            ends[hazard.name] = end
         if hazard.metric is not None:
             numbers = robust if robust is not None else over_time.numbers(hazard.margin, values)
             metrics.append((hazard.metric, numbers))
     metrics += [(metric, _numbers(metric, values)) for metric in manifest.metrics]
-    t_end = min(ends, default=None)
-    found = [(metric.name, _aggregate(metric, numbers, values, t_end)) for metric, numbers in metrics]
+    t_end = min(ends.values(), default=None)
+    found = {metric.name: _aggregate(metric, numbers, values, t_end) for metric, numbers in metrics}
+    contact = manifest.contact
+    if contact and t_end is not None and ends.get(contact.hazard) == t_end:
+        speed = found[contact.speed]
+        found[DELTA_V] = None if speed is None else contact.delta_v(speed)
     return Judged(
         hazards=tuple(hazards),
         alerts=tuple(alerts_of(record, manifest.alerts)),
         t_end=t_end,
-        metrics=tuple((name, value) for name, value in found if value is not None),
+        metrics=tuple((name, value) for name, value in found.items() if value is not None),
     )
 
 
@@ -112,14 +119,13 @@ def _first_of(holds: np.ndarray, time: np.ndarray) -> float | None:
     return float(time[at[0]]) if at.size else None
 
 
-def _ends(hazard: Hazard, first: float | None, values: Values) -> list[float]:
-    """When the drive is over because of a hazard: at most one time."""
+def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
+    """When the drive is over because of a hazard; None: it is not."""
     if hazard.terminal == "True":
-        return [] if first is None else [first]
+        return first
     if not hazard.terminal:
-        return []
-    end = _first_of(over_time.holds(hazard.terminal, values), values[TIME])
-    return [] if end is None else [end]
+        return None
+    return _first_of(over_time.holds(hazard.terminal, values), values[TIME])
 
 
 def _numbers(metric: Metric, values: Values) -> np.ndarray:

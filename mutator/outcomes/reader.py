@@ -14,8 +14,9 @@ from mutator._common.files import no_pipe
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes import results
-from mutator.outcomes.columns import hazards_in
+from mutator.outcomes.columns import SINCE, hazards_in
 from mutator.outcomes.rows import Row, row_from
+from mutator.targets.severity import Scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -145,9 +146,11 @@ class Results:
         return MutatorError(f"not a results table: {why}", where=self.path, remedy=_REMEDY)
 
 
-def row_of(experiment: Experiment, record: Record, hazards: "Sequence[str]") -> Row:
+def row_of(
+    experiment: Experiment, record: Record, hazards: "Sequence[str]", scale: Scale | None = None
+) -> Row:
     """The row that results.csv has, or would have, for an experiment and its record."""
-    cells = results.row(experiment, record, hazards)
+    cells = results.row(experiment, record, hazards, scale=scale)
     return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
 
 
@@ -167,6 +170,7 @@ def _units(frame: "pd.DataFrame") -> dict[str, str]:
     """The unit of each column of numbers; `unit` names that of `value`, row by row."""
     numbers = frame.select_dtypes("number").columns
     times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
+    times |= {column.name for column in SINCE}
     known = {name: "s" if name in times else "-" for name in numbers}
     known |= {name: "as its channel" for name in numbers if name.startswith("max_dev_")}
     return known | {"value": "as the column `unit` says"}

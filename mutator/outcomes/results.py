@@ -20,11 +20,13 @@ from mutator.outcomes.columns import (
     hazard_columns,
     plan_row,
     result_columns,
+    severity_columns,
 )
-from mutator.outcomes.verdicts import reaction_time
+from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.store import plan_file
 from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
+from mutator.targets.severity import Scale
 
 CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
 SCHEMA, STAMP = "results/1", "results.json"
@@ -32,12 +34,18 @@ _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
 def row(
-    experiment: Experiment, record: Record, hazards: Sequence[str], *, ends: bool = False
+    experiment: Experiment,
+    record: Record,
+    hazards: Sequence[str],
+    *,
+    ends: bool = False,
+    scale: Scale | None = None,
 ) -> dict[str, object]:
     """One row by column, in any order; without the largest differences where the run left no trace.
 
-    `hazards` are those that the target checks; `ends` says that one of them can end the drive. None stands
-    for nothing; flags are 0 or 1; times are seconds of simulation since its start.
+    `hazards` are those that the target checks; `ends` says that one of them can end the drive, and `scale`
+    makes classes of delta-v. None stands for nothing; flags are 0 or 1; times are seconds of simulation
+    since its start.
     """
     activation = record.activation
     ok = record.status is Status.OK
@@ -53,6 +61,9 @@ def row(
         "alerts": ";".join(name for name, _ in record.alerts) or None,
         "t_alert": _time(record.alerts[0][1]) if record.alerts else None,
         "reaction_time": _time(reaction_time(record.hazards, record.alerts)),
+        "severity": severity_of(record, scale),
+        "fault_tolerant_time": _time(since_activation(record)),
+        "manifest_to_hazard": _time(since_manifestation(record)),
         "detail": record.detail or None,
     }
     times = dict(record.hazards)
@@ -105,9 +116,11 @@ def tables(folder: RunFolder) -> dict[str, bytes]:
     experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     head = folder.head
     metrics = head.get("metrics", ())
-    columns = result_columns(head["hazards"], head["compared"], metrics)
-    ends = T_END in (name for name, *_ in metrics)
-    rows = [row(e, records[e.id], head["hazards"], ends=ends) for e in experiments if e.id in records]
+    columns = result_columns(head["hazards"], head["compared"], metrics, severity_columns(head))
+    ends, scale = T_END in (name for name, *_ in metrics), folder.scale
+    rows = [
+        row(e, records[e.id], head["hazards"], ends=ends, scale=scale) for e in experiments if e.id in records
+    ]
     return {
         CSV: _csv(rows, [column.name for column in columns]),
         PARQUET: _parquet(rows, columns),
@@ -122,7 +135,9 @@ def _made_from(folder: RunFolder) -> str:
     files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
     found = [(path.relative_to(run).as_posix(), Digest.of_file(path)) for path in files]
     head = folder.head
-    return digest([SCHEMA, VERSION, head["hazards"], head["compared"], head.get("metrics", []), found])
+    told = [head["hazards"], head["compared"], head.get("metrics", [])]
+    told += [head["severity"]] if "severity" in head else []
+    return digest([SCHEMA, VERSION, *told, found])
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
@@ -158,7 +173,7 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
 
 def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
     text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n", restval="")
+    writer = csv.DictWriter(text, columns, lineterminator="\n", restval="", extrasaction="ignore")
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue().encode()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from mutator.model import Outcome, Status, fault_label
 from mutator.outcomes.columns import hazards_in
+from mutator.targets.severity import DELTA_V
 
 UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
@@ -37,6 +38,9 @@ class Row:
     t_alert: float | None
     reaction_time: float | None
     detail: str
+    severity: str = ""  # class of the contact that ended the drive
+    delta_v: float | None = None  # m/s, in it
+    margin: float | None = None  # the least one: of the hazards that came, else of all
 
     @property
     def ending(self) -> str:
@@ -160,16 +164,24 @@ def row_from(line: Mapping[str, str]) -> Row:
         trigger=line["trigger"],
         status=Status(line["status"]),
         outcome=Outcome(line["outcome"]) if line["outcome"] else None,
-        t_activation=_time(line["t_activation"]),
-        t_manifest=_time(line["t_manifest"]),
+        t_activation=_number(line["t_activation"]),
+        t_manifest=_number(line["t_manifest"]),
         checked=tuple(checked),
         hazards=tuple(sorted(hazards, key=lambda h: h[1])),
         alerts=tuple(a for a in line["alerts"].split(";") if a),
-        t_alert=_time(line["t_alert"]),
-        reaction_time=_time(line["reaction_time"]),
+        t_alert=_number(line["t_alert"]),
+        reaction_time=_number(line["reaction_time"]),
         detail=line["detail"],
+        severity=line.get("severity", ""),
+        delta_v=_number(line.get(DELTA_V, "")),
+        margin=_least_margin(line, [name for name, _ in hazards] or checked),
     )
 
 
-def _time(text: str) -> float | None:
+def _least_margin(line: Mapping[str, str], hazards: Sequence[str]) -> float | None:
+    margins = [line.get(f"margin_{name.lower()}", "") for name in hazards]
+    return min((float(text) for text in margins if text), default=None)
+
+
+def _number(text: str) -> float | None:
     return float(text) if text else None

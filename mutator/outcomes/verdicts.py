@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
-from mutator.model import Activation, Outcome
+from mutator.model import Activation, Outcome, Record
+from mutator.targets.severity import DELTA_V, Scale
 
 Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
@@ -42,3 +43,26 @@ def reaction_time(hazards: Events, alerts: Events) -> float | None:
     if not hazards or not alerts or alerts[0][1] >= hazards[0][1]:
         return None
     return hazards[0][1] - alerts[0][1]
+
+
+def since_activation(record: Record) -> float | None:
+    """First hazard minus activation in s: the fault-tolerant time. None without a hazard."""
+    if not record.hazards or record.activation is None:
+        return None
+    return record.hazards[0][1] - record.activation.first
+
+
+def since_manifestation(record: Record) -> float | None:
+    """First hazard minus manifestation in s; None when either is missing or the hazard came first."""
+    if not record.hazards or record.t_manifest is None or record.t_manifest > record.hazards[0][1]:
+        return None
+    return record.hazards[0][1] - record.t_manifest
+
+
+def severity_of(record: Record, scale: Scale | None) -> str | None:
+    """The class of the contact that ended the drive; None without one, and when it came before the fault was
+    active: then it is not the fault's doing."""
+    delta_v = dict(record.metrics).get(DELTA_V)
+    if scale is None or delta_v is None or record.activation is None or record.t_end is None:
+        return None
+    return scale.class_of(delta_v) if record.t_end >= record.activation.first else None

@@ -10,7 +10,7 @@ from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
 from mutator.reference.tables import generated, sections
 from mutator.stpa import analysis, context_tables
-from mutator.targets import manifest_files
+from mutator.targets import manifest_files, severity
 from mutator.workspace import Workspace
 
 STRICT = """\
@@ -76,6 +76,11 @@ def manifests(workspace: Workspace) -> str:
         "library record is in [Channels](channels.md).\n",
         f"The first key is `schema: {manifest_files.SCHEMA}`. {_SAME}\n",
         *sections("target-manifest.md", manifest_files.ManifestModel),
+        "## Scales of severity\n",
+        "The files of `fault_library/severity/`: which class a delta-v is in, as [Verdicts](../explanation/"
+        "verdicts.md#severity)\nsays. A manifest names one in `severity.scale`. The first key is `schema: "
+        f"{severity.SCHEMA}`.\n",
+        *sections("target-manifest.md", severity.ScaleModel, below=2),
     )
 
 

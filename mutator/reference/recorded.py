@@ -3,12 +3,20 @@
 from collections.abc import Iterable, Iterator
 
 from mutator._common.tables import Table
-from mutator.outcomes.columns import PLAN_COLUMNS, TIMINGS, Column, metric_columns, result_columns
+from mutator.outcomes.columns import (
+    PLAN_COLUMNS,
+    TIMINGS,
+    Column,
+    metric_columns,
+    result_columns,
+    severity_columns,
+)
 from mutator.reference.tables import generated
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import variable_units
+from mutator.targets.severity import DELTA_V
 from mutator.workspace import Workspace
 
 _ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
@@ -45,7 +53,8 @@ def results(workspace: Workspace) -> str:
 def _table_of(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
     compared = [channel.name for channel in manifest.compared]
-    yield from _columns(result_columns(manifest.hazards, compared, metric_columns(manifest)))
+    severity = severity_columns({"severity": manifest.contact})
+    yield from _columns(result_columns(manifest.hazards, compared, metric_columns(manifest), severity))
 
 
 def _columns(columns: Iterable[Column]) -> Iterator[str]:
@@ -117,7 +126,12 @@ def _hazard(hazard: Hazard) -> tuple[str, ...]:
 
 
 def _metric(metric: Metric) -> tuple[str, ...]:
-    what = f"{metric.aggregate} of `{metric.formula}`" if metric.formula else "min of its robustness"
+    if metric.name == DELTA_V:
+        what = "what `severity` says"
+    elif metric.formula:
+        what = f"{metric.aggregate} of `{metric.formula}`"
+    else:
+        what = "min of its robustness"
     if metric.where:
         what += f" where `{metric.where}`"
     about = f"{metric.about} ({metric.source})" if metric.source else metric.about

@@ -17,7 +17,7 @@ from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultMod
 from mutator.faults.injections import DIMENSIONLESS
 from mutator.faults.readings import Readings
 from mutator.stpa import analysis, context_tables
-from mutator.targets import manifest_files
+from mutator.targets import manifest_files, severity
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors know best
 _MODEL = re.compile(r"^_?(\w+?)Model$")
@@ -52,6 +52,7 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
     (campaign_files.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
+    (severity.ScaleModel, severity.SCHEMA, "severity/*.yaml"),
     (context_tables.HazardsModel, context_tables.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
     (analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),

@@ -39,6 +39,7 @@ from mutator.store.records import TIMINGS_SCHEMA, read_records
 from mutator.store.run_head import HEAD, SCHEMA, Head, read_head
 from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
+from mutator.targets.severity import Scale
 
 _LOOKS = 3  # at a folder whose owner writes while it is looked at
 SCRATCH = "work"
@@ -172,6 +173,12 @@ class RunFolder:
     def limits(self) -> Limits:
         """Limits of each run."""
         return Limits(**self.head["limits"])
+
+    @property
+    def scale(self) -> Scale | None:
+        """What makes classes of delta-v; None for a target without contacts, and in older runs."""
+        told = self.head.get("severity")
+        return Scale.from_plain(told) if told else None
 
     @property
     def has_alerts(self) -> bool:

@@ -42,6 +42,8 @@ _SHAPES: dict[str, Any] = {
     "alerts": [str],
     "compared": [str],
     "metrics": [[str]],
+    "severity": ({"name": str, "about": str, "source": str, "classes": [list]}, NoneType),
+    "about_hazards": [{"name": str, "about": str, "terminal": bool}],
     "goldens": [list],
     "golden_files": [str],
     "canary": {str: object},

@@ -15,10 +15,19 @@ from mutator.targets.judging import Hazard, Metric
 from mutator.targets.observation import Observation
 from mutator.targets.placeholders import filled
 from mutator.targets.scene import Scene
+from mutator.targets.severity import DELTA_V, Contact
 from mutator.targets.source_tree import SourceTree, matches, read_tree
 from mutator.triggers import stl
 from mutator.triggers.conditions import names_in
 
+_DELTA_V = Metric(
+    name=DELTA_V,
+    aggregate="at_end",
+    formula="",
+    unit="m/s",
+    worse="higher",
+    about="change of the own speed in the contact, from contact speed and masses",
+)
 FILM = "film"  # folder in the output of a run that is filmed
 
 
@@ -64,6 +73,7 @@ class TargetManifest:
     observation: Observation
     rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
+    contact: Contact | None  # what makes a contact severe
     scene: Scene | None
     alerts: tuple[str, ...]  # alerts that count in experiments
     source: Source = field(repr=False, compare=False)  # the file's lines, for errors
@@ -124,8 +134,9 @@ class TargetManifest:
 
     @cached_property
     def measures(self) -> tuple[Metric, ...]:
-        """All numbers that a run is given: the margins of its hazards, then its metrics."""
-        return (*(hazard.metric for hazard in self.rules if hazard.metric), *self.metrics)
+        """All numbers that a run is given: the margins of its hazards, its metrics, delta-v."""
+        margins = [hazard.metric for hazard in self.rules if hazard.metric]
+        return (*margins, *self.metrics, *([_DELTA_V] if self.contact else []))
 
     @property
     def outputs(self) -> tuple[str, ...]:

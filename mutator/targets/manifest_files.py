@@ -16,6 +16,7 @@ from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, chec
 from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene import SceneModel, read_scene
+from mutator.targets.severity import SeverityModel, read_contact
 from mutator.targets.upgrade import NEW, OLD, Upgrade, upgraded, upgraded_text
 from mutator.triggers import stl
 
@@ -138,6 +139,9 @@ class ManifestModel(StrictModel, title="The file"):
     metrics: dict[str, MetricModel] = Field(
         default_factory=dict, description="Numbers that each run is given: columns of the results."
     )
+    severity: SeverityModel | None = Field(
+        None, description="How hard a contact is; without it no result has a class of severity."
+    )
     scene: SceneModel | None = Field(None, description="How a drive looks from above.")
     alerts: list[str] = Field(
         default_factory=list,
@@ -182,6 +186,8 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
     observation = read_observation(model.observation, source)
     known = observation.judgeable(channel.name for channel in channels)
     _check_recorded(source, set(observation.variables) - set(known))
+    rules = read_hazards(model.hazards, known, source, recorded=model.record is not None, step_s=model.step_s)
+    metrics = read_metrics(model.metrics, known, source)
     return TargetManifest(
         name=model.name,
         path=path,
@@ -206,10 +212,9 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         channels=channels,
         record_file=model.record,
         observation=observation,
-        rules=read_hazards(
-            model.hazards, known, source, recorded=model.record is not None, step_s=model.step_s
-        ),
-        metrics=read_metrics(model.metrics, known, source),
+        rules=rules,
+        metrics=metrics,
+        contact=None if model.severity is None else read_contact(model.severity, rules, metrics, source),
         scene=None if model.scene is None else read_scene(model.scene, known, source),
         alerts=tuple(model.alerts),
         source=source,

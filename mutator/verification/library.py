@@ -46,6 +46,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     manifest = found.tried(lambda: workspace.manifest(target))
     if manifest:
         found.tried(lambda: check_requirements(manifest))
+        found.tried(lambda: workspace.scale_of(manifest))
     models = found.tried(workspace.fault_models)
     hazards = found.tried(workspace.hazards)
     tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]

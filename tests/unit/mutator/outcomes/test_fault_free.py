@@ -20,6 +20,7 @@ MANIFEST: Any = SimpleNamespace(
     time_channel="t",
     rules=(Hazard(name="H1"),),
     metrics=(),
+    contact=None,
     judged=(),
     channels=(),
     observation=SimpleNamespace(derived=()),

@@ -138,6 +138,40 @@ def test_a_condition_may_end_the_drive(write: Write) -> None:
     assert dict(found.metrics) == {"margin_near": -1.0}  # gap - 1, at contact
 
 
+CONTACT = (
+    'hazards: {HIT: {when: "gap <= 0", terminal: true}, OUT: {when: "speed < 0", terminal: OUT_ENDS}}\n'
+    "metrics: {impact: {at_end: speed, unit: m/s, worse: higher, about: x}}\n"
+    "severity: {contact: HIT, contact_speed: impact, mass_kg: 1000, other_mass_kg: 3000, scale: collision}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("speed", "delta_v"),
+    [
+        (2.0, 1.5),  # of 1 t into 3 t at 2 m/s: both go on at 0.5 m/s
+        (-4.0, 0.0),  # the wall moves away: they touch and part
+        (np.nan, None),
+    ],
+)
+def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None) -> None:
+    """Delta-v is what an inelastic collision takes from the own speed: closing speed and masses say it."""
+    manifest = write(CONTACT.replace("OUT_ENDS", "false"))
+    found = judged(manifest, speed=np.array([1.0, 2.0, -1.0, speed, 9.0, 9.0]))
+    assert found.t_end == 3.0
+    assert dict(found.metrics).get("delta_v") == delta_v
+
+
+def test_only_the_contact_that_ended_the_drive_has_a_delta_v(write: Write) -> None:
+    """What another hazard ended has none, though the contact comes later; nor has a drive without any."""
+    found = judged(write(CONTACT.replace("OUT_ENDS", "true")))
+    assert (found.t_end, found.hazards) == (2.0, (("HIT", 3.0), ("OUT", 2.0)))
+    assert dict(found.metrics) == {"margin_hit": 1.0, "margin_out": -1.0, "impact": -1.0}
+    never = judged(write(CONTACT.replace("OUT_ENDS", "false")), gap=GAP + 2.0)
+    assert (never.t_end, "delta_v" in dict(never.metrics)) == (None, False)
+    same_step = judged(write(CONTACT.replace("OUT_ENDS", "true")), gap=GAP - 2.0)
+    assert (same_step.t_end, dict(same_step.metrics)["delta_v"]) == (1.0, 1.5)
+
+
 @pytest.mark.parametrize(
     ("rule", "margin"),
     [

@@ -16,7 +16,7 @@ from mutator.exports import Format
 from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes import results
-from mutator.outcomes.columns import metric_columns, result_columns
+from mutator.outcomes.columns import SEVERITY, SINCE, metric_columns, result_columns
 from mutator.outcomes.reader import Results
 from mutator.report import building
 from mutator.statistics.frame import load
@@ -138,7 +138,7 @@ def test_a_run_fills_the_columns_that_its_manifest_promises(
     record = run_single(crane, manifest, experiment, tmp_path / "single").record
     assert record.status is Status.OK
     compared = [channel.name for channel in manifest.compared]
-    columns = result_columns(manifest.hazards, compared, metric_columns(manifest))
+    columns = result_columns(manifest.hazards, compared, metric_columns(manifest), (SEVERITY, *SINCE))
     cells = results.row(experiment, record, manifest.hazards)
     assert {*cells} == {column.name for column in columns}
     assert cells["max_dev_wheel"]

@@ -15,10 +15,12 @@ from mutator.campaigns.plans import freeze, make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.outcomes import results
+from mutator.outcomes.columns import result_columns, severity_columns
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.targets.severity import Scale
 from mutator.workspace import Workspace
 
 HAZARDS = ("H1", "H2", "H3")
@@ -67,6 +69,59 @@ def test_a_hazard_row(experiment: Callable[..., Experiment], record: MakeRecord)
         "detail": None,
     }
     assert {name: cells[name] for name in expected} == expected
+
+
+SCALE = Scale(
+    name="x",
+    about="",
+    source="",
+    classes=(("S0", 0.0, ""), ("S1", 1.0, ""), ("S2", 5.0, ""), ("S3", 11.0, "")),
+)
+
+
+@pytest.mark.parametrize(
+    ("given", "severity", "tolerant", "after_manifest"),
+    [
+        ({}, "S2", 3.5, 3.25),
+        ({"metrics": (("delta_v", 0.0),)}, "S0", 3.5, 3.25),
+        ({"metrics": (("delta_v", 11.0),)}, "S3", 3.5, 3.25),  # on the bound: the upper class
+        ({"metrics": ()}, None, 3.5, 3.25),  # no contact
+        ({"t_end": 1.5}, None, 3.5, 3.25),  # a contact before the fault was active
+        ({"t_manifest": 6.0}, "S2", 3.5, None),  # the hazard came first
+        ({"t_manifest": None}, "S2", 3.5, None),
+        ({"hazards": (), "outcome": Outcome.SDC, "metrics": ()}, None, None, None),
+    ],
+)
+def test_severity_and_times_to_the_hazard(
+    experiment: Callable[..., Experiment],
+    record: MakeRecord,
+    given: dict[str, object],
+    severity: str | None,
+    tolerant: float | None,
+    after_manifest: float | None,
+) -> None:
+    """A contact after the activation has a class; times count to the first hazard, of activation at 2 s."""
+    hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
+    kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
+    cells = results.row(experiment(), kept, HAZARDS, scale=SCALE)
+    told = (cells["severity"], cells["fault_tolerant_time"], cells["manifest_to_hazard"])
+    assert told == (severity, tolerant, after_manifest)
+    assert results.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
+
+
+def test_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
+    """A run has the columns that its head asks for: all, the times alone, or none in an older run."""
+    scale = {"severity": SCALE.plain()}
+    times = ["fault_tolerant_time", "manifest_to_hazard"]
+    heads: list[tuple[dict[str, object], list[str]]] = [
+        (scale, ["severity", *times]),
+        ({"severity": None}, times),
+        ({}, []),
+    ]
+    for head, names in heads:
+        columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity_columns(head))]
+        assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
+    assert Scale.from_plain(SCALE.plain()) == SCALE
 
 
 @pytest.mark.parametrize(

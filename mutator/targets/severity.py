@@ -1,0 +1,143 @@
+"""Severity of a contact: delta-v of the own car, and the class that a scale gives it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from mutator.config.units import UNITS
+from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.targets.judging import Hazard, Metric
+
+SCHEMA = "severity/1"
+CLASSES = ("S0", "S1", "S2", "S3")  # of ISO 26262-3, the mildest first
+DELTA_V = "delta_v"  # the metric
+_KPH = UNITS["kph"].factor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """How hard a contact is: it comes with the terminal hazard `hazard`, at the closing speed that the metric
+    `speed` has (m/s), between masses in kg; `scale` names what makes a class of it."""
+
+    hazard: str
+    speed: str
+    mass: float
+    other_mass: float
+    scale: str
+
+    def delta_v(self, closing: float) -> float:
+        """Change of the own speed, m/s, in an inelastic collision along the line of travel: momentum is kept,
+        and both go on as one. Where they do not close in (0 or less) nothing changes."""
+        return max(closing, 0.0) * self.other_mass / (self.mass + self.other_mass)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """A class for each delta-v. `classes` are (name, least delta-v in m/s, meaning), the mildest first, from
+    0; `source` says where the bounds are from."""
+
+    name: str
+    about: str
+    source: str
+    classes: tuple[tuple[str, float, str], ...]
+
+    @classmethod
+    def from_plain(cls, data: Mapping[str, Any]) -> "Scale":
+        """The scale that `plain` gave."""
+        classes = tuple((name, float(least), about) for name, least, about in data["classes"])
+        return cls(name=data["name"], about=data["about"], source=data["source"], classes=classes)
+
+    def plain(self) -> dict[str, Any]:
+        """The scale as JSON has it, for run.json and pages."""
+        told = {"name": self.name, "about": self.about, "source": self.source}
+        return told | {"classes": [list(one) for one in self.classes]}
+
+    def class_of(self, delta_v: float) -> str:
+        """The class of a delta-v in m/s, 0 or more; one that is just on a bound is in the upper class."""
+        return [name for name, least, _ in self.classes if delta_v >= least][-1]
+
+
+class SeverityModel(StrictModel, title="Severity"):
+    """How hard a contact is. Delta-v of the own car, `contact_speed * other_mass_kg / (mass_kg +
+    other_mass_kg)`, is a metric, `delta_v`; the scale gives it a class."""
+
+    contact: str = Field(description="The terminal hazard that is a contact with another vehicle.")
+    contact_speed: str = Field(
+        description="The metric that is the closing speed there: one with `at_end`, in m/s. Below 0 the two "
+        "part, and delta-v is 0."
+    )
+    mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the own car.")
+    other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the other vehicle.")
+    scale: str = Field(description="A file of the library's `severity/`, without `.yaml`.")
+
+
+class _ClassModel(StrictModel, title="A class"):
+    from_kph: float = Field(ge=0.0, allow_inf_nan=False, description="The least delta-v in it; S0 has 0.")
+    about: str = Field(description="What harm it stands for.")
+
+
+class ScaleModel(StrictModel, title="severity/*.yaml"):
+    """What class a delta-v is in. A library may have several, and bounds of its own."""
+
+    about: str = Field("", description="What it is for.")
+    source: str = Field(description="Where the bounds are from.")
+    classes: dict[str, _ClassModel] = Field(description="S0, S1, S2 and S3, each from a higher delta-v.")
+
+
+def read_contact(
+    model: SeverityModel, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
+) -> Contact:
+    """What a manifest says of severity; MutatorError with the line of a hazard or metric that will not do."""
+    terminal = [hazard.name for hazard in hazards if hazard.terminal]
+    if model.contact not in terminal:
+        raise source.error(
+            ("severity", "contact"),
+            f"'{model.contact}'",
+            expected=f"a hazard with `terminal`: {', '.join(terminal) or 'there is none'}",
+            remedy="correct the name, or say `terminal: true` of the hazard",
+        )
+    speeds = [m.name for m in metrics if m.aggregate == "at_end" and m.unit == "m/s"]
+    if model.contact_speed not in speeds:
+        raise source.error(
+            ("severity", "contact_speed"),
+            f"'{model.contact_speed}'",
+            expected=f"a metric with `at_end` and the unit m/s: {', '.join(speeds) or 'there is none'}",
+            remedy="correct the name, or add the metric",
+        )
+    return Contact(
+        hazard=model.contact,
+        speed=model.contact_speed,
+        mass=model.mass_kg,
+        other_mass=model.other_mass_kg,
+        scale=model.scale,
+    )
+
+
+def load_scale(path: Path) -> Scale:
+    """Read a scale of a library; MutatorError with the line for classes that are not S0 to S3 in order."""
+    model, source = read(path, ScaleModel, SCHEMA)
+    if tuple(model.classes) != CLASSES:
+        raise source.error(
+            ("classes",),
+            f"the classes {', '.join(model.classes) or 'none'}",
+            expected=f"{', '.join(CLASSES)}, in this order",
+            remedy="name each of them once",
+        )
+    least = [one.from_kph for one in model.classes.values()]
+    for i, name in enumerate(CLASSES):
+        if (i == 0 and least[0] != 0.0) or (i and least[i] <= least[i - 1]):
+            raise source.error(
+                ("classes", name, "from_kph"),
+                f"{least[i]:g}",
+                expected="0 for S0, and for each other class more than for the one before",
+                remedy="correct the bound",
+            )
+    return Scale(
+        name=path.stem,
+        about=model.about,
+        source=model.source,
+        classes=tuple((name, one.from_kph * _KPH, one.about) for name, one in model.classes.items()),
+    )

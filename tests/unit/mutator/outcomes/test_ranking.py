@@ -1,0 +1,52 @@
+"""Which of two results is worse."""
+
+import csv
+import random
+from pathlib import Path
+
+from mutator.outcomes.columns import SEVERITY, result_columns
+from mutator.outcomes.ranking import worst
+from mutator.outcomes.reader import Results
+
+METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "delta_v")]
+COLUMNS = [column.name for column in result_columns(("H1", "H2"), ("gas",), METRICS, (SEVERITY,))]
+OK = {
+    "module": "m",
+    "fault_type": "f",
+    "scenario": "S1",
+    "method": "guided",
+    "status": "ok",
+    "h1": "0",
+    "h2": "0",
+}
+HAZARD = OK | {"outcome": "hazard", "t_activation": "1", "t_h2": "3", "margin_h1": "-9"}
+CONTACT = HAZARD | {"t_h1": "2", "severity": "S2", "delta_v": "6"}
+WORST_FIRST = {
+    "s3": CONTACT | {"severity": "S3", "delta_v": "12"},
+    "s2-harder": CONTACT | {"delta_v": "7"},
+    "s2-a": CONTACT,
+    "s2-b": CONTACT,
+    "s0": CONTACT | {"severity": "S0", "delta_v": "0"},
+    "deep": HAZARD | {"margin_h2": "-2"},  # of H2, which came; that of H1 says nothing
+    "less-deep": HAZARD | {"margin_h2": "-1"},
+    "no-margin": HAZARD,
+    "crash": OK | {"status": "crashed"},
+    "near": OK | {"outcome": "sdc", "margin_h1": "5", "margin_h2": "0.5"},
+    "far": OK | {"outcome": "sdc", "margin_h1": "1"},
+    "masked": OK | {"outcome": "masked", "margin_h1": "0.1"},
+    "idle": OK | {"outcome": "not_activated"},
+    "no-result": OK | {"status": "harness_error"},
+}
+
+
+def test_the_worst_come_first(tmp_path: Path) -> None:
+    """By class, then delta-v; without a class by ending, then margin; at last by id, in whatever order they
+    come."""
+    path = tmp_path / "results.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, COLUMNS, restval="")
+        table.writeheader()
+        table.writerows(line | {"experiment_id": name} for name, line in WORST_FIRST.items())
+    rows = list(Results(path).rows())
+    random.Random(1).shuffle(rows)
+    assert [row.experiment_id for row in worst(rows)] == list(WORST_FIRST)
