@@ -75,7 +75,12 @@ class Table:
 
         if not any(self.heads):
             return Markup("")
-        heads = Markup("").join(Markup('<th scope="col">{}</th>').format(head) for head in self.heads)
+        heads = Markup("").join(
+            Markup('<th scope="col"{}>{}</th>').format(
+                Markup(' class="number"' if i in self.right else ""), head
+            )
+            for i, head in enumerate(self.heads)
+        )
         return Markup("<thead><tr>{}</tr></thead>\n").format(heads)
 
 

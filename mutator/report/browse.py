@@ -24,6 +24,7 @@ from mutator.outcomes.columns import is_text
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report import series as report_series
+from mutator.report.answers import warning
 from mutator.review.groups import Shape, shapes
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -93,7 +94,7 @@ def reading_order(row: Row) -> tuple[str, ...]:
 
 def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bool = True) -> dict[str, Any]:
     """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
-    `t_hazard`. Those of alerts only for a target that has `alerts`."""
+    `warning`, `t_hazard`. Those of alerts only for a target that has `alerts`."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -102,6 +103,8 @@ def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bo
     columns["fault"] = [r.fault for r in rows]
     columns["ending"] = [r.ending for r in rows]
     columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
+    if alerts:
+        columns["warning"] = [warning(r) for r in rows]
     columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
     checked = sorted({name for r in rows for name in r.checked})
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]

@@ -13,6 +13,7 @@ from mutator.report.browse import browse_data
 from mutator.report.page import Content, markdown, page_html
 from mutator.report.panel import FOLDER
 from mutator.report.panels import PANELS
+from mutator.report.panels.answers import answers_panel
 from mutator.report.panels.tables import notes
 from mutator.report.stamp import is_current, made_from, remove_stamp, write_stamp
 from mutator.report.studies import ReportedRun
@@ -71,6 +72,7 @@ def _content(run: ReportedRun) -> Content:
         outcomes=outcome_counts(run.rows),
         planned=_planned(run.folder),
         notes=notes(run.folder).replace("*", ""),
+        answers=answers_panel(run),
         panels=panels,
         browse=browse_data(run.folder, run.rows, run.out, run.workspace),
     )

@@ -33,6 +33,7 @@ class Content:
 
     `alarm` stands before everything else, empty if there is none. `outcomes` counts how experiments ended,
     `planned` says in words how many there are to be, `notes` what the words of the counts mean.
+    `answers` come first, the list of experiments follows, then the other `panels`.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Content:
     outcomes: Mapping[str, int]
     planned: str
     notes: str
+    answers: Panel
     panels: Sequence[Panel]
     browse: Browse  # the experiments themselves; the page alone has them
 
@@ -52,6 +54,7 @@ def markdown(content: Content) -> str:
         f"# {content.name}",
         f"**{content.alarm}**" if content.alarm else "",
         f"{counted(total, 'experiment')}: {endings}. {content.planned}",
+        content.answers.markdown,
         *(panel.markdown for panel in content.panels),
         "The table of all experiments is `results.csv`; `index.html` lists them with their diffs.",
     ]

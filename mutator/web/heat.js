@@ -5,7 +5,7 @@ class HeatMap {
   static ROW = "kind";
   static COLUMN = "scenario";
   /** Facets whose filters do not change the map: its own two, and results, which it counts itself. */
-  static FREE = ["kind", "scenario", "outcome", "status", "hazards", "alerts"];
+  static FREE = ["kind", "scenario", "outcome", "status", "hazards", "alerts", "warning"];
 
   constructor(place, picker, table, state) {
     this.place = place;

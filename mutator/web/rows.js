@@ -13,6 +13,7 @@ const Rows = (() => {
     { name: "status", title: "Status" },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
+    { name: "warning", title: "Warning", none: "no hazard" },
   ];
   const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
     "ending", "hazards", "alerts", "detail"];

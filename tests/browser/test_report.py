@@ -94,7 +94,8 @@ def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
     """Its head says which of the filtered rows it is, the title follows, and a click in the list goes on."""
     page.choose("outcome", "hazard")
     count, title = len(page.column("ending")), page.page.title()
-    page.page.evaluate("scrollTo(0, 200)")
+    page.page.locator("#grid tr[data-at] >> nth=1").scroll_into_view_if_needed()
+    before = page.page.evaluate("scrollY")
     page.page.click("#grid tr[data-at] >> nth=1")
     assert page.page.inner_text("#experiment .place") == f"2 of {count}"
     assert (
@@ -110,11 +111,24 @@ def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
     page.page.go_back()
     page.page.wait_for_selector("#experiment", state="hidden")
     assert page.page.title() == title
-    assert page.page.evaluate("scrollY") == 200
+    assert page.page.evaluate("scrollY") == before > 100
     page.page.click("#grid tr[data-at] >> nth=1")
     page.page.click(".bar a:has-text('Tables')")
     assert not page.page.is_visible("#experiment")
     assert page.page.locator("#tables").is_visible()
+
+
+def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[dict[str, str]]) -> None:
+    """The worst is a click away, and a link's list has as many experiments as its answer says."""
+    hazards = [row for row in rows if row["outcome"] == "hazard"]
+    silent = [row for row in hazards if not row["reaction_time"]]
+    page.page.click(".dangerous td a >> nth=0")
+    page.page.wait_for_selector("#experiment .ending.hazard")
+    page.page.go_back()
+    page.page.click(".unwarned p a")
+    assert page.page.inner_text(".unwarned p").startswith(f"{len(silent)} of {len(hazards)} hazards")
+    assert page.found == f"{len(silent)} of {COUNT} experiments"
+    assert len(silent) not in (0, len(hazards))
 
 
 def test_two_keys_lead_to_the_list(page: "Page") -> None:

@@ -73,7 +73,7 @@ def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
     names = [
         {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)
     ]
-    assert names[0] - names[1] == {"alerts", "t_alert", "reaction_time"}
+    assert names[0] - names[1] == {"alerts", "t_alert", "reaction_time", "warning"}
     assert "detail" in names[1]
 
 

@@ -1,0 +1,66 @@
+"""The first thing a report says: answers to what a reader asks first."""
+
+from markupsafe import Markup
+
+from mutator._common.tables import Table
+from mutator.report.answers import Cell, Link, Listing, Part, answers_of
+from mutator.report.panel import Panel, rendered
+from mutator.report.studies import ReportedRun
+
+_HTML = """\
+<div class="answers">
+{% for answer in answers %}
+<section class="answer {{ answer.name }}" aria-labelledby="answer-{{ answer.name }}">
+<h2 id="answer-{{ answer.name }}">{{ answer.title }}</h2>
+<p>{{ answer.says }}
+{% for link in answer.links %}
+<a href="#{{ link.to }}">{{ link.text }}</a>{{ "" if loop.last else ", " }}
+{% endfor %}</p>
+{% for listing in answer.listings if listing.lines %}
+{{ table(listing) }}
+{% endfor %}
+</section>
+{% endfor %}
+</div>
+"""
+_BAR = '<span class="meter" style="--share: {:.3f}"></span><span class="of">{}</span>'
+
+
+def answers_panel(run: ReportedRun) -> Panel:
+    """What is dangerous, what came without a warning, what was survived, where the time went."""
+    made = answers_of(run)
+    parts = []
+    for answer in made:
+        tables = [_table(one).as_markdown() for one in answer.listings if one.lines]
+        parts += [f"## {answer.title}", answer.says, *tables]
+    html = rendered(_HTML, answers=made, table=_html)
+    return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
+
+
+def _table(listing: Listing) -> Table:
+    rows = [[cell if isinstance(cell, str) else cell.text for cell in line] for line in listing.lines]
+    return Table(heads=listing.heads, rows=rows, right=listing.numbers)
+
+
+def _html(listing: Listing) -> Markup:
+    """The same with links and bars. Where a screen is too narrow for the heads, cells say what they are."""
+    rows = [
+        [
+            _labelled(head, _cell(cell)) if i else _cell(cell)
+            for i, (head, cell) in enumerate(zip(listing.heads, line, strict=True))
+        ]
+        for line in listing.lines
+    ]
+    return Table(heads=listing.heads, rows=rows, right=listing.numbers).as_html("plain")
+
+
+def _labelled(head: str, cell: str) -> str:
+    return Markup('<span class="label">{} </span>{}').format(head, cell)
+
+
+def _cell(cell: Cell) -> str:
+    if isinstance(cell, Link):
+        return Markup('<a href="#{}">{}</a>').format(cell.to, cell.text)
+    if isinstance(cell, Part):
+        return Markup(_BAR).format(cell.part / cell.of if cell.of else 0.0, cell.text)
+    return cell
