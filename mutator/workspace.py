@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mutator._common.arguments import check_whole
 from mutator._common.files import check_is_text
-from mutator._common.shipped import shipped_folder
+from mutator._common.places import environment_path, library_files, library_folder, templates_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
@@ -23,9 +23,6 @@ from mutator.stpa.context_tables import ContextTable, HazardList, load_context_t
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.severity import Scale, load_scale
-
-_LIBRARY = "fault_library"
-_TEMPLATES = "templates"
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,22 +69,16 @@ class Workspace:
         upward that holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that
         is missing.
         """
-        its_library = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
-        its_templates = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
-        its_target = Path(target) if target else _environment("MUTATOR_TARGET")
+        its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
         if its_target and not its_target.is_dir():
             raise MutatorError(
                 f"no folder {its_target}",
                 expected="the target folder",
                 remedy="correct MUTATOR_TARGET, or name another folder of the controller's source",
             )
-        if its_library is None:
-            its_library = (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
-        if its_templates is None:
-            its_templates = (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
         return cls(
-            library=_folder(its_library, _LIBRARY, "library"),
-            templates=_folder(its_templates, _TEMPLATES, "templates"),
+            library=_folder(library_folder(root, library), "fault_library", "library"),
+            templates=_folder(templates_folder(root, templates), "templates", "templates"),
             target=its_target.resolve() if its_target else None,
         )
 
@@ -238,9 +229,7 @@ class Workspace:
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def _files(self, folder: str) -> dict[str, Path]:
-        base = self.library / folder
-        files = {p.relative_to(base).with_suffix("").as_posix(): p for p in base.rglob("*.yaml")}
-        return dict(sorted(files.items()))
+        return library_files(self.library, folder)
 
     def _file(self, folder: str, name: str | Path, what: str) -> Path:
         """A file of the library by name, or the file at a path that ends in .yaml."""
@@ -265,26 +254,6 @@ class Workspace:
 
 def _variants(spec: FaultSpec) -> list[str]:
     return [f"{spec.name}/{variant.name}" for variant in spec]
-
-
-def _named(folder: str | Path | None, root: str | Path | None, name: str, variable: str) -> Path | None:
-    """The folder `name` that an argument names, itself or by its root, else the one of the environment."""
-    if folder or root:
-        return Path(folder) if folder else Path(root or "") / name
-    base = _environment("MUTATOR_ROOT")
-    return _environment(variable) or (base / name if base else None)
-
-
-def _environment(variable: str) -> Path | None:
-    value = os.environ.get(variable)
-    return Path(value) if value else None
-
-
-def _upward(*folders: str) -> Path | None:
-    """The nearest folder from the current one upward that holds fault_library/, if it holds all of these."""
-    here = Path.cwd()
-    nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
-    return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None
 
 
 def _folder(path: Path, what: str, argument: str) -> Path:

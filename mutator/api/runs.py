@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.arguments import check_type
 from mutator._common.files import ScratchFolder
+from mutator._common.places import run_folders
 from mutator._common.tables import Table
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
@@ -33,7 +34,6 @@ from mutator.report import building, series
 from mutator.report.film import Shot, film_experiment
 from mutator.store import cleaning, plan_file
 from mutator.store.run_folder import RunFolder, golden_key
-from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
@@ -42,8 +42,6 @@ from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
     import pandas as pd
-
-RUNS = Path("runs")
 
 
 def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
@@ -57,16 +55,14 @@ def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
 
 def newest_run(root: Path) -> Path:
     """The run folder in runs/, here or under `root`, that was used last; MutatorError if there is none."""
-    here = {base.resolve() for base in (RUNS, root / RUNS)}
-    heads = [head for base in here for head in base.glob(f"*/{HEAD}")]
-    if not heads:
+    found = run_folders(root)
+    if not found:
         raise MutatorError(
             "no run folder in runs/",
             argument="run",
             remedy="name one: `run`, or make one: `mutator run quickstart --out runs/first`",
         )
-    newest = max(heads, key=lambda head: (head.stat().st_mtime_ns, str(head)))
-    return _from_here(newest.parent)
+    return _from_here(found[0])
 
 
 def _from_here(path: Path) -> Path:

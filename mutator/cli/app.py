@@ -89,7 +89,6 @@ class Verbs(TyperGroup):
 app = typer.Typer(
     cls=Verbs,
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_enable=False,
     epilog=EXAMPLES,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -177,6 +176,8 @@ def _answer(words: Sequence[str]) -> int:
     try:
         # Not `app()`: it would answer errors, interruptions and closed pipes in its own way.
         command = get_command(app)
+        if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks what fits
+            command.main(prog_name="mutator")
         with (
             _warnings_in_one_line(),
             terminable(),
@@ -186,6 +187,8 @@ def _answer(words: Sequence[str]) -> int:
         return EXIT_OK
     except typer.Exit as e:
         return e.exit_code
+    except SystemExit as e:  # completion ends so
+        return int(e.code or 0)
     except MutatorError as e:
         show_error(e)
         return e.exit_code

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import mutator
+from mutator.cli import completion
 from mutator.cli.console import Terminal, error_text
 from mutator.cli.options import Json, Place, with_place
 from mutator.cli.run_folders import library_if_any
@@ -27,7 +28,7 @@ Examples:
 
 @with_place
 def verify(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")],
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
     rerun: Annotated[
         int, typer.Option(metavar="N", min=0, help="Drive N experiments, drawn by lot, again.")
     ] = 0,

@@ -11,6 +11,7 @@ import typer
 import mutator
 from mutator._common.cores import usable_cores
 from mutator._common.text import counted
+from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
     AcceptVersions,
@@ -37,7 +38,12 @@ if TYPE_CHECKING:
     from mutator.report.building import Report
 
 CampaignName = Annotated[
-    str, typer.Argument(metavar="CAMPAIGN", help="A campaign of the library, or a campaign file.")
+    str,
+    typer.Argument(
+        metavar="CAMPAIGN",
+        help="A campaign of the library, or a campaign file.",
+        autocompletion=completion.campaigns,
+    ),
 ]
 
 ONE_PER_CORE = "Default: one for each usable core."

@@ -7,6 +7,7 @@ import typer
 
 import mutator
 from mutator._common.text import counted
+from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Only
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
@@ -36,8 +37,16 @@ result in a run, for then nobody can say that nothing got worse.
 
 
 def compare(
-    run_a: Annotated[Path, typer.Argument(metavar="RUN_A", help="A run folder: before, or the one.")],
-    run_b: Annotated[Path, typer.Argument(metavar="RUN_B", help="Another: after, or the other.")],
+    run_a: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN_A", help="A run folder: before, or the one.", autocompletion=completion.runs
+        ),
+    ],
+    run_b: Annotated[
+        Path,
+        typer.Argument(metavar="RUN_B", help="Another: after, or the other.", autocompletion=completion.runs),
+    ],
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Where to write; default: RUN_B/report/compare-<RUN_A>."),

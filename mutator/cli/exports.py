@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import mutator
+from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place
 from mutator.exports import Format
@@ -27,7 +28,7 @@ Examples:
 
 @with_place
 def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=completion.runs)],
     format: Annotated[Format, typer.Option(help="What to write.")],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Where to; default: a file in RUN/exports/.")

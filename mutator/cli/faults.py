@@ -8,6 +8,7 @@ import typer
 
 import mutator
 from mutator._common.text import counted
+from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
@@ -15,7 +16,12 @@ from mutator.mutants.readable_diffs import readable
 
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
 
-SpecName = Annotated[str, typer.Argument(metavar="SPEC", help="A spec of the library, or a spec file.")]
+SpecName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SPEC", help="A spec of the library, or a spec file.", autocompletion=completion.specs
+    ),
+]
 TriggerText = Annotated[
     str,
     typer.Option(
@@ -44,7 +50,15 @@ Examples:
 @with_place
 def try_spec(
     spec: SpecName,
-    scenario: Annotated[str, typer.Option("--scenario", "-s", help="Name or file of a driving scenario.")],
+    scenario: Annotated[
+        str,
+        typer.Option(
+            "--scenario",
+            "-s",
+            help="Name or file of a driving scenario.",
+            autocompletion=completion.scenarios,
+        ),
+    ],
     trigger: TriggerText = "always",
     variant: Variant = None,
     value: Value = None,
@@ -101,7 +115,12 @@ Examples:
 @with_place
 def diff(
     what: Annotated[
-        str, typer.Argument(metavar="SPEC|EXPERIMENT", help="A spec, a spec file, or an experiment.")
+        str,
+        typer.Argument(
+            metavar="SPEC|EXPERIMENT",
+            help="A spec, a spec file, or an experiment.",
+            autocompletion=completion.specs_and_experiments,
+        ),
     ],
     trigger: TriggerText = "always",
     variant: Variant = None,
@@ -166,7 +185,10 @@ Examples:
 @with_place
 def generate(
     specs: Annotated[
-        list[str] | None, typer.Argument(metavar="SPEC", help="Specs, globs over them, or spec files.")
+        list[str] | None,
+        typer.Argument(
+            metavar="SPEC", help="Specs, globs over them, or spec files.", autocompletion=completion.specs
+        ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new or empty folder.")] = ...,  # type: ignore[assignment]
     campaign: Annotated[

@@ -10,6 +10,7 @@ import typer
 
 import mutator
 from mutator._common.text import counted
+from mutator.cli import completion
 from mutator.cli.console import Terminal, error_text, short_path, with_options
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
@@ -155,7 +156,10 @@ def check(
     ] = False,
     scenario: Annotated[
         list[str] | None,
-        typer.Option(help="Drive this scenario, again for more; default: those of the campaigns."),
+        typer.Option(
+            help="Drive this scenario, again for more; default: those of the campaigns.",
+            autocompletion=completion.scenarios,
+        ),
     ] = None,
     as_json: Json = False,
     *,

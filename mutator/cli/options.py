@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import mutator
+from mutator.cli import completion
 from mutator.engines.kinds import ENGINES, FORK
 
 if TYPE_CHECKING:
@@ -18,7 +19,11 @@ if TYPE_CHECKING:
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
 Manifest = Annotated[
-    str | None, typer.Option(help="Name or file of the target's manifest; default: the library's only one.")
+    str | None,
+    typer.Option(
+        help="Name or file of the target's manifest; default: the library's only one.",
+        autocompletion=completion.targets,
+    ),
 ]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of drawn values and times.")]
 Reading = Annotated[
@@ -28,10 +33,21 @@ Reading = Annotated[
 Variant = Annotated[str | None, typer.Option(help="Only this variant of the spec.")]
 Value = Annotated[float | None, typer.Option(help="This value (in the spec's unit) instead of drawn ones.")]
 Run = Annotated[
-    Path | None, typer.Option("--run", metavar="DIR", help="The run folder; default: the newest in runs/.")
+    Path | None,
+    typer.Option(
+        "--run",
+        metavar="DIR",
+        help="The run folder; default: the newest in runs/.",
+        autocompletion=completion.runs,
+    ),
 ]
 ExperimentId = Annotated[
-    str, typer.Argument(metavar="EXPERIMENT", help="Id of an experiment, or the start of one.")
+    str,
+    typer.Argument(
+        metavar="EXPERIMENT",
+        help="Id of an experiment, or the start of one.",
+        autocompletion=completion.experiments,
+    ),
 ]
 Only = Annotated[
     str | None,

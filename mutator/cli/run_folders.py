@@ -10,6 +10,7 @@ import typer
 
 import mutator
 from mutator._common.text import counted
+from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import AcceptVersions, Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
@@ -43,7 +44,10 @@ Examples:
 
 
 def merge(
-    shards: Annotated[list[Path], typer.Argument(metavar="DIR", help="The run folder of each shard.")],
+    shards: Annotated[
+        list[Path],
+        typer.Argument(metavar="DIR", help="The run folder of each shard.", autocompletion=completion.runs),
+    ],
     out: OutRun,
     accept_versions: AcceptVersions = False,
     as_json: Json = False,
@@ -73,7 +77,7 @@ Examples:
 
 @with_place
 def report(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.")],
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
     as_json: Json = False,
     *,
     place: Place,
@@ -112,7 +116,9 @@ Examples:
 
 
 def clean(
-    runs: Annotated[list[Path], typer.Argument(metavar="DIR", help="Run folders.")],
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="DIR", help="Run folders.", autocompletion=completion.runs)
+    ],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
 ) -> None:
     """Delete run folders.

@@ -30,6 +30,10 @@ def command_line(workspace: Workspace) -> str:
         "which is told with\na traceback.\n",
         "An error, on standard error, says file and line, what was found, what was expected, and what "
         "to do. With `--json`\nstandard output is one JSON document. Progress goes to standard error.\n",
+        "## Completion\n",
+        "`mutator --install-completion` has the current shell complete verbs, options, and the names of "
+        "campaigns, specs,\nscenarios, targets, run folders in `runs/` and experiments: of the run that "
+        "`--run` names, or of the newest one.\n`mutator --show-completion` prints what it would install.\n",
         "## Where things are\n",
         _PLACES,
         *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),

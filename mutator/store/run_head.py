@@ -7,11 +7,12 @@ from types import NoneType
 from typing import Any
 
 from mutator._common.files import read_json
+from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.model import Limits
 
 SCHEMA = "run/2"
-HEAD, CAMPAIGN = "run.json", "campaign.yaml"
+HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 _REMEDY = "the run folder is damaged: take the file from a copy of it"
 _TEXTS = {str: str}
 # What keys hold: a type, or several; `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`;

@@ -1,0 +1,76 @@
+"""What a shell completes when one presses Tab: names of the library, run folders, ids of experiments.
+
+A shell asks with every key press, so only names of files are looked at, and the plan of one run as text.
+Where nothing fits, the shell completes files by itself.
+"""
+
+import csv
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from mutator._common.places import library_files, library_folder, run_folders
+from mutator.errors import MutatorError
+
+Completer = Callable[[typer.Context, str], list[str]]
+
+
+def names_in(folder: str) -> Completer:
+    """Completes the names of the library's files in this folder."""
+
+    def complete(ctx: typer.Context, incomplete: str) -> list[str]:
+        return _starting(library_files(_library(ctx), folder), incomplete)
+
+    return complete
+
+
+campaigns = names_in("campaigns")
+scenarios = names_in("scenarios")
+specs = names_in("faults")
+targets = names_in("targets")
+
+
+def runs(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Completes the run folders in runs/, as one types them."""
+    return _starting(map(_from_here, run_folders(_library(ctx).parent)), incomplete)
+
+
+def experiments(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Completes the ids of experiments of the run that is named, or of the newest one."""
+    folders = [Path(run)] if (run := ctx.params.get("run")) else run_folders(_library(ctx).parent)[:1]
+    return [name for folder in folders for name in _starting(_ids(folder), incomplete)]
+
+
+def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Completes either."""
+    return specs(ctx, incomplete) + experiments(ctx, incomplete)
+
+
+def _library(ctx: typer.Context) -> Path:
+    """The library that the options before or after the verb name, or the environment."""
+    given: dict[str, Any] = {}
+    for one in (ctx.find_root(), ctx):
+        given |= {name: one.params.get(name) for name in ("root", "library") if one.params.get(name)}
+    try:
+        return library_folder(**given)
+    except MutatorError:  # what ships cannot be unpacked
+        return Path("fault_library")
+
+
+def _ids(run: Path) -> list[str]:
+    try:
+        with (run / "plan.csv").open(encoding="utf-8", newline="") as file:
+            return [line["experiment_id"] for line in csv.DictReader(file)]
+    except (OSError, KeyError, UnicodeDecodeError):
+        return []
+
+
+def _starting(names: Iterable[str], incomplete: str) -> list[str]:
+    return sorted(name for name in names if name.startswith(incomplete))
+
+
+def _from_here(path: Path) -> str:
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)

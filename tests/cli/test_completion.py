@@ -1,0 +1,99 @@
+"""What a shell is offered when Tab is pressed."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Complete = Callable[..., list[str]]
+
+
+@pytest.fixture
+def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
+    """Answers as a shell is answered after these words, the last one being typed."""
+
+    def ask(*words: str) -> list[str]:
+        monkeypatch.setenv("_MUTATOR_COMPLETE", "complete_bash")
+        monkeypatch.setenv("COMP_WORDS", " ".join(("mutator", *words)))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        answer = cli()
+        monkeypatch.delenv("_MUTATOR_COMPLETE")
+        assert (answer.code, answer.err) == (0, "")
+        return answer.out.split()
+
+    return ask
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (["pl"], ["plan"]),
+        (["run", "sm"], ["small"]),
+        (["plan", "toy"], ["toy"]),
+        (["try", "sensor/dis"], ["sensor/distance"]),
+        (["generate", "sensor/si"], ["sensor/silence"]),
+        (["try", "sensor/lane", "--scenario", "A"], ["A"]),
+        (["check", "--manifest", "t"], ["toycar"]),
+        (["run", "nothing_like_it"], []),
+        (["export", "runs/x", "--format", "mut"], ["mutation-elements"]),
+    ],
+)
+def test_names_are_completed(complete: Complete, words: list[str], offered: list[str]) -> None:
+    """Verbs, campaigns, specs, scenarios, targets and formats are offered by what their names begin with."""
+    assert complete(*words) == offered
+
+
+def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli: Cli) -> None:
+    """Run folders in runs/ are offered, and the ids of experiments of the run that is named, or of the
+    newest one."""
+    cli("plan", "small", "--out", "runs/old", "--limit", "2")
+    cli("plan", "toy", "--out", "runs/new", "--limit", "2")
+    os.utime("runs/old/run.json", (1, 1))
+    old, new = (
+        sorted(line.split(",")[0] for line in Path(f"runs/{name}/plan.csv").read_text().splitlines()[1:])
+        for name in ("old", "new")
+    )
+    assert complete("report", "runs/") == ["runs/new", "runs/old"]
+    assert complete("show", "--run", "runs/o") == ["runs/old"]
+    assert complete("show", "") == new
+    assert complete("show", new[0][:6]) == new[:1]
+    assert complete("rerun", "--run", "runs/old", "") == old
+    Path("runs/old/plan.csv").write_bytes(b"\xff")
+    assert complete("rerun", "--run", "runs/old", "") == []
+
+
+def test_a_library_that_is_named_is_looked_into(
+    complete: Complete, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The options that name a library count before and after the verb; without them, the environment."""
+    monkeypatch.delenv("MUTATOR_ROOT")
+    assert "small" not in complete("run", "")
+    assert "small" in complete("--root", str(root), "run", "")
+    assert "small" in complete("run", "--library", str(root / "fault_library"), "")
+
+
+def test_the_script_for_a_shell_is_printed(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`--show-completion` prints what a shell must be given, for the command `mutator`."""
+    monkeypatch.setattr("typer.completion._get_shell_name", lambda: "bash")
+    answer = cli("--show-completion")
+    assert answer.code == 0
+    assert "_MUTATOR_COMPLETE=complete_bash" in answer.out
+    assert answer.out.rstrip().endswith("-F _mutator_completion mutator")
+
+
+def test_completion_loads_little(root: Path) -> None:
+    """What a shell waits for imports nothing that is large."""
+    code = (
+        "import sys\nfrom mutator.cli.app import main\nassert main() == 0\n"
+        "print(sorted({'jinja2', 'libcst', 'numpy', 'pandas', 'yaml', 'rich'} & set(sys.modules)))"
+    )
+    asked = {"_MUTATOR_COMPLETE": "complete_bash", "COMP_WORDS": "mutator run sm", "COMP_CWORD": "2"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ | asked
+    )
+    assert done.stdout.splitlines() == ["small", "[]"]
