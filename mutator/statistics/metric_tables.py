@@ -1,12 +1,20 @@
-"""How bad runs were: the target's metrics as a table."""
+"""How bad runs were, and how fast: metrics, classes of severity and times to the hazard as tables."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
+from mutator.statistics.medians import median_interval
+from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, Sheet
+from mutator.targets.severity import CLASSES
 
 HIGHER = "higher"
+TOTAL = "total"
+_INTERVAL = (
+    "Medians have 95 % intervals, resampled by fault (location and value); none where all runs say the same."
+)
 
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
@@ -15,17 +23,84 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
     lines: list[tuple[Cell, ...]] = []
     activated = frame[frame["is_activated"]]
     for name, unit, _, worse in metrics:
-        values = pd.to_numeric(activated[name]).dropna()
-        for kind, group in values.groupby(activated["kind"]):
+        for kind, values, faults in _groups(activated, pd.to_numeric(activated[name])):
             is_higher = worse == HIGHER
-            bad = float(group.quantile(0.75 if is_higher else 0.25))
-            worst = float(group.max() if is_higher else group.min())
-            lines.append((str(kind), name, unit, worse, len(group), float(group.median()), bad, worst))
+            bad = float(values.quantile(0.75 if is_higher else 0.25))
+            worst = float(values.max() if is_higher else values.min())
+            lines.append((kind, name, unit, worse, len(values), *_median(values, faults), bad, worst))
     return Sheet(
         name="metrics",
         title="Metrics by fault type",
-        note="Over the N runs with an activated fault that have a value, up to the end of the drive. A "
-        "quarter of them is at the worse quartile or beyond.",
-        heads=("fault type", "metric", "unit", "worse", "N", "median", "worse quartile", "worst"),
+        note="Over the N runs with an activated fault that have a value, up to the end of the drive. "
+        f"{_INTERVAL} A quarter of the runs is at the worse quartile or beyond.",
+        heads=(
+            *("fault type", "metric", "unit", "worse", "N"),
+            *("median", "median, low", "median, high", "worse quartile", "worst"),
+        ),
         lines=tuple(lines),
     )
+
+
+def severity_sheet(frame: pd.DataFrame) -> Sheet:
+    """How many of the activated faults of each type ended in a contact of which class; without lines where
+    results have no classes."""
+    lines: list[tuple[Cell, ...]] = []
+    activated = frame[frame["is_activated"]]
+    for kind, group in _by_kind(activated) if "severity" in frame else ():
+        counts = [int((group["severity"] == name).sum()) for name in CLASSES]
+        shares = [share(count, len(group)) for count in (sum(counts), *counts)]
+        lines.append((kind, *shares))
+    return Sheet(
+        name="severity",
+        title="Severity by fault type",
+        note="Of the activated faults, those whose drive ended in a contact, and in one of which class. 95 % "
+        "Wilson intervals; in brackets count/whole. Hazards without a contact have no class.",
+        heads=("fault type", "contact", *CLASSES),
+        lines=tuple(lines),
+    )
+
+
+def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
+    """How long it took to the first hazard, by fault type; `alerts` if the target has some."""
+    came = frame[frame["is_hazard"]]
+    starts = {"activation": "t_activation", "manifestation": "t_manifest"}
+    starts |= {"alert": "t_alert"} if alerts else {}
+    lines: list[tuple[Cell, ...]] = []
+    for start, column in starts.items():
+        times = (came["t_hazard"] - came[column]).round(6)
+        first = times > 0 if start == "alert" else times >= 0
+        for kind, values, faults in _groups(came, times.where(first)):
+            least, lower = float(values.min()), float(values.quantile(0.25))
+            lines.append((kind, f"{start} to hazard", len(values), least, lower, *_median(values, faults)))
+    return Sheet(
+        name="fault_tolerant_times",
+        title="From fault to hazard by fault type",
+        note="s from activation (the fault-tolerant time), from the first difference of an actuator, and "
+        "from the first alert to the first hazard, in the N runs in which they came in this order. What "
+        f"detects the fault and reacts has no more than the shortest. {_INTERVAL}",
+        heads=(
+            *("fault type", "time", "N", "shortest, s", "lower quartile, s"),
+            *("median, s", "median, low, s", "median, high, s"),
+        ),
+        lines=tuple(lines),
+    )
+
+
+def _groups(frame: pd.DataFrame, values: pd.Series) -> Iterator[tuple[str, pd.Series, pd.Series]]:
+    """Fault type, values and whose they are, of the runs that have one."""
+    known = values.dropna()
+    for kind, group in _by_kind(frame.loc[known.index]):
+        yield kind, known[group.index], group["fault_id"]
+
+
+def _by_kind(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """By fault type, and all of them together where there are several."""
+    kinds = [(str(kind), group) for kind, group in frame.groupby("kind")]
+    yield from kinds
+    if len(kinds) > 1:
+        yield TOTAL, frame
+
+
+def _median(values: pd.Series, faults: pd.Series) -> tuple[float, float, float]:
+    low, high = median_interval(values, faults) if len(values) > 1 else (math.nan, math.nan)
+    return float(values.median()), low, high

@@ -17,7 +17,7 @@ from mutator.outcomes.rows import (
 )
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
-from mutator.statistics.metric_tables import metrics_sheet
+from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.sheets import run_sheets
 from mutator.store.run_folder import RunFolder
@@ -93,8 +93,12 @@ def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
     published = run.study.published(run) if run.study else None
     alerts = {name: record.alerts for name, record in run.folder.records().items()}
     sheets = run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
-    metrics = metrics_sheet(run.frame, run.folder.head.get("metrics", ()))
-    return (*sheets, metrics) if metrics.lines else sheets
+    more = (
+        severity_sheet(run.frame),
+        tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
+        metrics_sheet(run.frame, run.folder.head.get("metrics", ())),
+    )
+    return (*sheets, *(sheet for sheet in more if sheet.lines))
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:

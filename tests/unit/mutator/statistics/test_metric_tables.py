@@ -1,31 +1,110 @@
-"""Metrics as a table."""
+"""Metrics, severity and times to the hazard as tables."""
 
+import math
+
+import numpy as np
 import pandas as pd
+import pytest
 
-from mutator.statistics.metric_tables import metrics_sheet
+from mutator.statistics import medians
+from mutator.statistics.medians import median_difference, median_interval
+from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
 
 METRICS = [["t_end", "s", "x", "lower"], ["gap", "m", "x", "lower"], ["speed", "m/s", "x", "higher"]]
+FRAME = pd.DataFrame(
+    {
+        "kind": ["a/x"] * 5 + ["a/y", "a/y"],
+        "fault_id": [*"fghij", "k", "k"],
+        "is_activated": [True] * 6 + [False],
+        "t_end": [None] * 7,
+        "gap": ["1", "2", "3", "4", "5", "", "0"],
+        "speed": ["5", "6", "7", "8", "9", "4", "99"],
+        "severity": ["S3", "S2", "", "", "S0", "", "S3"],
+        "is_hazard": [True] * 5 + [False, False],
+        "t_activation": [1.0, 1, 1, 1, 1, 1, math.nan],
+        "t_manifest": [1.5, 9, math.nan, 2, 2, 2, math.nan],
+        "t_alert": [math.nan, 2.0, 4, 1, 7, math.nan, math.nan],
+        "t_hazard": [2.0, 3, 4, 5, 6, math.nan, math.nan],
+    }
+)
 
 
 def test_the_spread_of_each_metric_by_fault_type() -> None:
     """Median, worse quartile and worst are by hand; what was not activated and what has no value is out."""
-    frame = pd.DataFrame(
-        {
-            "kind": ["a/x"] * 5 + ["a/y", "a/y"],
-            "is_activated": [True] * 6 + [False],
-            "t_end": [None] * 7,
-            "gap": ["1", "2", "3", "4", "5", "", "0"],
-            "speed": ["5", "6", "7", "8", "9", "4", "99"],
-        }
-    )
-    sheet = metrics_sheet(frame, METRICS)
-    assert sheet.lines == (
+    sheet = metrics_sheet(FRAME, METRICS)
+    told = [(*line[:6], *line[8:]) for line in sheet.lines]
+    assert told == [
         ("a/x", "gap", "m", "lower", 5, 3.0, 2.0, 1.0),
         ("a/x", "speed", "m/s", "higher", 5, 7.0, 8.0, 9.0),
         ("a/y", "speed", "m/s", "higher", 1, 4.0, 4.0, 4.0),
-    )
+        ("total", "speed", "m/s", "higher", 6, 6.5, 7.75, 9.0),
+    ]
+    assert [line[6:8] for line in sheet.lines[:2]] == [(1.0, 5.0), (5.0, 9.0)]
+    assert all(math.isnan(cell) for cell in sheet.lines[2][6:8] if isinstance(cell, float))  # of one run
 
 
 def test_without_a_value_there_is_no_line() -> None:
-    """A target without metrics, or a run without values, has no such table."""
-    assert metrics_sheet(pd.DataFrame({"kind": ["a"], "is_activated": [True]}), []).lines == ()
+    """A target without metrics, or a run without values or hazards, has no such tables."""
+    frame = FRAME[FRAME["kind"] == "a/y"]
+    assert metrics_sheet(frame, []).lines == ()
+    assert tolerant_times_sheet(frame).lines == ()
+    assert severity_sheet(frame.drop(columns="severity")).lines == ()
+
+
+def test_classes_of_severity_by_fault_type() -> None:
+    """Each class is counted of the activated faults, and any contact before them."""
+    rows = severity_sheet(FRAME).table().rows
+    counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
+    assert counts == [
+        ["a/x", "3/5", "1/5", "0/5", "1/5", "1/5"],
+        ["a/y", "0/1", "0/1", "0/1", "0/1", "0/1"],
+        ["total", "3/6", "1/6", "0/6", "1/6", "1/6"],
+    ]
+    assert rows[0][1] == "60.0 % (3/5; 23.1 to 88.2)"
+
+
+def test_times_to_the_hazard() -> None:
+    """Only what came before the hazard is a time to it; an alert that came with it is none."""
+    told = [line[:6] for line in tolerant_times_sheet(FRAME).lines]
+    assert told == [
+        ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
+        ("a/x", "manifestation to hazard", 3, 0.5, 1.75, 3.0),
+        ("a/x", "alert to hazard", 2, 1.0, 1.75, 2.5),
+    ]
+    assert len(tolerant_times_sheet(FRAME, alerts=False).lines) == 2
+
+
+@pytest.mark.parametrize("pairs", [False, True])
+def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
+    pairs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The interval is what a plain loop finds that copies the runs of each drawn fault."""
+    monkeypatch.setattr(medians, "RESAMPLES", 40)
+    monkeypatch.setattr(medians, "_CELLS", 300)  # several batches
+    rng = np.random.default_rng(3)
+    cluster = pd.Series(rng.integers(0, 6, 30))
+    first, second = pd.Series(rng.normal(0, 1, 30)), pd.Series(rng.normal(1, 1, 30).round(1))
+    draws, names = np.random.default_rng(1), cluster.unique()
+    seen = []
+    for counts in draws.multinomial(6, [1 / 6] * 6, size=40):
+        of = zip(names, counts, strict=True)
+        rows = [i for name, n in of for i in cluster.index[cluster == name].repeat(n)]
+        seen.append(np.median(second[rows]) - (np.median(first[rows]) if pairs else 0.0))
+    expected = pytest.approx(tuple(np.quantile(seen, (0.025, 0.975))))
+    if pairs:
+        found = median_difference(first, second, cluster)
+        assert found.difference == np.median(second) - np.median(first)
+        assert (found.low, found.high) == expected
+    else:
+        assert median_interval(second, cluster) == expected
+
+
+def test_where_nothing_can_be_said_of_a_median() -> None:
+    """One fault, or runs that all say the same, have no interval; no pair has no difference."""
+    ones, faults = pd.Series([1.0, 1.0, 1.0]), pd.Series(["a", "b", "c"])
+    assert all(map(math.isnan, median_interval(ones, faults)))
+    assert all(map(math.isnan, median_interval(pd.Series([1.0, 2.0]), pd.Series(["a", "a"]))))
+    same = median_difference(faults.index.to_series(), faults.index.to_series() + 2, faults)
+    assert same.difference == 2.0
+    assert math.isnan(same.low)
+    assert math.isnan(median_difference(ones[:0], ones[:0], faults[:0]).difference)
