@@ -25,6 +25,7 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report import series as report_series
 from mutator.report.answers import warning
+from mutator.report.scenes import scene_facts
 from mutator.review.groups import Shape, shapes
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -60,21 +61,24 @@ def browse_data(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "W
     series = [Markup(embedded(data, f"series-{name}")) for name, data in carried.items()]
     data = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
     data["table"], data["details"] = tables_of(folder, rows)
-    facts = {"filmed": _is_filmed(folder, workspace), "series": report_series.kept(out)}
+    facts = {**_of_target(folder, workspace), "series": report_series.kept(out)}
     return Browse(
-        facts=Markup(json.dumps(facts)),
+        facts=Markup(json.dumps(facts).replace("<", "\\u003c")),
         scripts=(*(Markup(embedded(value, name)) for name, value in data.items()), *series),
         carried=len(series),
         carried_kb=sum(map(len, series)) // 1000,
     )
 
 
-def _is_filmed(folder: RunFolder, workspace: "Workspace | None") -> bool:
-    """Whether pictures can be made of the target's runs; true where the target is not to be found."""
+def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
+    """What the page needs of the target, as its manifest is now: whether pictures can be made of its runs
+    (true where there is no manifest), and how a drive looks from above."""
     try:
-        return workspace is None or workspace.manifest(folder.head["target"]).film is not None
+        manifest = workspace.manifest(folder.head["target"]) if workspace else None
     except MutatorError:
-        return True
+        manifest = None
+    filmed = manifest is None or manifest.film is not None
+    return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
 
 
 def tables_of(folder: RunFolder, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:

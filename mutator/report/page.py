@@ -10,7 +10,7 @@ from mutator.report.browse import Browse
 from mutator.report.panel import Panel, rendered
 from mutator.web import asset, plainly_embedded
 
-STYLES = ("base.css", "report.css")
+STYLES = ("base.css", "report.css", "replay.css")
 SCRIPTS = (  # each uses those before it
     "packed.js",
     "dom.js",
@@ -22,6 +22,17 @@ SCRIPTS = (  # each uses those before it
     "grid.js",
     "details.js",
     "series.js",
+    "replay_formula.js",
+    "replay_data.js",
+    "replay_clock.js",
+    "replay_colours.js",
+    "replay_tracks.js",
+    "replay_scene.js",
+    "replay_bar.js",
+    "replay_gauges.js",
+    "replay_plot.js",
+    "replay_plots.js",
+    "replay.js",
     "experiment.js",
     "report.js",
 )

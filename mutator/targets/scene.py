@@ -1,4 +1,4 @@
-"""A scene: what a drive looks like from above, in channels. It is checked here and drawn elsewhere."""
+"""A scene: what a drive looks like from above, in channels. It is checked here; the report draws it."""
 
 import math
 from collections.abc import Collection
@@ -16,7 +16,8 @@ Shape = Literal["box", "circle"]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actor:
     """Something that moves: its middle at (`x`, `y`) in m, turned by `heading` (rad, left positive), each a
-    formula over channels; `width` is a circle's diameter. It is there while `visible` holds."""
+    formula over channels; `width` is a circle's diameter. It is there while `visible` holds; one that is
+    `believed` is where the controller takes something to be."""
 
     name: str
     shape: Shape
@@ -26,6 +27,7 @@ class Actor:
     y: str
     heading: str
     visible: str
+    believed: bool
     about: str
 
 
@@ -41,11 +43,13 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """What can be drawn of a drive. `follow` is the actor that the view stays with ('' none)."""
+    """What can be drawn of a drive. `follow` is the actor that the view stays with ('' none), `speed` a
+    formula for how fast the origin moves along x (m/s)."""
 
     actors: tuple[Actor, ...]
     lines: tuple[Line, ...]
     follow: str
+    speed: str
 
 
 class _ActorModel(StrictModel, title="An actor"):
@@ -58,6 +62,9 @@ class _ActorModel(StrictModel, title="An actor"):
     y: str = Field("0", description="Of its middle, m, left positive.")
     heading: str = Field("0", description="rad, left positive.")
     visible: str = Field("True", description="The condition while which it is there.")
+    believed: bool = Field(
+        False, description="Whether it is where the controller takes something to be: drawn as an outline."
+    )
     about: str = Field("", description="What it is.")
 
 
@@ -75,6 +82,11 @@ class SceneModel(StrictModel, title="The scene"):
     actors: dict[str, _ActorModel] = Field(min_length=1, description="What moves, by name.")
     lines: dict[str, _LineModel] = Field(default_factory=dict, description="Lines on the ground, by name.")
     follow: str | None = Field(None, description="The actor that the view stays with.")
+    speed: str = Field(
+        "0",
+        description="How fast the origin moves along x, m/s: a formula, for a drive whose poses are relative "
+        "to the car. The road then passes by, and a car that falls behind the golden run is seen to.",
+    )
 
 
 def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Scene:
@@ -88,7 +100,8 @@ def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Sce
         )
     actors = tuple(_actor(name, actor, known, source) for name, actor in model.actors.items())
     lines = tuple(_line(name, line, known, source) for name, line in model.lines.items())
-    return Scene(actors=actors, lines=lines, follow=model.follow or "")
+    speed = formula(model.speed, known, source, ("scene", "speed"))
+    return Scene(actors=actors, lines=lines, follow=model.follow or "", speed=speed)
 
 
 def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source) -> Actor:
@@ -106,6 +119,7 @@ def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source
         y=formula(model.y, known, source, (*keys, "y")),
         heading=formula(model.heading, known, source, (*keys, "heading")),
         visible=condition(model.visible, known, source, (*keys, "visible")),
+        believed=model.believed,
         about=model.about,
     )
 

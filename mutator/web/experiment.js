@@ -80,7 +80,7 @@ class Experiment {
       this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
       el("section.happened", {}, el("h3", {}, "What happened"), this.#events()),
       typeof Path === "undefined" ? "" : section("Path of the fault", "path"),
-      section(typeof Replay === "undefined" ? "Golden against faulty" : "Replay", "replay"),
+      section("Replay", "replay"),
       section("Pictures", "pictures"),
       section("What was changed", "change"),
       section("Injected lines alone", "snippet"),
@@ -156,7 +156,7 @@ class Experiment {
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
     this.#pictures(id, media && media[id]);
     const place = this.#content("replay");
-    if (series && typeof Replay !== "undefined") Replay.show(place, series, this.facts);
+    if (series && typeof SeriesFile !== "undefined") Replay.show(place, series, this.facts);
     else if (series) Series.show(place, series);
     else this.#noSeries(id, this.facts.onDemand.has(id));
   }

@@ -1,0 +1,67 @@
+"""Conditions and formulas as JSON, for what evaluates them in another language: the report's page.
+
+A number, a truth value or a name (`t` and `inf` too) stands for itself. Anything else is a list of an
+operator and its operands: `+ - * / neg abs hypot min max rate`, `< <= > >= == !=`, `and or not ever`, and
+`if` with a condition and two numbers.
+"""
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+from mutator.triggers.conditions import parse
+
+Tree = bool | float | str | list[Any]
+
+_OPERATORS: Mapping[type[ast.AST], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.And: "and",
+    ast.Or: "or",
+    ast.Not: "not",
+    ast.USub: "neg",
+}
+
+
+def tree(text: str, derived: Mapping[str, str]) -> Tree:
+    """The tree of a checked condition or formula; a `derived` value is replaced by its own formula."""
+    return _tree(parse(text), derived)
+
+
+def _tree(node: ast.expr, derived: Mapping[str, str]) -> Tree:
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, bool) else float(node.value)  # type: ignore[arg-type]
+    if isinstance(node, ast.Name):
+        return tree(derived[node.id], derived) if node.id in derived else node.id
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd):
+        return _tree(node.operand, derived)
+    name, parts = _application(node)
+    return [name, *(_tree(part, derived) for part in parts)]
+
+
+def _application(node: ast.expr) -> tuple[str, list[ast.expr]]:
+    """The operator of a node, and what it is of."""
+    if isinstance(node, ast.BoolOp):
+        return _OPERATORS[type(node.op)], node.values
+    if isinstance(node, ast.UnaryOp):
+        return _OPERATORS[type(node.op)], [node.operand]
+    if isinstance(node, ast.BinOp):
+        return _OPERATORS[type(node.op)], [node.left, node.right]
+    if isinstance(node, ast.IfExp):
+        return "if", [node.test, node.body, node.orelse]
+    if isinstance(node, ast.Call):
+        return ast.unparse(node.func), node.args
+    assert isinstance(node, ast.Compare)
+    if len(node.ops) == 1:
+        return _OPERATORS[type(node.ops[0])], [node.left, *node.comparators]
+    terms = [node.left, *node.comparators]  # a < b < c
+    pairs = zip(terms, node.ops, terms[1:], strict=False)
+    return "and", [ast.Compare(left, [op], [right]) for left, op, right in pairs]

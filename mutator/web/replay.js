@@ -1,0 +1,194 @@
+"use strict";
+// The replay of an experiment: its scene, instruments and plots at one time, which plays, is dragged and is stepped.
+
+const Replay = (() => {
+  const BEFORE = 1; // s before the activation at which it waits
+  const SPOKEN = 4; // channels in the sentence about a time
+  const SILENCE = 500; // ms that the time must stand before it is read out
+
+  const SYMBOLS = {
+    play: "M4 2l9 6-9 6z", pause: "M4 2h3v12H4zM9 2h3v12H9z", start: "M3 3h2v10H3zM13 3v10L6 8z", end: "M11 3h2v10h-2zM3 3v10l7-5z",
+    back: "M11 3v10L4 8z", on: "M5 3v10l7-5z",
+  };
+
+  /** A symbol of a button, whatever fonts there are. */
+  const symbol = (name) => Dom.svg("svg", { viewBox: "0 0 16 16", width: 14, height: 14, fill: "currentColor", "aria-hidden": "true" }, Dom.svg("path", { d: SYMBOLS[name] }));
+
+  class Player {
+    constructor(place, series, facts) {
+      Object.assign(this, { place, series, facts });
+      this.channels = [...series.channels].sort((a, b) => (b.role === "actuator") - (a.role === "actuator"));
+      this.axes = this.channels.map((channel) => ReplayData.range(channel, ReplayData.until(series)));
+      const at = Math.max(series.start, (series.active?.[0] ?? series.marks[0]?.[1] ?? series.start) - BEFORE);
+      this.clock = new ReplayClock({ start: series.start, end: series.end, stops: series.tEnd === null ? [] : [series.tEnd], steps: ReplayData.steps(series), at },
+        () => this.#draw());
+      this.scene = this.#scene();
+      this.#build();
+      this.plots.begin();
+      new ResizeObserver(() => {
+        this.plots.width = this.drawn = 0;
+        this.clock.redraw();
+      }).observe(this.root);
+      for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => this.clock.redraw());
+    }
+
+    /** The scene, where the target has one and its formulas can be evaluated over this series. */
+    #scene() {
+      if (!this.facts.scene) return null;
+      try {
+        return new ReplayScene(new ReplayTracks(this.facts.scene, this.series), this.series);
+      } catch (error) {
+        this.missing = error.message;
+        return null;
+      }
+    }
+
+    #build() {
+      const { el } = Dom, { clock, series } = this;
+      this.bar = new ReplayBar(series, clock, (t) => this.describe(t));
+      const plotting = { isPlotted: (name) => this.plots.isPlotted(name), toggle: (name) => {
+        this.plots.toggle(name);
+        this.gauges.pressed();
+      } };
+      this.gauges = new ReplayGauges(this.channels, this.axes, plotting);
+      this.plots = new ReplayPlots(this.channels, this.axes, series, clock, (from, to) => this.bar.zoomed(from, to));
+      this.gauges.pressed();
+      this.time = el("span.now");
+      this.states = el("span.states");
+      this.live = el("p.visually-hidden", { "aria-live": "polite" });
+      this.root = el("div.replay-player", { role: "group", "aria-label": "Replay. Space plays, arrows step, Shift and an arrow goes a second.",
+        onkeydown: (event) => this.#key(event) },
+        el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
+        this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,
+        this.gauges.element, this.plots.element, this.live);
+      this.place.replaceChildren(el("div.replay-box", {}, this.root));
+    }
+
+    #view() {
+      if (!this.scene) return null;
+      const about = this.facts.scene.actors.map(({ name, about: what }) => what || name).join(", ");
+      this.canvas = Dom.el("canvas.scene", { role: "img", "aria-label": `The drive from above: ${about}. Golden run as an outline.`, onclick: () => {
+        this.clock.toggle();
+        this.bar.element.focus({ preventScroll: true });
+      } });
+      return this.canvas;
+    }
+
+    #controls() {
+      const { el } = Dom, { clock } = this;
+      const button = (icon, name, todo) => el("button", { type: "button", title: name, "aria-label": name, onclick: todo }, symbol(icon));
+      this.playing = el("button.play", { type: "button", onclick: () => clock.toggle() });
+      const speed = el("select", { "aria-label": "Speed", onchange: () => (clock.speed = Number(speed.value)) },
+        ReplayClock.SPEEDS.map((value) => el("option", { value, selected: value === 1 }, `${value}×`)));
+      return el("div.controls", {}, this.playing, button("start", "To the start (Home)", () => this.#go(this.series.start)),
+        button("back", "One step back (←)", () => clock.step(-1)), button("on", "One step on (→)", () => clock.step(1)),
+        button("end", "To the end of the drive (End)", () => this.#go(ReplayData.until(this.series))), speed,
+        this.scene ? el("p.legend", {}, el("span.key.box-faulty"), "faulty", el("span.key.box-golden"), "golden",
+          this.facts.scene.actors.some(({ believed }) => believed) ? [el("span.key.box-belief"), "what the controller believes"] : null) : null);
+    }
+
+    #go(t) {
+      this.clock.pause();
+      this.clock.seek(t);
+    }
+
+    #key(event) {
+      if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select")) return;
+      const { clock, series, plots } = this, by = event.shiftKey ? 1 : 0;
+      const keys = {
+        ArrowLeft: () => (by ? this.#go(clock.t - by) : clock.step(-1)), ArrowRight: () => (by ? this.#go(clock.t + by) : clock.step(1)),
+        Home: () => this.#go(series.start), End: () => this.#go(ReplayData.until(series)),
+        "+": () => plots.zoom(1), "-": () => plots.zoom(-1), 0: () => plots.all(), e: () => plots.event(),
+        " ": event.target.matches("button") ? null : () => clock.toggle(),
+      };
+      if (!keys[event.key]) return;
+      keys[event.key]();
+      event.preventDefault();
+    }
+
+    /** The state at a time in words. */
+    describe(t) {
+      const { series } = this, words = [`${t.toFixed(2)} s`, ...this.#stateAt(t).map(([, text]) => text)];
+      const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.held(c, "faulty", t), ReplayData.held(c, "golden", t)));
+      for (const channel of (differ.length ? differ : this.channels).slice(0, SPOKEN)) {
+        const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.held(channel, run, t), places);
+        words.push(`${channel.name} ${of("faulty")} ${ReplayData.unit(channel)}${differ.length ? `, golden ${of("golden")}` : ""}`.trim());
+      }
+      return `${words.join(", ")}${differ.length || t < series.start ? "" : ", as golden"}`;
+    }
+
+    /** [kind, text] of what is so at a time: fault active, the last alert, hazards, the end. */
+    #stateAt(t) {
+      const { active, marks, tEnd } = this.series, came = marks.filter(([, at]) => at <= t + ReplayData.TINY), states = [];
+      if (active && t >= active[0] - ReplayData.TINY && t <= active[1] + ReplayData.TINY) states.push(["active", "fault active"]);
+      else if (active) states.push(["idle", t < active[0] ? "fault not active yet" : "fault no longer active"]);
+      for (const [kind, , label] of came) if (kind === "alert" || kind === "hazard") states.push([kind, this.#named(kind, label)]);
+      if (tEnd !== null && t > tEnd + ReplayData.TINY) states.push(["after", "after the end of the drive"]);
+      return states;
+    }
+
+    #named(kind, label) {
+      const about = kind === "hazard" ? this.facts.hazards?.find?.(({ name }) => name === label)?.about : "";
+      return about ? `${label}: ${about}` : label;
+    }
+
+    /** Draw the time of the clock: all that is shown follows from it. */
+    #draw() {
+      if (!this.root.isConnected) return this.clock.pause();
+      const { clock, series } = this, { t, isPlaying } = clock, now = performance.now(), colours = ReplayColours.now();
+      const isAfter = series.tEnd !== null && t > series.tEnd + ReplayData.TINY;
+      this.root.classList.toggle("is-after", isAfter);
+      if (this.scene) this.#drawScene(t, colours);
+      this.plots.draw(colours);
+      this.plots.show(now, isPlaying);
+      this.gauges.show(t, now, isPlaying);
+      this.bar.show();
+      this.#write(t, isPlaying);
+      this.place.dispatchEvent(new CustomEvent("replay-time", { bubbles: true, detail: { t } }));
+      Replay.rate = clock.rate;
+      if (clock.rate) this.root.dataset.rate = clock.rate.toFixed(1);
+    }
+
+    #drawScene(t, colours) {
+      const width = this.root.clientWidth, height = Math.round(Math.min(260, Math.max(160, width * 0.27)));
+      if (this.drawn !== width) {
+        this.drawn = width;
+        this.context = ReplayColours.fitted(this.canvas, width, height);
+      }
+      this.scene.draw(this.context, width, height, t, colours);
+    }
+
+    #write(t, isPlaying) {
+      const { el } = Dom;
+      this.time.textContent = `${t.toFixed(2)} s`;
+      this.root.dataset.t = t.toFixed(3);
+      const states = this.#stateAt(t), key = states.map(([, text]) => text).join("|");
+      if (key !== this.stated) {
+        this.states.replaceChildren(...states.map(([kind, text]) => el(`span.chip.${kind}`, {}, text)));
+        if (isPlaying && this.stated !== undefined) this.live.textContent = key.replaceAll("|", ", ");
+        this.stated = key;
+      }
+      const told = isPlaying ? "Pause" : "Play";
+      if (this.playing.dataset.told !== told) {
+        this.playing.replaceChildren(symbol(isPlaying ? "pause" : "play"), ` ${told}`);
+        this.playing.title = `${told} (space)`;
+        this.playing.dataset.told = told;
+      }
+      clearTimeout(this.speaking);
+      if (!isPlaying) this.speaking = setTimeout(() => document.activeElement !== this.bar.element && this.#say(t), SILENCE);
+    }
+
+    /** Read the state out once the time stands; the bar says its own. */
+    #say(t) {
+      const text = this.describe(t);
+      if (this.root.contains(document.activeElement) && this.live.textContent !== text) this.live.textContent = text;
+    }
+  }
+
+  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` of the page: scene, hazards. */
+  function show(place, series, facts) {
+    return new Player(place, series, facts);
+  }
+
+  return { show, rate: 0 };
+})();

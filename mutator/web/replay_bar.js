@@ -1,0 +1,79 @@
+"use strict";
+// The time of a replay as a bar: drag it, with marks of what happened when; beneath it a button for each of these.
+
+class ReplayBar {
+  /** `describe(t)` says the state at a time in words. */
+  constructor(series, clock, describe) {
+    const { el } = Dom;
+    Object.assign(this, { series, clock, describe });
+    this.handle = el("span.handle");
+    this.done = el("span.done");
+    this.window = el("span.window", { hidden: true });
+    this.element = el("div.timebar", { role: "slider", tabindex: 0, "aria-label": "Time of the replay", "aria-valuemin": series.start.toFixed(2),
+      "aria-valuemax": series.end.toFixed(2), onpointerdown: (event) => this.#drag(event) },
+      el("span.track"), this.done, ...this.#parts(), this.window, this.handle);
+    this.jumps = el("div.jumps", { role: "group", "aria-label": "Go to" }, series.marks.map((mark) => this.#jump(mark)));
+  }
+
+  /** A time as a share of the bar, in CSS. */
+  #at = (t) => `${(100 * (t - this.series.start)) / (this.series.end - this.series.start || 1)}%`;
+
+  #span(name, from, to, title) {
+    const { el } = Dom, made = el(`span.${name}`, { title });
+    made.style.left = this.#at(from);
+    made.style.width = `calc(${this.#at(to)} - ${this.#at(from)})`;
+    return made;
+  }
+
+  #parts() {
+    const { el } = Dom, { active, tEnd, end, marks } = this.series, parts = [];
+    if (active) parts.push(this.#span("active", active[0], Math.min(active[1], ReplayData.until(this.series)), `fault active, first to last: ${active[0].toFixed(2)} to ${active[1].toFixed(2)} s`));
+    if (tEnd !== null) parts.push(this.#span("after", tEnd, end, "after the end of the drive"));
+    return [...parts, ...marks.map(([kind, t]) => {
+      const mark = el(`span.mark.${kind}`, { "aria-hidden": "true" }, ReplayScene.SYMBOLS[kind] ?? "•");
+      mark.style.left = this.#at(t);
+      return mark;
+    })];
+  }
+
+  #jump([kind, t, label]) {
+    const { el } = Dom;
+    return el(`button.jump.${kind}`, { type: "button", title: `Go to ${t.toFixed(2)} s`, onclick: () => {
+      this.clock.pause();
+      this.clock.seek(t);
+    } }, el("span.symbol", { "aria-hidden": "true" }, ReplayScene.SYMBOLS[kind] ?? "•"), ` ${label} `, el("span.when", {}, `${t.toFixed(2)} s`));
+  }
+
+  #drag(event) {
+    if (event.button) return;
+    event.preventDefault();
+    this.element.focus({ preventScroll: true });
+    this.element.setPointerCapture(event.pointerId);
+    const { left, width } = this.element.getBoundingClientRect(), { start, end } = this.series;
+    const move = ({ clientX }) => {
+      this.clock.pause();
+      this.clock.seek(start + ((clientX - left) / width) * (end - start));
+    };
+    const over = new AbortController(), { signal } = over;
+    move(event);
+    this.element.addEventListener("pointermove", move, { signal });
+    for (const name of ["pointerup", "pointercancel"]) this.element.addEventListener(name, () => over.abort(), { signal });
+  }
+
+  /** Show the time; what is said of it only while it stands, or a screen reader would never be silent. */
+  show() {
+    const { t, isPlaying } = this.clock, { start, end } = this.series, share = (t - start) / (end - start || 1);
+    this.handle.style.left = `${100 * share}%`;
+    this.done.style.transform = `scaleX(${share})`;
+    if (isPlaying) return;
+    this.element.setAttribute("aria-valuenow", t.toFixed(2));
+    this.element.setAttribute("aria-valuetext", this.describe(t));
+  }
+
+  /** Show which part of the time the plots show; all of it needs no sign. */
+  zoomed(from, to) {
+    this.window.hidden = from <= this.series.start && to >= this.series.end;
+    this.window.style.left = this.#at(from);
+    this.window.style.width = `calc(${this.#at(to)} - ${this.#at(from)})`;
+  }
+}

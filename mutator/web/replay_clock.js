@@ -1,0 +1,92 @@
+"use strict";
+// The time of a replay: playing, stepping, and how many frames a second are drawn.
+
+class ReplayClock {
+  static SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
+  static CALM = 500; // ms between two pictures where motion is to be little
+  #frames = []; // when the last ones were drawn, ms
+  #last = null; // ms, of the frame before while playing
+  #isDue = false; // a frame is asked for
+  #timer = null;
+
+  /** From `start` to `end` s; playing pauses at each of `stops` on its way. `draw(clock)` is called when anything changed. */
+  constructor({ start, end, stops, steps, at }, draw) {
+    Object.assign(this, { start, end, stops, steps, draw, t: at, speed: 1, isPlaying: false, rate: 0 });
+    this.calm = matchMedia("(prefers-reduced-motion: reduce)");
+  }
+
+  toggle() {
+    if (this.isPlaying) this.pause();
+    else this.play();
+  }
+
+  play() {
+    if (this.isPlaying) return;
+    if (this.t >= this.end - ReplayData.TINY) this.t = this.start;
+    this.isPlaying = true;
+    this.#last = null;
+    this.#frames = [];
+    if (this.calm.matches) this.#goOnCalmly();
+    this.#ask();
+  }
+
+  pause() {
+    this.isPlaying = false;
+    clearInterval(this.#timer);
+    this.#ask();
+  }
+
+  seek(t) {
+    this.t = Math.min(this.end, Math.max(this.start, t));
+    this.#ask();
+  }
+
+  /** Go `by` samples on or back. */
+  step(by) {
+    this.pause();
+    const now = ReplayData.index(this.steps, this.t), isBetween = this.t - this.steps[now] > ReplayData.TINY;
+    const to = now + by + (by < 0 && isBetween ? 1 : 0);
+    this.seek(this.steps[Math.min(this.steps.length - 1, Math.max(0, to))]);
+  }
+
+  /** Draw once more, soon: what is shown has changed, not the time. */
+  redraw() {
+    this.#ask();
+  }
+
+  #ask() {
+    if (this.#isDue) return;
+    this.#isDue = true;
+    requestAnimationFrame((now) => this.#frame(now));
+  }
+
+  #frame(now) {
+    this.#isDue = false;
+    const isCalm = this.calm.matches;
+    if (this.isPlaying && (!isCalm || this.#last === null)) this.#advance(now);
+    this.draw(this);
+    if (this.isPlaying && !isCalm) this.#ask();
+  }
+
+  /** For those whom motion harms: a picture twice a second, and nothing that glides. */
+  #goOnCalmly() {
+    this.#timer = setInterval(() => {
+      if (!this.isPlaying) return clearInterval(this.#timer);
+      this.#advance(performance.now());
+      this.#ask();
+    }, ReplayClock.CALM);
+  }
+
+  #advance(now) {
+    const passed = this.#last === null ? 0 : Math.min(ReplayClock.CALM, now - this.#last); // a page in the back gets no frames
+    this.#last = now;
+    const from = this.t, to = Math.min(this.end, from + (passed / 1000) * this.speed);
+    const stop = this.stops.find((t) => from < t - ReplayData.TINY && to >= t);
+    this.t = stop ?? to;
+    if (stop !== undefined || this.t >= this.end) this.isPlaying = false;
+    this.#frames.push(now);
+    while (now - this.#frames[0] > 1000) this.#frames.shift();
+    const span = now - this.#frames[0];
+    this.rate = span > 200 ? ((this.#frames.length - 1) * 1000) / span : 0;
+  }
+}

@@ -1,0 +1,31 @@
+"use strict";
+// The colours of the page for canvases, light or dark as it is, and canvases as sharp as the screen.
+
+const ReplayColours = (() => {
+  let made = null;
+  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => (made = null));
+
+  /** Colours by name; the same object until they change. */
+  function now() {
+    if (made) return made;
+    const style = getComputedStyle(document.documentElement), of = (name) => style.getPropertyValue(`--${name}`).trim();
+    const names = ["golden", "faulty", "hazard", "ink", "quiet", "line", "raised", "road", "verge", "post", "paint", "other", "glass", "edge", "halo", "burst",
+      "active", "after", "late", "between", "belief"];
+    made = Object.fromEntries(names.map((name) => [name, of(`replay-${name}`) || of(name)]));
+    return Object.assign(made, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), activation: of("ink"), goldenText: of("accent") });
+  }
+
+  /** The context of a canvas of so many CSS pixels, made anew and empty. */
+  function fitted(canvas, width, height) {
+    const ratio = devicePixelRatio || 1;
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    canvas.style.width = `${width}px`;
+    canvas.style.height = `${height}px`;
+    const context = canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return context;
+  }
+
+  return { now, fitted };
+})();

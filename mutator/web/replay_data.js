@@ -1,0 +1,84 @@
+"use strict";
+// Numbers of a series (SeriesFile.load) as the replay shows them: at a time, in a text, on an axis.
+
+const ReplayData = (() => {
+  const BEYOND = 100; // so many times what a channel usually is: its axis is cut
+  const TINY = 1e-9; // s
+
+  /** The last of `times` that is not after `t`; 0 before the first. */
+  function index(times, t) {
+    let low = 0, high = times.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (times[middle] <= t + TINY) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  /** The value of a channel in a run (`golden` or `faulty`) at a time: that of the last sample; NaN where there is none. */
+  const held = (channel, run, t) => (channel.t.length && t >= channel.t[0] - TINY ? channel[run][index(channel.t, t)] : NaN);
+
+  const same = (a, b) => a === b || (Number.isNaN(a) && Number.isNaN(b));
+
+  /** The times at which the state of a replay can differ: those of the channel that has most. */
+  const steps = (series) => series.channels.reduce((most, { t }) => (t.length > most.length ? t : most), []);
+
+  /** Until when what happens is part of the drive. */
+  const until = (series) => series.tEnd ?? series.end;
+
+  /** Where golden and faulty differ most up to the end of the drive: {by, t}; `by` is 0 where they do not. */
+  function largest(channel, end) {
+    const found = { by: 0, t: NaN };
+    for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) {
+      const by = Math.abs(channel.faulty[i] - channel.golden[i]);
+      if (by > found.by) Object.assign(found, { by, t: channel.t[i] });
+      else if (!found.by && !same(channel.faulty[i], channel.golden[i])) Object.assign(found, { by: NaN, t: channel.t[i] });
+    }
+    return found;
+  }
+
+  /** The axis of a channel, of what it is up to the end of the drive; `cut`: from where to where its values really
+   *  go, if that is too far to show. A headway time near standstill goes to any height, and nothing else would be seen. */
+  function range(channel, end) {
+    const values = [];
+    for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) values.push(channel.golden[i], channel.faulty[i]);
+    const sorted = values.filter(Number.isFinite).sort((a, b) => a - b);
+    if (!sorted.length) return { low: 0, high: 1, cut: null };
+    let low = sorted[0], high = sorted[sorted.length - 1], cut = null;
+    const sizes = sorted.map(Math.abs).sort((a, b) => a - b), usual = Math.max(1, sizes[Math.floor(0.98 * (sizes.length - 1))]);
+    if (Math.max(-low, high) > BEYOND * usual) {
+      cut = [low, high];
+      [low, high] = [Math.max(low, -2 * usual), Math.min(high, 2 * usual)];
+    }
+    // a narrower range would show rounding as something
+    const margin = Math.max((high - low) * 0.06, 1e-6, Math.abs(high) * 1e-3);
+    return { low: low - margin, high: high + margin, cut };
+  }
+
+  /** Round numbers to label an axis from `low` to `high` with, about `count` of them. */
+  function ticks(low, high, count) {
+    const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
+    const step = power * ([1, 2, 5, 10].find((m) => m * power >= rough) || 10), made = [];
+    for (let k = Math.ceil(low / step - TINY); k * step <= high + step * TINY; k++) made.push(Number((k * step).toPrecision(12)));
+    return made;
+  }
+
+  /** How many digits behind the point a channel with this axis is written with. */
+  function digits({ low, high }) {
+    const size = Math.max(Math.abs(low), Math.abs(high), 1e-9);
+    return Math.min(4, Math.max(0, (size < 1 ? 3 : 4) - Math.ceil(Math.log10(size))));
+  }
+
+  /** A value as a text; a true minus, so that it is as wide as a plus. */
+  function text(value, places) {
+    if (Number.isNaN(value)) return "–";
+    if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+    const made = Math.abs(value) >= 1e6 ? value.toExponential(1) : value.toFixed(places);
+    return (Number(made) === 0 ? made.replace("-", "") : made).replace("-", "−");
+  }
+
+  const unit = (channel) => (channel.unit && channel.unit !== "-" ? channel.unit : "");
+
+  return { TINY, index, held, same, steps, until, largest, range, ticks, digits, text, unit };
+})();

@@ -1,0 +1,55 @@
+"use strict";
+// Instruments: each channel's value with a bar in its range, faulty and golden. One is also the switch of its plot.
+
+class ReplayGauges {
+  static FEW = 8; // that a narrow screen shows at first
+  static TEXTS = 100; // ms between two texts while playing: faster than this nobody reads
+
+  /** `isPlotted(name)`, and `toggle(name)` which changes that. */
+  constructor(channels, axes, { isPlotted, toggle }) {
+    const { el } = Dom;
+    Object.assign(this, { isPlotted, written: -Infinity });
+    this.gauges = channels.map((channel, i) => this.#gauge(channel, axes[i], toggle));
+    const all = el("button.more", { type: "button", onclick: () => {
+      this.element.classList.add("has-all");
+      all.remove();
+    } }, `All ${channels.length} instruments`);
+    this.element = el("div.gauges", { role: "group", "aria-label": "Instruments; pressed: its plot is shown" },
+      this.gauges.map(({ button }) => button), channels.length > ReplayGauges.FEW ? all : null);
+  }
+
+  #gauge(channel, axis, toggle) {
+    const { el } = Dom, unit = ReplayData.unit(channel), span = axis.high - axis.low;
+    const share = (v) => Math.min(1, Math.max(0, (v - axis.low) / span));
+    const faulty = el("b"), golden = el("span.of-golden"), fill = el("span.fill"), needle = el("span.needle");
+    const button = el("button.gauge", { type: "button", title: channel.about || null, "aria-label": `Plot of ${channel.name}`, onclick: () => toggle(channel.name) },
+      el("span.name", {}, channel.name, unit ? el("span.unit", {}, ` ${unit}`) : null, channel.role === "actuator" ? el("span.role", {}, "actuator") : null),
+      el("span.values", {}, faulty, golden), el("span.bar", {}, el("span.zero", { style: `left:${100 * share(0)}%` }), fill, needle));
+    return { channel, axis, share, places: ReplayData.digits(axis), button, faulty, golden, fill, needle };
+  }
+
+  /** Show the values of a time; `now` is when, in ms: texts are not written in each frame. */
+  show(t, now, isPlaying) {
+    const isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
+    if (isWritten) this.written = now;
+    for (const gauge of this.gauges) this.#show(gauge, t, isWritten);
+  }
+
+  #show({ channel, share, places, button, faulty, golden, fill, needle }, t, isWritten) {
+    const now = ReplayData.held(channel, "faulty", t), before = ReplayData.held(channel, "golden", t);
+    const zero = share(0), to = Number.isNaN(now) ? zero : share(now);
+    fill.style.transform = `translateX(${100 * Math.min(zero, to)}%) scaleX(${Math.abs(to - zero)})`;
+    needle.style.transform = `translateX(${100 * share(before)}%)`;
+    needle.hidden = Number.isNaN(before);
+    if (!isWritten) return;
+    const [text, other] = [now, before].map((value) => ReplayData.text(value, places));
+    faulty.textContent = text;
+    golden.textContent = text === other ? "" : `golden ${other}`;
+    button.classList.toggle("differs", text !== other);
+  }
+
+  /** Show which ones are plotted. */
+  pressed() {
+    for (const { channel, button } of this.gauges) button.setAttribute("aria-pressed", String(this.isPlotted(channel.name)));
+  }
+}

@@ -1,0 +1,167 @@
+"use strict";
+// One channel over time on a canvas: golden broad beneath, faulty narrow above, gray after the end of the drive.
+
+class ReplayPlot {
+  static HEIGHT = 84; // px
+  static LEFT = 58; // px for the numbers of the axis
+  static RIGHT = 8;
+
+  constructor(channel, axis, series) {
+    const { el } = Dom, unit = ReplayData.unit(channel);
+    Object.assign(this, { channel, axis, series, end: ReplayData.until(series), places: ReplayData.digits(axis) });
+    this.largest = ReplayData.largest(channel, this.end);
+    this.golden = el("span.value.golden");
+    this.faulty = el("span.value.faulty");
+    this.by = el("span.value.by");
+    this.canvas = el("canvas", { role: "img", "aria-label": this.#inWords() });
+    this.cursor = el("span.cursor");
+    this.room = el("div.room", {}, this.canvas, this.cursor);
+    this.element = el("div.plot-of", { "data-channel": channel.name }, el("div.head", {},
+      el("span.name", { title: channel.about || null }, channel.name, unit ? ` [${unit}]` : ""), this.golden, this.faulty, this.by), this.room, this.#note());
+  }
+
+  /** Where golden and faulty differ most, as a share of the axis. */
+  get weight() {
+    const { by } = this.largest;
+    return Number.isNaN(by) ? 1 : by / (this.axis.high - this.axis.low);
+  }
+
+  #text = (value) => ReplayData.text(value, this.places);
+
+  #inWords() {
+    const { by, t } = this.largest;
+    const most = by ? `largest difference ${this.#text(by)} at ${t.toFixed(2)} s` : "no difference";
+    return `${this.channel.name} from golden to faulty: ${most}, up to ${this.end.toFixed(2)} s`;
+  }
+
+  #note() {
+    const { cut } = this.axis;
+    return cut ? Dom.el("p.note", {}, `axis cut: values go from ${this.#text(cut[0])} to ${this.#text(cut[1])}`) : null;
+  }
+
+  /** Where a time is, in px of the canvas. */
+  x(t, { from, to }) {
+    return ReplayPlot.LEFT + ((t - from) / (to - from)) * (this.width - ReplayPlot.LEFT - ReplayPlot.RIGHT);
+  }
+
+  /** The time at a place of the canvas. */
+  time(x, { from, to }) {
+    return from + ((x - ReplayPlot.LEFT) / (this.width - ReplayPlot.LEFT - ReplayPlot.RIGHT)) * (to - from);
+  }
+
+  /** Draw the time from `view.from` to `view.to`, as wide as there is room. */
+  draw(width, view, colours) {
+    const { HEIGHT, LEFT, RIGHT } = ReplayPlot;
+    this.width = width;
+    const context = ReplayColours.fitted(this.canvas, width, HEIGHT);
+    const x = (t) => this.x(t, view), { low, high } = this.axis, y = (v) => 3 + ((high - v) / (high - low)) * (HEIGHT - 6);
+    context.fillStyle = colours.ground;
+    context.fillRect(LEFT, 0, width - LEFT - RIGHT, HEIGHT);
+    this.#scale(context, y, width, colours);
+    context.save();
+    context.beginPath();
+    context.rect(LEFT, 0, width - LEFT - RIGHT, HEIGHT);
+    context.clip();
+    this.#happened(context, x, width, colours);
+    const [first, last] = this.#seen(view);
+    this.#between(context, x, y, first, last, colours.between);
+    this.#lines(context, x, y, first, last, colours);
+    context.restore();
+  }
+
+  /** The samples that are in a view, and one more at both ends. */
+  #seen({ from, to }) {
+    const { t } = this.channel;
+    return [Math.max(0, ReplayData.index(t, from)), Math.min(t.length - 1, ReplayData.index(t, to) + 1)];
+  }
+
+  #scale(context, y, width, colours) {
+    context.font = "11px system-ui, sans-serif";
+    context.textAlign = "right";
+    context.textBaseline = "middle";
+    for (const tick of ReplayData.ticks(this.axis.low, this.axis.high, 3)) {
+      context.fillStyle = colours.line;
+      context.fillRect(ReplayPlot.LEFT, Math.round(y(tick)), width - ReplayPlot.LEFT - ReplayPlot.RIGHT, 1);
+      context.fillStyle = colours.quiet;
+      context.fillText(String(tick).replace("-", "−"), ReplayPlot.LEFT - 6, y(tick));
+    }
+  }
+
+  #happened(context, x, width, colours) {
+    const { active, marks } = this.series, { HEIGHT } = ReplayPlot;
+    if (active) {
+      const from = x(active[0]), to = x(Math.min(active[1], this.end));
+      context.fillStyle = colours.active;
+      context.fillRect(from, 0, Math.max(1, to - from), HEIGHT);
+    }
+    for (const [kind, t] of marks) {
+      context.strokeStyle = colours[kind] ?? colours.ink;
+      context.lineWidth = kind === "hazard" ? 1.8 : 1.2;
+      context.setLineDash(kind === "hazard" ? [] : kind === "alert" ? [6, 3] : [2, 3]);
+      context.beginPath();
+      context.moveTo(x(t), 0);
+      context.lineTo(x(t), HEIGHT);
+      context.stroke();
+    }
+    context.setLineDash([]);
+    if (this.series.tEnd === null) return;
+    context.fillStyle = colours.after;
+    context.fillRect(x(this.series.tEnd), 0, width, HEIGHT);
+  }
+
+  /** What lies between both runs, never of a time before the activation. */
+  #between(context, x, y, first, last, colour) {
+    const { t, golden, faulty } = this.channel, begin = this.series.active?.[0] ?? -Infinity;
+    context.fillStyle = colour;
+    context.beginPath();
+    for (let i = first; i < last; i++) {
+      const values = [golden[i], golden[i + 1], faulty[i + 1], faulty[i]];
+      if (t[i] < begin - ReplayData.TINY || t[i + 1] > this.end + ReplayData.TINY || !values.every(Number.isFinite)) continue;
+      if (values[0] === values[3] && values[1] === values[2]) continue;
+      context.moveTo(x(t[i]), y(values[0]));
+      context.lineTo(x(t[i + 1]), y(values[1]));
+      context.lineTo(x(t[i + 1]), y(values[2]));
+      context.lineTo(x(t[i]), y(values[3]));
+    }
+    context.fill();
+  }
+
+  #lines(context, x, y, first, last, colours) {
+    const { channel } = this, end = Math.min(last, Math.max(first, ReplayData.index(channel.t, this.end)));
+    context.lineJoin = "round";
+    for (const [run, width, alpha] of [["golden", 3.4, 0.6], ["faulty", 1.6, 1]]) {
+      context.lineWidth = width;
+      context.globalAlpha = alpha;
+      for (const [from, to, colour] of [[end, last, colours.late], [first, end, colours[run]]]) {
+        context.strokeStyle = colour;
+        context.beginPath();
+        let isDown = false;
+        for (let i = from; i <= to; i++) {
+          const value = channel[run][i];
+          if (Number.isFinite(value)) context[isDown ? "lineTo" : "moveTo"](x(channel.t[i]), y(Math.max(-1e9, Math.min(1e9, value))));
+          isDown = Number.isFinite(value);
+        }
+        context.stroke();
+      }
+      context.globalAlpha = 1;
+    }
+  }
+
+  /** A difference with its sign, in so many digits that it is none of 0. */
+  #difference(by) {
+    if (!Number.isFinite(by)) return "differs";
+    const text = this.#text(by);
+    return `${by > 0 ? "+" : ""}${/[1-9]/.test(text) ? text : by.toPrecision(1).replaceAll("-", "−")}`;
+  }
+
+  /** Put the cursor at a time, and say both values there if `isWritten`. */
+  look(t, view, isWritten) {
+    this.cursor.hidden = t < view.from - ReplayData.TINY || t > view.to + ReplayData.TINY;
+    this.cursor.style.transform = `translateX(${this.x(t, view)}px)`;
+    if (!isWritten) return;
+    const golden = ReplayData.held(this.channel, "golden", t), faulty = ReplayData.held(this.channel, "faulty", t), by = faulty - golden;
+    this.golden.textContent = this.#text(golden);
+    this.faulty.textContent = this.#text(faulty);
+    this.by.textContent = ReplayData.same(golden, faulty) ? "" : this.#difference(by);
+  }
+}

@@ -1,0 +1,192 @@
+"use strict";
+// The plots below a replay: those channels that are chosen, on one time axis that can be zoomed and moved.
+
+class ReplayPlots {
+  static NARROWEST = 0.2; // s that are shown at least
+  static CHOSEN = 6; // plots at first, at most
+  static SEEN = 0.01; // share of an axis that a difference must have to be seen
+  static FACTOR = 1.6; // of a step of zoom
+
+  constructor(channels, axes, series, clock, zoomed) {
+    const { el } = Dom;
+    Object.assign(this, { series, clock, zoomed, hovered: null, written: -Infinity, colours: null });
+    this.plots = channels.map((channel, i) => new ReplayPlot(channel, axes[i], series));
+    this.view = { from: series.start, to: series.end };
+    this.axis = el("canvas.axis", { "aria-hidden": "true" });
+    this.list = el("div.list", { onpointerdown: (event) => this.#press(event), onpointermove: (event) => this.#hover(event),
+      onpointerleave: () => this.#look(null) });
+    this.list.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    this.told = el("span.told");
+    this.element = el("div.plots", {}, this.#tools(), this.list);
+    this.chosen = new Set(this.#interesting().map(({ name }) => name));
+    this.#fill();
+  }
+
+  /** The channels that are plotted at first: those that differ most; else the first three. */
+  #interesting() {
+    const differ = this.plots.filter(({ weight }) => weight > ReplayPlots.SEEN).sort((a, b) => b.weight - a.weight);
+    return (differ.length ? differ.slice(0, ReplayPlots.CHOSEN) : this.plots.slice(0, 3)).map(({ channel }) => channel);
+  }
+
+  #tools() {
+    const { el } = Dom;
+    const button = (text, name, todo) => el("button", { type: "button", title: name, "aria-label": name, onclick: todo }, text);
+    return el("div.tools", {},
+      el("p.legend", {}, el("span.key.golden"), "golden", el("span.key.faulty"), "faulty", this.series.active ? [el("span.key.active"), "fault active"] : null,
+        this.series.tEnd === null ? null : [el("span.key.after"), "after the end of the drive"]),
+      this.told,
+      el("div.buttons", { role: "group", "aria-label": "Part of the time that is shown" },
+        button("−", "Zoom out (−)", () => this.zoom(-1)), button("+", "Zoom in (+)", () => this.zoom(1)),
+        button("◀", "Earlier", () => this.pan(-0.4)), button("▶", "Later", () => this.pan(0.4)),
+        button("Event", "From the activation to the end of the drive (e)", () => this.event()), button("All", "The whole run (0)", () => this.all())));
+  }
+
+  #fill() {
+    const shown = this.plots.filter(({ channel }) => this.chosen.has(channel.name));
+    this.list.replaceChildren(...shown.map(({ element }) => element), shown.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen: press one above."));
+    this.shown = shown;
+    this.width = 0; // what is new has not been drawn
+  }
+
+  isPlotted = (name) => this.chosen.has(name);
+
+  toggle(name) {
+    if (!this.chosen.delete(name)) this.chosen.add(name);
+    this.#fill();
+    this.clock.redraw();
+  }
+
+  /** Draw all that is shown, as wide as there is room. */
+  draw(colours) {
+    const width = Math.floor(this.list.clientWidth);
+    if (!width || (width === this.width && colours === this.colours)) return;
+    Object.assign(this, { width, colours });
+    for (const plot of this.shown) plot.draw(width, this.view, colours);
+    this.#times(width, colours);
+    this.written = -Infinity;
+  }
+
+  #times(width, colours) {
+    const context = ReplayColours.fitted(this.axis, width, 20), { from, to } = this.view, [plot] = this.shown;
+    if (!plot) return;
+    context.font = "11px system-ui, sans-serif";
+    context.fillStyle = colours.quiet;
+    context.textAlign = "center";
+    for (const tick of ReplayData.ticks(from, to, Math.max(2, width / 110))) context.fillText(`${tick} s`, Math.min(width - 16, plot.x(tick, this.view)), 14);
+  }
+
+  /** Show the time of the clock, or where one points; `now` in ms. */
+  show(now, isPlaying) {
+    if (isPlaying) this.#keepInView(this.clock.t);
+    const t = this.hovered ?? this.clock.t, isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
+    if (isWritten) {
+      this.written = now;
+      this.told.textContent = `${t.toFixed(2)} s`;
+    }
+    for (const plot of this.shown) if (plot.width) plot.look(t, this.view, isWritten);
+  }
+
+  #keepInView(t) {
+    const { from, to } = this.view;
+    if (t >= from && t <= to) return;
+    this.#set(t, t + to - from);
+  }
+
+  /** Look at a time without going there; null: at that of the clock. */
+  #look(t) {
+    this.hovered = t;
+    this.clock.redraw();
+  }
+
+  #timeAt(event) {
+    const [plot] = this.shown;
+    if (!plot?.width) return null;
+    const t = plot.time(event.clientX - plot.canvas.getBoundingClientRect().left, this.view);
+    return t < this.view.from || t > this.view.to ? null : t;
+  }
+
+  #hover(event) {
+    if (event.pointerType === "mouse" && !event.buttons) this.#look(this.#timeAt(event));
+  }
+
+  /** A press goes to its time; dragged on, to those it passes; with Shift it moves the plots instead. */
+  #press(event) {
+    const t = this.#timeAt(event);
+    if (event.button || t === null || !event.target.closest(".room, .axis")) return;
+    if (event.pointerType === "mouse") event.preventDefault();
+    this.hovered = null;
+    const over = new AbortController(), { signal } = over, { from, to } = this.view;
+    const move = (other) => {
+      const by = ((event.clientX - other.clientX) / this.width) * (to - from), here = this.#timeAt(other);
+      if (event.shiftKey) this.#set(from + by, to + by);
+      else if (here !== null) {
+        this.clock.pause();
+        this.clock.seek(here);
+      }
+    };
+    move(event);
+    addEventListener("pointermove", move, { signal });
+    for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => over.abort(), { signal });
+  }
+
+  /** With Ctrl, or two fingers, a wheel zooms where it points; sideways, or with Shift, it moves. Else it scrolls the page. */
+  #wheel(event) {
+    const aside = event.deltaX || (event.shiftKey ? event.deltaY : 0);
+    if (event.ctrlKey) this.zoom(event.deltaY < 0 ? 0.5 : -0.5, this.#timeAt(event) ?? undefined);
+    else if (aside && !this.isWhole) this.pan(aside / this.width);
+    else return;
+    event.preventDefault();
+  }
+
+  get isWhole() {
+    return this.view.from <= this.series.start && this.view.to >= this.series.end;
+  }
+
+  /** Zoom in by so many steps (out: negative), around a time. */
+  zoom(steps, around = this.clock.t) {
+    const { from, to } = this.view, { start, end } = this.series;
+    const span = Math.min(end - start, Math.max(ReplayPlots.NARROWEST, (to - from) / ReplayPlots.FACTOR ** steps));
+    const at = Math.min(to, Math.max(from, around)), left = at - ((at - from) / (to - from)) * span;
+    this.#set(left, left + span);
+  }
+
+  /** Move by a share of what is shown. */
+  pan(share) {
+    const { from, to } = this.view, by = share * (to - from);
+    this.#set(from + by, to + by);
+  }
+
+  /** From when to when something happened in the drive, with a little room at both ends; null: nothing did. */
+  get #event() {
+    const { marks, active, start, end, tEnd } = this.series, until = ReplayData.until(this.series);
+    const times = [...marks.map(([, t]) => t), ...(active ?? [])].filter((t) => t <= until);
+    if (!times.length) return null;
+    const first = Math.min(...times), last = tEnd ?? Math.max(...times), margin = Math.max(0.5, (last - first) * 0.08);
+    return [Math.max(start, first - margin), Math.min(end, last + margin)];
+  }
+
+  /** Show what happened; nothing did: all. */
+  event() {
+    this.#set(...(this.#event ?? [this.series.start, this.series.end]));
+  }
+
+  all() {
+    this.#set(this.series.start, this.series.end);
+  }
+
+  /** Show the drive and a little of what came after it; of a long one only what happened. */
+  begin() {
+    const { start, end, tEnd } = this.series, until = tEnd === null ? end : Math.min(end, tEnd + 0.1 * (tEnd - start)), event = this.#event;
+    if (event && event[1] - event[0] < (until - start) / 3) this.event();
+    else this.#set(start, until);
+  }
+
+  #set(from, to) {
+    const { start, end } = this.series, span = Math.min(to - from, end - start);
+    const left = Math.min(end - span, Math.max(start, from));
+    this.view = { from: left, to: left + span };
+    this.width = 0;
+    this.zoomed(left, left + span);
+    this.clock.redraw();
+  }
+}

@@ -1,0 +1,129 @@
+"use strict";
+// Where the actors of a scene are in both runs of a series: the manifest's formulas over its channels.
+
+class ReplayTracks {
+  static REACH = { least: 25, most: 150, spread: 1.5 }; // m ahead that are shown at least and at most; s over which that changes
+
+  /** `scene` comes from the manifest (report/scenes.py); Error for one with a channel that the series lacks. */
+  constructor(scene, series) {
+    this.scene = scene;
+    this.t = series.channels.length ? ReplayData.steps(series) : [0];
+    this.runs = { golden: this.#run("golden", series), faulty: this.#run("faulty", series) };
+    this.lines = scene.lines.map((line) => ({ ...line, across: line.y === null ? null : Formula.evaluate(line.y, this.#values("faulty", series)) }));
+    this.follow = scene.actors.findIndex((actor) => actor.name === scene.follow);
+    if (this.follow >= 0) this.reach = this.#reach();
+  }
+
+  /** The channels of a run on one time axis. */
+  #values(run, series) {
+    const values = { t: this.t };
+    for (const channel of series.channels) values[channel.name] = channel.t === this.t ? channel[run] : this.#spread(channel, run);
+    return values;
+  }
+
+  /** A channel with fewer samples on the axis of the others: straight from one of its samples to the next. */
+  #spread(channel, run) {
+    return Array.from(this.t, (t) => {
+      const i = ReplayData.index(channel.t, t), a = channel[run][i], b = channel[run][i + 1];
+      if (b === undefined || Number.isNaN(b) || t <= channel.t[i]) return t < channel.t[0] - ReplayData.TINY ? NaN : a;
+      return a + ((b - a) * (t - channel.t[i])) / (channel.t[i + 1] - channel.t[i]);
+    });
+  }
+
+  #run(run, series) {
+    const values = this.#values(run, series), of = (tree) => Formula.evaluate(tree, values);
+    const ground = this.#ground(of(this.scene.speed));
+    const actors = this.scene.actors.map((actor) => ({
+      x: Array.from(of(actor.x), (x, i) => x + ground[i]), y: of(actor.y), heading: of(actor.heading), visible: of(actor.visible),
+    }));
+    return { ground, actors };
+  }
+
+  /** How far the origin has come: the speed summed up; without a value it stands still. */
+  #ground(speed) {
+    let sum = 0;
+    return Array.from(speed, (v, i) => {
+      const mean = i ? (v + speed[i - 1]) / 2 : 0;
+      return (sum += Number.isFinite(mean) ? mean * (i ? this.t[i] - this.t[i - 1] : 0) : 0);
+    });
+  }
+
+  /** How far ahead of the followed actor the view must go, so smooth that zooming in and out is not felt. */
+  #reach() {
+    const { least, most, spread } = ReplayTracks.REACH, { actors } = this.runs.faulty, own = actors[this.follow];
+    const wanted = Array.from(this.t, (_, i) => this.#farthest(actors, own, i, least, most));
+    const half = Math.max(1, Math.round(spread / ((this.t[this.t.length - 1] - this.t[0]) / (this.t.length - 1) || 1)));
+    const over = (values, of) => Array.from(values, (_, i) => of(values.slice(Math.max(0, i - half), i + half + 1)));
+    return over(over(wanted, (near) => Math.max(...near)), (near) => near.reduce((a, b) => a + b, 0) / near.length);
+  }
+
+  #farthest(actors, own, i, least, most) {
+    const ahead = actors.map(({ x, visible }, k) => (visible[i] && !this.scene.actors[k].believed ? x[i] - own.x[i] : 0));
+    return Math.max(least, ...ahead.filter((x) => x <= most));
+  }
+
+  /** The two steps around a time, and how far it is from the first to the second. */
+  #around(t) {
+    const i = ReplayData.index(this.t, t), next = Math.min(i + 1, this.t.length - 1);
+    const part = next === i ? 0 : Math.min(1, Math.max(0, (t - this.t[i]) / (this.t[next] - this.t[i])));
+    return [i, next, part];
+  }
+
+  static #between(values, [i, next, part]) {
+    const a = values[i], b = values[next];
+    return Number.isFinite(a) && Number.isFinite(b) ? a + (b - a) * part : a;
+  }
+
+  /** The actors that are there at a time: {actor, x, y, heading}, metres of the world. */
+  at(run, t) {
+    const near = this.#around(t);
+    return this.runs[run].actors.flatMap(({ x, y, heading, visible }, k) => {
+      if (!visible[near[0]]) return [];
+      const [px, py, turned] = [x, y, heading].map((values) => ReplayTracks.#between(values, near));
+      return Number.isFinite(px) && Number.isFinite(py) ? [{ actor: this.scene.actors[k], x: px, y: py, heading: turned || 0 }] : [];
+    });
+  }
+
+  /** Where the actor is that the view stays with; what a run has no more stays where it was. */
+  followed(run, t) {
+    const { x, y } = this.runs[run].actors[this.follow];
+    let near = this.#around(t);
+    while (near[0] > 0 && !Number.isFinite(x[near[0]])) near = [near[0] - 1, near[0] - 1, 0];
+    return { x: ReplayTracks.#between(x, near), y: ReplayTracks.#between(y, near) };
+  }
+
+  reachAt(t) {
+    return ReplayTracks.#between(this.reach, this.#around(t));
+  }
+
+  acrossAt(line, t) {
+    return ReplayTracks.#between(line.across, this.#around(t));
+  }
+
+  /** What a view that stays where it is must hold: [left, right, low, high] of all points and ways. */
+  bounds(end) {
+    const last = ReplayData.index(this.t, end), xs = [], ys = [];
+    for (const line of this.scene.lines) for (const [x, y] of line.points) (xs.push(x), ys.push(y));
+    for (const { actors } of Object.values(this.runs)) {
+      actors.forEach(({ x, y }, k) => {
+        const size = Math.max(this.scene.actors[k].length, this.scene.actors[k].width) / 2;
+        for (let i = 0; i <= last; i++) {
+          if (Number.isFinite(x[i]) && Number.isFinite(y[i])) (xs.push(x[i] - size, x[i] + size), ys.push(y[i] - size, y[i] + size));
+        }
+      });
+    }
+    const least = (values) => values.reduce((a, b) => Math.min(a, b), Infinity), most = (values) => values.reduce((a, b) => Math.max(a, b), -Infinity);
+    return [least(xs), most(xs), least(ys), most(ys)];
+  }
+
+  /** Where the followed actor touches, or comes nearest to, another one at a time; its own place where it is alone. */
+  contact(t) {
+    const there = this.at("faulty", t), own = there.find(({ actor }) => actor.name === this.scene.follow) ?? there[0];
+    if (!own || this.follow < 0) return own ?? null;
+    const gap = (other) => Math.abs(other.x - own.x) - (other.actor.length + own.actor.length) / 2;
+    const [nearest] = there.filter((other) => other !== own && !other.actor.believed).sort((a, b) => gap(a) - gap(b));
+    if (!nearest || gap(nearest) > 1) return { x: own.x, y: own.y };
+    const side = Math.sign(nearest.x - own.x) || 1;
+    return { x: own.x + (side * own.actor.length) / 2, y: (own.y + nearest.y) / 2 };
+  }
+}

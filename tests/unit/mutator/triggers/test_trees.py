@@ -1,0 +1,41 @@
+"""Formulas and conditions as JSON trees."""
+
+import pytest
+
+from mutator.triggers.conditions import check_condition, check_formula
+from mutator.triggers.trees import tree
+
+KNOWN = ("t", "gap", "speed", "hwt", "risk")
+DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
+
+
+@pytest.mark.parametrize(
+    ("text", "made"),
+    [
+        ("gap", "gap"),
+        ("-2.2", ["neg", 2.2]),
+        ("+gap * 2", ["*", "gap", 2.0]),
+        ("gap / speed if speed > 0 else inf", ["if", [">", "speed", 0.0], ["/", "gap", "speed"], "inf"]),
+        ("hypot(gap, rate(speed))", ["hypot", "gap", ["rate", "speed"]]),
+        ("risk", ["/", 1.0, ["/", "gap", "speed"]]),
+    ],
+)
+def test_a_formula_is_a_tree_of_its_operators(text: str, made: object) -> None:
+    """Operators come first, numbers are floats, and a derived value is replaced by its own formula."""
+    assert tree(check_formula(text, KNOWN, over_time=True), DERIVED) == made
+
+
+@pytest.mark.parametrize(
+    ("text", "made"),
+    [
+        ("True", True),
+        ("not gap != 3", ["not", ["!=", "gap", 3.0]]),
+        (
+            "0 < gap <= 9 or ever(t >= 2)",
+            ["or", ["and", ["<", 0.0, "gap"], ["<=", "gap", 9.0]], ["ever", [">=", "t", 2.0]]],
+        ),
+    ],
+)
+def test_a_chain_of_comparisons_is_all_of_them(text: str, made: object) -> None:
+    """`a < b <= c` becomes `a < b and b <= c`; truth values stay what they are."""
+    assert tree(check_condition(text, variables=KNOWN, over_time=True), {}) == made
