@@ -230,7 +230,9 @@ class Record:
     (name, first time) pairs sorted by time; only what came at or after the activation is kept. `max_dev` and
     `t_manifest` refer to the manifest's compared channels. `t_end` is when a terminal hazard ended the drive,
     and `dev` what `max_dev` is up to there (empty without such an end: the same). `metrics` has the metrics
-    of the manifest and the margins of its hazards, those that have a value.
+    of the manifest and the margins of its hazards, those that have a value. `left` has each channel that left
+    golden beyond its tolerance before the end of the drive: its name, when first, and its largest deviation
+    up to that end.
     """
 
     experiment_id: str
@@ -249,3 +251,4 @@ class Record:
     t_end: float | None = added(None)
     dev: tuple[tuple[str, float], ...] = added(())
     metrics: tuple[tuple[str, float], ...] = added(())
+    left: tuple[tuple[str, float, float], ...] = added(())

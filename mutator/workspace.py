@@ -18,7 +18,7 @@ from mutator.faults.readings import Readings, load_readings
 from mutator.faults.specs import FaultSpec, load_spec
 from mutator.model import Fault
 from mutator.outcomes.columns import check_names
-from mutator.stpa.analysis import Analysis, load_analysis
+from mutator.stpa.analysis import Analysis, StructureModel, load_analysis, load_structure
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
@@ -227,6 +227,14 @@ class Workspace:
         """The hazard analysis of fault_library/stpa/; None where there is no control structure in it."""
         folder = self.library / "stpa"
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
+
+    def structure(self, manifest: TargetManifest) -> StructureModel | None:
+        """The control structure of a target; None where the library has none, or one that no channel of the
+        target's names a component of."""
+        path = self.library / "stpa" / "control_structure.yaml"
+        structure = load_structure(path) if path.exists() else None
+        known = structure.components if structure else {}
+        return structure if any(channel.component in known for channel in manifest.channels) else None
 
     def _files(self, folder: str) -> dict[str, Path]:
         return library_files(self.library, folder)

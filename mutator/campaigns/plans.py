@@ -26,6 +26,7 @@ from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, metric_columns, plan_row
+from mutator.outcomes.propagation import channel_facts
 from mutator.store import digests, plan_file
 from mutator.store.check_results import measured_cpu_s
 from mutator.store.digests import Digest, Ledger
@@ -294,6 +295,7 @@ def _sources(plan: Plan, workspace: Workspace) -> dict[str, str]:
 
 def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> dict[str, Any]:
     manifest = workspace.manifest(plan.campaign.target)
+    structure = workspace.structure(manifest)
     canary = plan_file.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
     return {
         "schema": SCHEMA,
@@ -316,6 +318,8 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
             {"name": one.name, "about": one.about, "terminal": bool(one.terminal)} for one in manifest.rules
         ],
         "severity": scale.plain() if (scale := workspace.scale_of(manifest)) else None,
+        "channels": channel_facts(manifest),
+        "structure": structure.model_dump(mode="json", by_alias=True) if structure else None,
         "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
         "golden_files": list(manifest.outputs),
         "canary": canary,

@@ -17,7 +17,8 @@ from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
-from mutator.outcomes.judging import load_judged
+from mutator.outcomes.judging import load_channels, load_judged
+from mutator.outcomes.propagation import departures
 from mutator.outcomes.verdicts import first_events, judge
 from mutator.targets.manifest import TargetManifest
 
@@ -40,7 +41,7 @@ class Finished:
 
 
 class Goldens:
-    """The compared channels of golden runs, loaded when first asked for. `folder_of` finds a run's output."""
+    """The channels of golden runs, loaded when first asked for. `folder_of` finds a run's output."""
 
     def __init__(self, manifest: TargetManifest, folder_of: Callable[[str, tuple[str, ...]], Path]) -> None:
         self._manifest = manifest
@@ -55,7 +56,7 @@ class Goldens:
         key = (experiment.scenario, experiment.changes)
         if key not in self._traces:
             folder = self.folder(experiment)
-            self._traces[key] = golden.load_trace(self._manifest, folder, self._manifest.compared)
+            self._traces[key] = load_channels(self._manifest, folder)
         return self._traces[key]
 
 
@@ -183,6 +184,7 @@ class Runner:
             t_end=judged.t_end,
             dev=() if judged.t_end is None else difference.dev,
             metrics=judged.metrics,
+            left=departures(reference, faulty, self.manifest.channels, time, judged.t_end),
         )
 
 

@@ -67,6 +67,15 @@ SINCE = (
         "first hazard minus manifestation; empty where the hazard came first",
     ),
 )
+OF_PATHS = (
+    Column("reached", "text", "", "the component furthest along the fault's path that left golden"),
+    Column(
+        "stopped_at",
+        "text",
+        "",
+        "the components that held a fault which changed no actuator, joined by `;`",
+    ),
+)
 EXTRA = (
     Column("variant", "text", "", "the variant of the spec"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
@@ -84,7 +93,8 @@ PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim"
 # Columns that readers of the table add to it; no hazard may take their names.
 _DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards", "warning")
 DERIVED = (*_DERIVED_TEXTS, "hazard", "t_hazard")
-_TEXTS = {column.name for column in (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *EXTRA) if column.type == "text"}
+_PLAIN = (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *OF_PATHS, *EXTRA)
+_TEXTS = {column.name for column in _PLAIN if column.type == "text"}
 _TEXTS |= {*_DERIVED_TEXTS}
 
 
@@ -93,9 +103,12 @@ def result_columns(
     compared: Sequence[str],
     metrics: Sequence[Sequence[str]] = (),
     severity: Sequence[Column] = (),
+    *,
+    paths: bool = False,
 ) -> tuple[Column, ...]:
     """The columns of results.csv, in order, for a target's hazards, the names of its compared channels, its
-    metrics as `metric_columns` has them, and the `severity_columns` of the run."""
+    metrics as `metric_columns` has them, and the `severity_columns` of the run; `paths`: with those of the
+    fault's path."""
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -110,6 +123,7 @@ def result_columns(
             for name, column in driven_columns(compared, metrics).items()
         ),
         *severity,
+        *(OF_PATHS if paths else ()),
         *EXTRA,
     )
 
@@ -170,9 +184,10 @@ def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) ->
 def check_names(manifest: TargetManifest) -> None:
     """MutatorError, at its line of the manifest, for a hazard or metric whose columns have the name of
     another one, or would be taken for a hazard's flag and time."""
-    taken = {column.name for column in result_columns((), [channel.name for channel in manifest.compared])}
+    compared = [channel.name for channel in manifest.compared]
+    taken = {column.name for column in result_columns((), compared, paths=True)}
     taken |= {SEVERITY.name, *(column.name for column in SINCE)}
-    taken |= {*DERIVED, T_END, *driven_columns([c.name for c in manifest.compared], [[T_END]]).values()}
+    taken |= {*DERIVED, T_END, *driven_columns(compared, [[T_END]]).values()}
     named = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):
         names = {column.name for column in hazard_columns(hazard)}

@@ -50,12 +50,18 @@ def trace_digest(manifest: TargetManifest, out: Path) -> str:
         raise BadOutput("the run left no trace", where=out / manifest.trace_file) from None
 
 
-def load_trace(manifest: TargetManifest, out: Path, channels: Sequence[Channel] | None = None) -> Trace:
-    """Channels (default: all that there are) and time of the trace in the output folder `out`."""
+def load_trace(
+    manifest: TargetManifest,
+    out: Path,
+    channels: Sequence[Channel] | None = None,
+    also: Sequence[Channel] = (),
+) -> Trace:
+    """Channels (default: all that there are) and time of the trace in the output folder `out`; channels in
+    `also` may be missing."""
     path = out / manifest.trace_file
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
-        trace = trace_files.read(path, manifest, channels)
+        trace = trace_files.read(path, manifest, channels, also)
     except trace_files.BadTrace as err:
         raise BadOutput(err.got, where=path, expected=err.expected) from None
     except KeyError as err:
@@ -170,17 +176,36 @@ def compare(
     largest: list[tuple[str, float]] = []
     driven: list[tuple[str, float]] = []
     for channel in channels:
-        times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
-        first = min(first, _other_times(*times))
-        at, values = _on_same_times(times, [golden[channel.name], faulty[channel.name]])
-        deviation = _deviation(*values)
-        largest.append((channel.name, float(deviation.max(initial=0.0))))
-        driven.append((channel.name, float(deviation[at <= end].max(initial=0.0))))
-        beyond = np.flatnonzero(deviation > channel.tolerance)
-        if beyond.size:
-            first = min(first, float(at[beyond[0]]))
+        found = deviation(golden, faulty, channel, time)
+        first = min(first, found.t_first)
+        largest.append((channel.name, found.largest()))
+        driven.append((channel.name, found.largest(end)))
     t_first = None if first == np.inf else first
     return Difference(t_first=t_first, max_dev=tuple(largest), dev=tuple(driven))
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """|faulty - golden| of a channel at the times that both runs have. `t_first` is when it first exceeds the
+    tolerance or its times differ; infinite: never."""
+
+    at: np.ndarray
+    values: np.ndarray
+    t_first: float
+
+    def largest(self, end: float = np.inf) -> float:
+        """The largest one up to a time."""
+        return float(self.values[self.at <= end].max(initial=0.0))
+
+
+def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Deviation:
+    """How a channel of a run differs from golden."""
+    times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
+    at, values = _on_same_times(times, [golden[channel.name], faulty[channel.name]])
+    values_apart = _deviation(*values)
+    beyond = np.flatnonzero(values_apart > channel.tolerance)
+    first = float(at[beyond[0]]) if beyond.size else np.inf
+    return Deviation(at, values_apart, min(first, _other_times(*times)))
 
 
 def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:

@@ -35,11 +35,18 @@ class Judged:
 
 
 def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
-    """The run in the output folder `out`: the channels that its verdict needs, and what it came to. BadOutput
-    for one that left no trace or record, or none that can be judged."""
-    needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]
-    trace = load_trace(manifest, out, needed)
+    """The run in the output folder `out`: those of the manifest's channels that it recorded, and what it came
+    to. BadOutput for one that left no trace or record, or none that can be judged."""
+    trace = load_channels(manifest, out)
     return trace, judge_run(manifest, trace, load_record(manifest, out))
+
+
+def load_channels(manifest: TargetManifest, out: Path) -> Trace:
+    """Every channel of the manifest that the run in `out` recorded; BadOutput where one is missing that its
+    verdict needs."""
+    needed = {*manifest.compared, *manifest.judged}
+    others = [channel for channel in manifest.channels if channel not in needed]
+    return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
 
 
 def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:

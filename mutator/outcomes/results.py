@@ -12,6 +12,7 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.model import Experiment, Record, Status
+from mutator.outcomes import propagation
 from mutator.outcomes.columns import (
     T_END,
     TIMINGS,
@@ -22,6 +23,8 @@ from mutator.outcomes.columns import (
     result_columns,
     severity_columns,
 )
+from mutator.outcomes.paths import Ways, ways_of
+from mutator.outcomes.propagation import columns_of
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.store import plan_file
 from mutator.store.digests import Digest
@@ -29,6 +32,8 @@ from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
 
 CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
+PROPAGATION = "propagation.parquet"
+TABLES = (CSV, PARQUET, PROPAGATION, TIMINGS_PARQUET)
 SCHEMA, STAMP = "results/1", "results.json"
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
@@ -95,8 +100,8 @@ def ensure(run: Path) -> Path:
 
 
 def build(run: Path) -> Path:
-    """Write results.csv (returned), results.parquet and timings.parquet of a run folder from its plan and
-    records. A MutatorWarning tells of a table that somebody has edited: it is no more."""
+    """Write results.csv (returned) and the other tables of a run folder from its plan and records. A
+    MutatorWarning tells of a table that somebody has edited: it is no more."""
     folder = RunFolder.open(run)
     made_from = _made_from(folder)
     made = tables(folder)
@@ -116,16 +121,30 @@ def tables(folder: RunFolder) -> dict[str, bytes]:
     experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     head = folder.head
     metrics = head.get("metrics", ())
-    columns = result_columns(head["hazards"], head["compared"], metrics, severity_columns(head))
+    ways = ways_of(head)
+    columns = result_columns(
+        head["hazards"], head["compared"], metrics, severity_columns(head), paths=ways is not None
+    )
     ends, scale = T_END in (name for name, *_ in metrics), folder.scale
-    rows = [
-        row(e, records[e.id], head["hazards"], ends=ends, scale=scale) for e in experiments if e.id in records
-    ]
-    return {
+    done = [(e, records[e.id]) for e in experiments if e.id in records]
+    rows = [row(e, r, head["hazards"], ends=ends, scale=scale) | _path_cells(ways, e, r) for e, r in done]
+    made = {
         CSV: _csv(rows, [column.name for column in columns]),
-        PARQUET: _parquet(rows, columns),
+        PARQUET: _parquet(_columns(rows, columns), columns),
         TIMINGS_PARQUET: _timings(folder),
     }
+    if "channels" in head:
+        found = columns_of((record for _, record in done), head["channels"])
+        made[PROPAGATION] = _parquet(found, propagation.COLUMNS)
+    return made
+
+
+def _path_cells(ways: Ways | None, experiment: Experiment, record: Record) -> dict[str, object]:
+    """What the path of a fault adds to a row."""
+    path = ways.path(experiment, record) if ways else None
+    if path is None:
+        return {}
+    return {"reached": path.reached or None, "stopped_at": ";".join(path.stopped_at) or None}
 
 
 def _made_from(folder: RunFolder) -> str:
@@ -136,14 +155,19 @@ def _made_from(folder: RunFolder) -> str:
     found = [(path.relative_to(run).as_posix(), Digest.of_file(path)) for path in files]
     head = folder.head
     told = [head["hazards"], head["compared"], head.get("metrics", [])]
-    told += [head["severity"]] if "severity" in head else []
+    told += [head[key] for key in ("severity", "channels", "structure") if key in head]
     return digest([SCHEMA, VERSION, *told, found])
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
     """Digests of the tables as they are now; None of a missing one."""
-    found = {name: Digest.of_file(folder.path / name) for name in (CSV, PARQUET, TIMINGS_PARQUET)}
+    found = {name: Digest.of_file(folder.path / name) for name in _names(folder)}
     return {name: one.sha256 if one else None for name, one in found.items()}
+
+
+def _names(folder: RunFolder) -> tuple[str, ...]:
+    """The tables that a folder has; runs of earlier versions recorded no propagation."""
+    return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
 def _stamp(folder: RunFolder) -> dict[str, Any]:
@@ -179,16 +203,18 @@ def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
     return text.getvalue().encode()
 
 
-def _parquet(rows: list[dict[str, object]], columns: Sequence[Column]) -> bytes:
-    """The rows as a Parquet file; nothing in it depends on when or where it was made."""
+def _columns(rows: list[dict[str, object]], columns: Sequence[Column]) -> dict[str, list[Any]]:
+    return {column.name: [row.get(column.name) for row in rows] for column in columns}
+
+
+def _parquet(values: Mapping[str, list[Any]], columns: Sequence[Column]) -> bytes:
+    """Columns as a Parquet file; nothing in it depends on when or where it was made."""
     import pyarrow as pa  # type: ignore[import-untyped]
     from pyarrow import parquet
 
     types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
     schema = pa.schema([(column.name, types[column.type]) for column in columns])
-    table = pa.table(
-        {field.name: pa.array([r.get(field.name) for r in rows], field.type) for field in schema}, schema
-    )
+    table = pa.table({field.name: pa.array(values[field.name], field.type) for field in schema}, schema)
     sink = io.BytesIO()
     parquet.write_table(table, sink, compression="zstd")
     return sink.getvalue()
@@ -197,4 +223,4 @@ def _parquet(rows: list[dict[str, object]], columns: Sequence[Column]) -> bytes:
 def _timings(folder: RunFolder) -> bytes:
     """What each experiment cost, where."""
     newest = folder.timings()
-    return _parquet([newest[name] for name in sorted(newest)], TIMINGS)
+    return _parquet(_columns([newest[name] for name in sorted(newest)], TIMINGS), TIMINGS)

@@ -1,7 +1,7 @@
 """Trace files of runs, by suffix: each reader gives the arrays of the channels that it is asked for."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,19 +27,22 @@ def own_times(name: str) -> str:
     return f"{name}@"
 
 
-def read(path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None) -> Arrays:
+def read(
+    path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, also: Sequence[Channel] = ()
+) -> Arrays:
     """Channels and time of a trace, by the names that the manifest has for them; under `own_times` the times
     of those that are not there in each step.
 
-    Without `channels`: all that there is, also what the manifest does not name. BadTrace, KeyError for a
-    channel that is not there, and what the readers raise.
+    Without `channels`: all that there is, also what the manifest does not name. Channels in `also` may be
+    missing. BadTrace, KeyError for another channel that is not there, and what the readers raise.
     """
-    wanted = manifest.channels if channels is None else tuple(channels)
+    wanted = manifest.channels if channels is None else (*channels, *also)
     if path.suffix == ".mcap":
-        return _read_mcap(path, manifest.time_channel, wanted)
+        return _read_mcap(path, manifest.time_channel, wanted, also)
     of_time = [channel.time for channel in wanted if channel.time]
     names = [manifest.time_channel, *of_time, *(channel.in_trace for channel in wanted)]
-    columns = _COLUMNS[path.suffix](path, None if channels is None else names)
+    may_miss = {name for channel in also for name in (channel.in_trace, channel.time)}
+    columns = _COLUMNS[path.suffix](path, None if channels is None else names, may_miss)
     known = {channel.in_trace for channel in wanted} | {*of_time}
     rest = {name: column for name, column in columns.items() if channels is None and name not in known}
     time = columns[manifest.time_channel]
@@ -47,7 +50,7 @@ def read(path: Path, manifest: TargetManifest, channels: Iterable[Channel] | Non
     steps = slice(None) if path.suffix == ".npz" else ~_empty(time)
     values = {name: column[steps] for name, column in rest.items()} | {manifest.time_channel: time[steps]}
     for channel in wanted:
-        if channels is None and channel.in_trace not in columns:
+        if channel.in_trace not in columns and (channels is None or channel in also):
             continue
         column = columns[channel.in_trace]
         there = steps
@@ -62,46 +65,54 @@ def _empty(values: np.ndarray) -> np.ndarray:
     return np.isnan(values) if values.dtype.kind == "f" else np.zeros(values.shape, dtype=bool)
 
 
-def _read_npz(path: Path, names: Iterable[str] | None) -> Arrays:
+def _read_npz(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
     loaded = np.load(no_pipe(path), allow_pickle=False)
     if not isinstance(loaded, np.lib.npyio.NpzFile):
         raise BadTrace("an array alone", "an .npz file")
     with loaded as file:
-        wanted = dict.fromkeys(file.files if names is None else names)
-        return {name: np.asarray(file[name]) for name in wanted}
+        return {name: np.asarray(file[name]) for name in _wanted(file.files, names, may_miss)}
 
 
-def _read_csv(path: Path, names: Iterable[str] | None) -> Arrays:
+def _read_csv(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
     import pandas as pd
 
-    return _columns(pd.read_csv(no_pipe(path)), names)
+    return _columns(pd.read_csv(no_pipe(path)), names, may_miss)
 
 
-def _read_parquet(path: Path, names: Iterable[str] | None) -> Arrays:
+def _read_parquet(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
     import pandas as pd
 
-    return _columns(pd.read_parquet(no_pipe(path)), names)
+    return _columns(pd.read_parquet(no_pipe(path)), names, may_miss)
 
 
-def _columns(frame: Any, names: Iterable[str] | None) -> Arrays:
-    wanted = dict.fromkeys(frame.columns if names is None else names)
-    return {str(name): frame[name].to_numpy() for name in wanted}
+def _columns(frame: Any, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
+    return {str(name): frame[name].to_numpy() for name in _wanted(frame.columns, names, may_miss)}
 
 
-_COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None], Arrays]] = {
+def _wanted(
+    there: Collection[str], names: Iterable[str] | None, may_miss: Collection[str]
+) -> dict[str, None]:
+    """What is read of a file that has `there`: these names, or all of them."""
+    if names is None:
+        return dict.fromkeys(there)
+    return {name: None for name in names if name in there or name not in may_miss}
+
+
+_COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None, Collection[str]], Arrays]] = {
     ".npz": _read_npz,
     ".csv": _read_csv,
     ".parquet": _read_parquet,
 }
 
 
-def _read_mcap(path: Path, steps: str, channels: Iterable[Channel]) -> Arrays:
+def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequence[Channel]) -> Arrays:
     """Of JSON messages: `/topic:field.of.field`. Log times are the simulation's, in ns."""
     try:
         from mcap.reader import make_reader
     except ImportError:
         raise BadTrace("an .mcap file, and no package mcap", "pip install mcap") from None
     places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}
+    may_miss = {channel.name for channel in also}
     topics = {steps, *(topic for topic, _ in places.values())}
     seen: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
     with no_pipe(path).open("rb") as file:
@@ -114,6 +125,8 @@ def _read_mcap(path: Path, steps: str, channels: Iterable[Channel]) -> Arrays:
     values = {steps: np.array([t for t, _ in seen[steps]])}
     for name, (topic, field) in places.items():
         if not seen[topic]:
+            if name in may_miss:
+                continue
             raise KeyError(topic)
         values[name] = np.array([_field(data, field) for _, data in seen[topic]])
         if topic != steps:

@@ -11,6 +11,7 @@ from mutator.outcomes.columns import (
     result_columns,
     severity_columns,
 )
+from mutator.outcomes.propagation import COLUMNS as PROPAGATION
 from mutator.reference.tables import generated
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard, Metric
@@ -42,6 +43,11 @@ def results(workspace: Workspace) -> str:
             *(line for manifest in manifests for line in _table_of(manifest)),
             "## plan.csv\n",
             f"`plan.csv` has what is known before a run: {left_out}.\n",
+            "## propagation.parquet\n",
+            "One row for each channel of an experiment that left golden beyond its tolerance, in the order "
+            "of experiments and of\nthe manifest's channels. How a path follows from it is in "
+            "[Fault paths](../explanation/fault-paths.md).\n",
+            *_columns(PROPAGATION),
             "## timings.parquet\n",
             "What each experiment cost, in its newest run. It is kept apart because it differs from "
             "run to run.\n",
@@ -54,7 +60,8 @@ def _table_of(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
     compared = [channel.name for channel in manifest.compared]
     severity = severity_columns({"severity": manifest.contact})
-    yield from _columns(result_columns(manifest.hazards, compared, metric_columns(manifest), severity))
+    columns = (manifest.hazards, compared, metric_columns(manifest), severity)
+    yield from _columns(result_columns(*columns, paths=True))
 
 
 def _columns(columns: Iterable[Column]) -> Iterator[str]:

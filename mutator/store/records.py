@@ -32,6 +32,7 @@ def record_from(data: Mapping[str, Any]) -> Record:
         t_end=data.get("t_end"),
         dev=_pairs(data.get("dev", [])),
         metrics=_pairs(data.get("metrics", [])),
+        left=tuple((name, first, largest) for name, first, largest in data.get("left", [])),
     )
 
 

@@ -15,7 +15,7 @@ DIR/
   proof/<session>-<worker>.jsonl                 records of the sample run again on the reference engine
   traces/<experiment>/                           on request (`rerun --trace`)
   plots/                                         plots, stills and films of experiments (`show`)
-  results.csv, results.parquet, timings.parquet  derived; can be made again at any time
+  results.csv, results.parquet, propagation.parquet, timings.parquet    derived; can be made again at any time
   results.json          digests of these tables and of what they were made from
   report/, exports/     derived, too (`report`, `compare`, `export`)
   damaged/              what a repair put aside (`verify --repair`)
@@ -47,7 +47,7 @@ CONTENT = (  # all that may be in a run folder; * stands for any text, folders i
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *("golden/*/*", "patches/*.patch", "records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     *("traces/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
-    *("results.csv", "results.parquet", "timings.parquet", "results.json"),
+    *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
     *("exports/mutation-elements.json", "exports/junit.xml"),

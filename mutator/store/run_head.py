@@ -13,7 +13,7 @@ from mutator.model import Limits
 
 SCHEMA = "run/2"
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
-_REMEDY = "the run folder is damaged: take the file from a copy of it"
+REMEDY = "the run folder is damaged: take the file from a copy of it"
 _TEXTS = {str: str}
 # What keys hold: a type, or several; `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`;
 # `(x, y)` one of them.
@@ -45,6 +45,8 @@ _SHAPES: dict[str, Any] = {
     "metrics": [[str]],
     "severity": ({"name": str, "about": str, "source": str, "classes": [list]}, NoneType),
     "about_hazards": [{"name": str, "about": str, "terminal": bool}],
+    "channels": [[str]],
+    "structure": ({str: object}, NoneType),
     "goldens": [list],
     "golden_files": [str],
     "canary": {str: object},
@@ -55,7 +57,7 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": 2, "chunks": 3, "metrics": 4}  # of each item
+_SIZES = {"goldens": 2, "chunks": 3, "metrics": 4, "channels": 5}  # of each item
 
 
 class Head(dict[str, Any]):
@@ -66,7 +68,7 @@ class Head(dict[str, Any]):
         self.path = path
 
     def __missing__(self, key: str) -> Any:
-        raise MutatorError(f"no '{key}'", where=self.path, expected="all keys of a run", remedy=_REMEDY)
+        raise MutatorError(f"no '{key}'", where=self.path, expected="all keys of a run", remedy=REMEDY)
 
 
 def read_head(run: Path) -> Head:
@@ -74,7 +76,7 @@ def read_head(run: Path) -> Head:
     path = run / HEAD
     head = Head(path, read_json(path, SCHEMA))
     if wrong := next(_wrong(head), ""):
-        raise MutatorError(f"damaged at '{wrong}'", where=path, remedy=_REMEDY)
+        raise MutatorError(f"damaged at '{wrong}'", where=path, remedy=REMEDY)
     if "provenance" in head:
         head["provenance"] = Head(path, head["provenance"])
     return head

@@ -141,6 +141,13 @@ class Analysis:
     factors_source: Source
 
 
+def load_structure(path: Path) -> StructureModel:
+    """The control structure of a file; MutatorError with file and line for a mistake in it."""
+    structure, source = read(path, StructureModel, "control_structure/1")
+    _check_structure(structure, source)
+    return structure
+
+
 def load_analysis(folder: Path) -> Analysis:
     """Read hazards, control structure, unsafe control actions, their tables and causal factors of `folder`.
 

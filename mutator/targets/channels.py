@@ -22,8 +22,8 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """A recorded channel. `unit` is for axis labels, `-` for none; `tolerance` says by how much an actuator
-    may differ from golden (0: exact); `component` names the part of the controller that it is of.
+    """A recorded channel. `unit` is for axis labels, `-` for none; `tolerance` says by how much it may differ
+    from golden (0: exact); `component` names the part of the controller that it is of.
 
     `time` is the channel with its own times, where it is not there in each step. `source` is what the trace
     calls it, where that is another name.
@@ -61,7 +61,8 @@ class ChannelModel(StrictModel, title="A channel"):
         0.0,
         ge=0.0,
         allow_inf_nan=False,
-        description="By how much an actuator may differ from golden and still count as the same.",
+        description="By how much it may differ from golden and still count as the same. An actuator beyond "
+        "it has manifested; a fault has reached a component with a channel beyond it.",
     )
     about: str = Field("", description="What it is.")
     time: str = Field(
@@ -121,13 +122,6 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
             f"'{name}'",
             expected=f"a name that formulas do not have already: {', '.join(RESERVED)}",
             remedy=f"call it otherwise, with `from: {name}`",
-        )
-    if model.tolerance and model.role is not Role.ACTUATOR:
-        raise source.error(
-            (*keys, "tolerance"),
-            f"a tolerance of a channel that is no actuator ({model.role})",
-            expected="a tolerance only where a difference counts",
-            remedy="leave it out, or say `role: actuator`",
         )
     in_topics = trace.file.endswith(".mcap")
     if in_topics and not all(model.from_.partition(":")):

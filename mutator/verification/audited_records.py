@@ -134,6 +134,7 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
         "dev": record.dev,
         "t_end": record.t_end,
         "metrics": record.metrics,
+        "left": record.left,
         "hazards": record.hazards,
         "alerts": record.alerts,
         "trace_digest": record.trace_digest,

@@ -14,8 +14,7 @@ _REMEDY = "`mutator report` makes it anew"
 
 def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
     """How many tables are there, and where they differ. A missing one is made when it is needed."""
-    names = (results.CSV, results.PARQUET, results.TIMINGS_PARQUET)
-    there = [name for name in names if (folder.path / name).is_file()]
+    there = [name for name in results.TABLES if (folder.path / name).is_file()]
     return len(there), _differences(folder, there)
 
 
@@ -27,7 +26,7 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
         path = folder.path / name
         if name == results.CSV:
             yield from _cells(path, made[name])
-        elif not same_parquet(path, made[name]):
+        elif name not in made or not same_parquet(path, made[name]):
             yield MutatorError("not what the records give", where=path, remedy=_REMEDY)
 
 

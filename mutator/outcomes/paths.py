@@ -1,0 +1,245 @@
+"""The path of a fault: from the components that it was injected into, along the control structure, to the
+controlled process.
+
+What feeds back (the vehicle is seen by its sensors) is no part of the path, so links out of the process and
+those of people are left out. A component of the path that left golden only after the process had is taken for
+one that the feedback changed, unless the path alone leads to it.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from itertools import pairwise
+
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Outcome, Record
+from mutator.outcomes.propagation import Departure
+from mutator.store.run_head import REMEDY, Head
+from mutator.stpa.analysis import Kind, StructureModel
+from mutator.targets.channels import Role
+
+
+class State(StrEnum):
+    """What became of the fault at a component."""
+
+    INJECTED = "injected"
+    REACHED = "reached"  # a channel of it left golden
+    FEEDBACK = "feedback"  # a channel of it left golden, but only after the process had
+    HELD = "held"  # it has channels, and none left golden
+    UNSEEN = "unseen"  # nothing of it is recorded
+
+
+class Passage(StrEnum):
+    """Whether the fault got through a link of its path."""
+
+    THROUGH = "through"
+    STOPPED = "stopped"
+    UNKNOWN = "unknown"  # what it leads to is not recorded
+    NONE = "none"  # the fault did not come to its start
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """A component on a path: its channels that left golden, and when (s) the first of them did."""
+
+    component: str
+    state: State
+    channels: tuple[Departure, ...]
+
+    @property
+    def t_first(self) -> float | None:
+        return min((first for _, first, _ in self.channels), default=None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """The stages of a path in causal order, and how the fault fared at each of its links.
+
+    `reached` is the furthest component that left golden. `stopped_at` are those that held a fault which
+    changed no actuator. Both may be empty.
+    """
+
+    stages: tuple[Stage, ...]
+    links: tuple[tuple[str, Passage], ...]
+    reached: str
+    stopped_at: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """Where the faults of some components may go: the components in causal order, the links between them."""
+
+    components: tuple[str, ...]
+    links: Mapping[str, tuple[str, str]]
+    sources: frozenset[str]  # where the fault comes in
+    injected: bool  # whether these are known to be where
+    fed: frozenset[str]  # components that something off the way leads to, too
+    steps: Mapping[str, int]  # links that are left to the process
+
+    def feeders(self, component: str) -> set[str]:
+        """The components that lead to one."""
+        return {tail for tail, tip in self.links.values() if tip == component}
+
+
+class Ways:
+    """Paths of faults through a target.
+
+    `channels` are name, unit, role, component and meaning of each, as run.json has them. Without a
+    `structure` the components are a chain: those of internal channels in the order of the manifest, then
+    those of actuators, then those of the true state; where in it a fault was injected is not known.
+    """
+
+    def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
+        self.component_of = {name: component for name, _, _, component, _ in channels}
+        self._roles = {component: role for _, _, role, component, _ in channels if component}
+        self.structure = structure
+        self._way = lru_cache(maxsize=None)(self._structured if structure else self._chain)
+
+    @property
+    def processes(self) -> frozenset[str]:
+        """The components that are controlled."""
+        if self.structure is None:
+            return frozenset(name for name, role in self._roles.items() if role == Role.TRUTH.value)
+        return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
+
+    def injected(self, experiment: Experiment) -> frozenset[str]:
+        """The components of the structure whose files the fault is injected into."""
+        files = {injection.location.path for injection in experiment.fault.injections}
+        components = self.structure.components if self.structure else {}
+        return frozenset(name for name, one in components.items() if files.intersection(one.modules))
+
+    def path(self, experiment: Experiment, record: Record) -> Path | None:
+        """The path of an experiment; None where its fault was not active, ended without an outcome, or is in
+        no component that is known."""
+        if record.outcome in (None, Outcome.NOT_ACTIVATED):
+            return None
+        way = self._way(self.injected(experiment))
+        if not way.components:
+            return None
+        left: dict[str, list[Departure]] = {}
+        for departure in record.left:
+            left.setdefault(self.component_of.get(departure[0], ""), []).append(departure)
+        times = {name: min(t for _, t, _ in found) for name, found in left.items()}
+        states, arrived = self._states(way, times)
+        stages = [
+            Stage(component=n, state=states[n], channels=tuple(left.get(n, ()))) for n in way.components
+        ]
+        changed = [s.component for s in stages if s.channels and s.state in (State.INJECTED, State.REACHED)]
+        return Path(
+            stages=tuple(stages),
+            links=tuple((name, _passage(*ends, states, arrived)) for name, ends in way.links.items()),
+            reached=min(reversed(changed), key=way.steps.__getitem__, default=""),
+            stopped_at=_holding(way, states, arrived) if record.outcome is Outcome.MASKED else (),
+        )
+
+    def _states(self, way: Way, left: Mapping[str, float]) -> tuple[dict[str, State], set[str]]:
+        """The state of each component of a way, by the times (s) when components first left golden; and
+        which of them the fault came to, as far as is known: an unseen one if it came to what feeds it."""
+        seen = {component for component in self.component_of.values() if component}
+        fed_back = min((left[name] for name in self.processes if name in left), default=float("inf"))
+        states: dict[str, State] = {}
+        arrived: set[str] = set()
+        for name in way.components:
+            came = name in way.sources or bool(way.feeders(name) & arrived)
+            if way.injected and name in way.sources:
+                states[name] = State.INJECTED
+            elif name not in seen:
+                states[name] = State.UNSEEN
+            elif name not in left:
+                states[name] = State.HELD
+            elif left[name] > fed_back and (name in way.fed or not came):
+                states[name] = State.FEEDBACK
+            else:
+                states[name] = State.REACHED
+            if states[name] in (State.INJECTED, State.REACHED) or (states[name] is State.UNSEEN and came):
+                arrived.add(name)
+        return states, arrived
+
+    def _chain(self, _: frozenset[str]) -> Way:
+        order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
+        chain = sorted(self._roles, key=lambda name: order.index(self._roles[name]))
+        links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
+        # what is seen of the process may come first
+        return Way(
+            components=tuple(chain),
+            links=links,
+            sources=frozenset(chain[:1]),
+            injected=False,
+            fed=frozenset(chain[:1]),
+            steps={name: len(chain) - place for place, name in enumerate(chain)},
+        )
+
+    def _structured(self, injected: frozenset[str]) -> Way:
+        assert self.structure is not None
+        people = {n for n, c in self.structure.components.items() if c.kind is Kind.HUMAN}
+        ends = {name: (link.from_, link.to) for name, link in self.structure.links.items()}
+        forward = {
+            name: (tail, tip)
+            for name, (tail, tip) in ends.items()
+            if tail not in self.processes and not {tail, tip} & people
+        }
+        steps = _steps(self.processes, [(tip, tail) for tail, tip in forward.values()])
+        on_way = (_steps(injected, forward.values()).keys() & steps.keys()) | injected
+        links = {name: pair for name, pair in forward.items() if on_way.issuperset(pair)}
+        fed = {tip for tail, tip in ends.values() if tail not in on_way and tail not in people}
+        return Way(
+            components=_in_causal_order([n for n in self.structure.components if n in on_way], links, steps),
+            links=links,
+            sources=injected,
+            injected=True,
+            fed=frozenset(fed & on_way),
+            steps={name: steps.get(name, len(on_way)) for name in on_way},
+        )
+
+
+def ways_of(head: Head) -> Ways | None:
+    """The ways of a run's target, as its run.json has them; None where no channel names a component, and in
+    runs of earlier versions."""
+    if not any(component for *_, component, _ in head.get("channels", ())):
+        return None
+    try:
+        structure = StructureModel.model_validate(head["structure"]) if head.get("structure") else None
+    except ValueError:
+        raise MutatorError("damaged at 'structure'", where=head.path, remedy=REMEDY) from None
+    return Ways(head["channels"], structure)
+
+
+def _steps(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
+    """How many links away from `start` everything is that can be come to from there, itself included."""
+    found = dict.fromkeys(start, 0)
+    while more := {tip for tail, tip in links if tail in found} - found.keys():
+        found |= dict.fromkeys(more, max(found.values()) + 1)
+    return found
+
+
+def _in_causal_order(
+    nodes: Sequence[str], links: Mapping[str, tuple[str, str]], steps: Mapping[str, int]
+) -> tuple[str, ...]:
+    """The nodes, each after all that feed it. Of several, and in a circle, the one with most `steps` to the
+    process comes first."""
+    left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
+    order: list[str] = []
+    while left:
+        waiting = {tip for tail, tip in links.values() if tail in left and tail != tip}
+        chosen = next((name for name in left if name not in waiting), left[0])
+        left.remove(chosen)
+        order.append(chosen)
+    return tuple(order)
+
+
+def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collection[str]) -> Passage:
+    if tail not in arrived or states[tip] is State.INJECTED:
+        return Passage.NONE
+    if states[tip] is State.UNSEEN:
+        return Passage.UNKNOWN
+    return Passage.THROUGH if states[tip] is State.REACHED else Passage.STOPPED
+
+
+def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
+    """The components that held a fault: next to the ones that it reached, or to where it came in if it
+    reached none."""
+    held = [name for name in way.components if states[name] is State.HELD]
+    reached = {name for name in way.components if states[name] is State.REACHED}
+    after_reached = [name for name in held if way.feeders(name) & reached]
+    return tuple(after_reached or (n for n in held if n in way.sources or way.feeders(n) & {*arrived}))

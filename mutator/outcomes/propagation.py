@@ -1,0 +1,60 @@
+"""How far a fault got: which channels left golden, when first, and by how much."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mutator.model import Record
+from mutator.outcomes.columns import Column
+from mutator.outcomes.golden import Trace, deviation
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
+
+Departure = tuple[str, float, float]  # channel, time first (s), largest deviation
+
+_TINY = 1e-9  # s; times are sums of steps
+COLUMNS = (
+    Column("experiment_id", "text", "", "the experiment"),
+    Column("channel", "text", "", "a channel that left golden beyond its tolerance"),
+    Column("component", "text", "", "the component that the channel belongs to, as the manifest says"),
+    Column("role", "text", "", "`actuator`, `truth` or `internal`"),
+    Column("t_first", "number", "s", "when it first left golden"),
+    Column("max_dev", "number", "the channel's", "its largest difference from golden up to the drive's end"),
+)
+
+
+def departures(
+    golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None
+) -> tuple[Departure, ...]:
+    """Each of `channels` that left golden beyond its tolerance before the end of the drive, in their order.
+
+    A channel that one of the runs did not record is left out. One whose run ended at another time than golden
+    left it there, with the largest deviation of the time that both have.
+    """
+    end = np.inf if t_end is None else t_end + _TINY
+    found = []
+    for channel in channels:
+        if channel.name in golden and channel.name in faulty:
+            one = deviation(golden, faulty, channel, time)
+            if one.t_first <= end and one.t_first < np.inf:
+                found.append((channel.name, one.t_first, one.largest(end)))
+    return tuple(found)
+
+
+def channel_facts(manifest: TargetManifest) -> list[list[str]]:
+    """Name, unit, role, component and meaning of every channel, as run.json has them."""
+    return [[c.name, c.unit, c.role.value, c.component, c.about] for c in manifest.channels]
+
+
+def columns_of(records: Iterable[Record], channels: Sequence[Sequence[str]]) -> Mapping[str, list[Any]]:
+    """The columns of propagation.parquet, a row for each channel that left golden, in the records' order."""
+    facts = {name: (role, component) for name, _, role, component, _ in channels}
+    made: dict[str, list[Any]] = {column.name: [] for column in COLUMNS}
+    for record in records:
+        for name, first, largest in record.left:
+            role, component = facts.get(name, ("", ""))
+            cells = (record.experiment_id, name, component, role, round(first, 6), largest)
+            for column, cell in zip(made.values(), cells, strict=True):
+                column.append(cell)
+    return made

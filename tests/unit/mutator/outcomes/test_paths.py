@@ -1,0 +1,274 @@
+"""Paths of faults, worked out by hand: a structure of two controllers, and chains without one."""
+
+from pathlib import Path as Folder
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import (
+    Activation,
+    Anchor,
+    AnchorKind,
+    Experiment,
+    Fault,
+    FaultLocation,
+    Injection,
+    Method,
+    Outcome,
+    Record,
+    Status,
+    Trigger,
+)
+from mutator.outcomes.paths import Passage, Path, State, Ways, ways_of
+from mutator.store.run_head import Head
+from mutator.stpa.analysis import StructureModel
+
+# eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge feeds `speed`, too
+KINDS = {
+    "driver": "human",
+    "speed": "controller",
+    "wheel": "controller",
+    "pedals": "actuator",
+    "rack": "actuator",
+    "finder": "estimator",
+    "eyes": "sensor",
+    "gauge": "sensor",
+    "car": "process",
+}
+LINKS = {
+    "orders": ("driver", "speed"),
+    "light": ("car", "eyes"),
+    "motion": ("car", "gauge"),
+    "picture": ("eyes", "finder"),
+    "lead": ("finder", "speed"),
+    "pace": ("gauge", "speed"),
+    "angle": ("gauge", "wheel"),
+    "gas": ("speed", "pedals"),
+    "torque": ("wheel", "rack"),
+    "force": ("pedals", "car"),
+    "turn": ("rack", "car"),
+    "show": ("speed", "driver"),
+}
+STRUCTURE = StructureModel.model_validate(
+    {
+        "about": "",
+        "components": {
+            name: {"kind": kind, "label": name, "about": "", "modules": [f"{name}.py"], "drawn": [i, 0, 1]}
+            for i, (name, kind) in enumerate(KINDS.items())
+        },
+        "control_actions": {},
+        "links": {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()},
+    }
+)
+CHANNELS = [
+    ["seen", "m", "internal", "finder", ""],
+    ["wanted", "m/s", "internal", "speed", ""],
+    ["angle", "rad", "internal", "wheel", ""],
+    ["gas", "-", "actuator", "pedals", ""],
+    ["torque", "-", "actuator", "rack", ""],
+    ["place", "m", "truth", "car", ""],
+]
+WAYS = Ways(CHANNELS, STRUCTURE)
+
+
+def experiment(*modules: str) -> Experiment:
+    places = [
+        FaultLocation(path=f"{m}.py", function="f", anchor=Anchor(kind=AnchorKind.ENTRY)) for m in modules
+    ]
+    fault = Fault(
+        spec="a/b/c",
+        module="a",
+        fault_type="b",
+        reading="r",
+        value=1,
+        unit="-",
+        aim="",
+        injections=tuple(Injection(location=place, model="offset") for place in places),
+    )
+    trigger = Trigger(name="t", condition="t >= 1")
+    return Experiment(
+        fault=fault, scenario="S", scenario_digest="", method=Method.RANDOM, trigger=trigger, seed=1
+    )
+
+
+def record(outcome: Outcome | None, **left: float) -> Record:
+    return Record(
+        experiment_id="",
+        status=Status.OK if outcome else Status.CRASHED,
+        outcome=outcome,
+        detail="",
+        tree="",
+        activation=Activation(first=1.0, last=1.0, count=1),
+        t_manifest=None,
+        max_dev=(),
+        hazards=(),
+        alerts=(),
+        trace_digest="",
+        left=tuple((name, t, 1.0) for name, t in left.items()),
+    )
+
+
+def path(*modules: str, outcome: Outcome = Outcome.SDC, ways: Ways = WAYS, **left: float) -> Path:
+    found = ways.path(experiment(*modules), record(outcome, **left))
+    assert found is not None
+    return found
+
+
+def states(found: Path) -> dict[str, State]:
+    return {stage.component: stage.state for stage in found.stages}
+
+
+def test_a_fault_that_an_estimator_held() -> None:
+    """It was injected where nothing is recorded; neither the estimator nor what follows it changed."""
+    found = path("eyes", outcome=Outcome.MASKED)
+    assert [*states(found).items()] == [
+        ("eyes", State.INJECTED),
+        ("finder", State.HELD),
+        ("speed", State.HELD),
+        ("pedals", State.HELD),
+        ("car", State.HELD),
+    ]
+    assert (found.reached, found.stopped_at) == ("", ("finder",))
+    assert dict(found.links) == {
+        "picture": Passage.STOPPED,
+        "lead": Passage.NONE,
+        "gas": Passage.NONE,
+        "force": Passage.NONE,
+    }
+
+
+def test_a_fault_that_a_controller_held() -> None:
+    """It reached the estimator and no further: the controller after it is what stopped it."""
+    found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
+    assert (found.reached, found.stopped_at) == ("finder", ("speed",))
+    assert dict(found.links)["picture"] is Passage.THROUGH
+    assert dict(found.links)["lead"] is Passage.STOPPED
+
+
+def test_a_fault_that_reached_the_car() -> None:
+    """Each component has the time of its first channel; the furthest one is the controlled process."""
+    found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
+    assert [(s.component, s.t_first) for s in found.stages[1:]] == [
+        ("finder", 1.2),
+        ("speed", 1.3),
+        ("pedals", 1.3),
+        ("car", 1.4),
+    ]
+    assert {passage for _, passage in found.links} == {Passage.THROUGH}
+    assert (found.reached, found.stopped_at) == ("car", ())
+
+
+def test_feedback_is_no_path() -> None:
+    """What is off the path does not appear on it, whenever it left golden: a car that moves otherwise is seen
+    otherwise."""
+    found = path("wheel", angle=1.0, torque=1.0, place=1.1, seen=1.2, wanted=1.3, gas=1.4)
+    assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
+
+
+def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
+    """The speed control left golden after the car had, and something off the path leads to it: so it and what
+    it alone leads to have only been fed back to, while a branch that came first was reached."""
+    found = path("finder", "wheel", seen=1.0, angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
+    assert states(found) == {
+        "finder": State.INJECTED,
+        "wheel": State.INJECTED,
+        "rack": State.REACHED,
+        "speed": State.FEEDBACK,
+        "pedals": State.FEEDBACK,
+        "car": State.REACHED,
+    }
+    assert dict(found.links)["lead"] is Passage.STOPPED
+    assert dict(found.links)["gas"] is Passage.NONE
+
+
+def test_a_late_departure_that_the_path_alone_explains() -> None:
+    """Nothing but the speed control leads to the pedals: they are reached, though the car moved before."""
+    found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
+    assert states(found)["pedals"] is State.REACHED
+
+
+def test_what_is_not_recorded_is_passed_through() -> None:
+    """A component without channels is unseen; whether the fault came to it is not known, and what follows it
+    tells whether it got further."""
+    ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
+    found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
+    assert states(found)["finder"] is State.UNSEEN
+    assert dict(found.links)["picture"] is Passage.UNKNOWN
+    assert dict(found.links)["lead"] is Passage.THROUGH
+    held = path("eyes", ways=ways, outcome=Outcome.MASKED)
+    assert held.stopped_at == ("speed",)
+
+
+def test_a_fault_before_a_fork_may_be_held_twice() -> None:
+    """Both controllers that a sensor feeds held it."""
+    assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
+    assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
+
+
+@pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
+def test_no_path_without_an_active_fault_and_an_outcome(outcome: Outcome | None) -> None:
+    """There is none of what was never active, or broke down."""
+    assert WAYS.path(experiment("eyes"), record(outcome)) is None
+
+
+def test_no_path_from_nowhere() -> None:
+    """A fault in a file that no component names has no path: nobody knows where it starts."""
+    assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
+
+
+def test_a_chain_without_a_structure() -> None:
+    """The components of a manifest follow each other by role and then by their order; the first that stayed
+    equal after those that were reached is where a fault was stopped."""
+    ways = Ways(CHANNELS[::-1], None)
+    found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
+    assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
+    assert (found.reached, found.stopped_at) == ("wheel", ("speed",))
+    none = path("eyes", ways=ways, outcome=Outcome.MASKED)
+    assert (none.reached, none.stopped_at) == ("", ("wheel",))
+
+
+def test_a_chain_knows_feedback_too() -> None:
+    """What the car interface reads changes after the car: the command was injected behind it."""
+    ways = Ways(
+        [
+            ["seen", "", "internal", "interface", ""],
+            ["ask", "", "actuator", "control", ""],
+            ["gap", "", "truth", "car", ""],
+        ],
+        None,
+    )
+    found = path("x", ways=ways, ask=1.0, gap=1.1, seen=1.2)
+    assert states(found) == {
+        "interface": State.FEEDBACK,
+        "control": State.REACHED,
+        "car": State.REACHED,
+    }
+
+
+def test_components_that_lead_in_a_circle() -> None:
+    """A path through a circle has each component once, and ends at the process."""
+    links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
+    links["back"] = {"from": "speed", "to": "finder", "label": ""}
+    circle = replace_links(links)
+    found = path("eyes", ways=Ways(CHANNELS, circle), seen=1.0, wanted=1.0, gas=1.0, place=1.1)
+    assert [stage.component for stage in found.stages] == ["eyes", "finder", "speed", "pedals", "car"]
+    assert found.reached == "car"
+
+
+def replace_links(links: dict[str, Any]) -> StructureModel:
+    return StructureModel.model_validate(STRUCTURE.model_dump(mode="json", by_alias=True) | {"links": links})
+
+
+def test_ways_from_run_json() -> None:
+    """A head gives the ways that it was written with; none without components, as in old runs."""
+    structure = STRUCTURE.model_dump(mode="json", by_alias=True)
+    head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
+    found = ways_of(head)
+    assert found is not None and found.structure == STRUCTURE
+    assert ways_of(Head(Folder("run.json"), {})) is None
+    nothing = [[name, unit, role, "", about] for name, unit, role, _, about in CHANNELS]
+    assert ways_of(Head(Folder("run.json"), {"channels": nothing, "structure": None})) is None
+    structure["links"]["lead"]["to"] = 3
+    with pytest.raises(MutatorError, match="structure"):
+        ways_of(head)
