@@ -82,7 +82,9 @@ class RunComparison:
         return {sheet.name: sheet.frame() for sheet in self.comparison.sheets}
 
     def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
-        """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "new-crash")`."""
+        """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "severity:S2")`.
+
+        MutatorError for an unknown gate, and for one of severity where a run has no classes."""
         known = [gate.value for gate in Gate]
         if strangers := [gate for gate in gates if gate not in known]:
             raise MutatorError(

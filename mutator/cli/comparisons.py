@@ -15,9 +15,11 @@ from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 if TYPE_CHECKING:
     from mutator.comparison.comparison import Comparison, Finding
 
-SHOWN = 4  # tables that the terminal shows: those that are not by fault type, but for the changes
 NAMED = 20  # experiments that the terminal names; the written comparison has all
-GATES = "new-hazard, other-hazard, earlier-hazard, lost-alert, worse, new-crash, harness-error, unmatched"
+GATES = (
+    "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
+    "unmatched, severity:CLASS (S0 to S3: a contact of that class or a worse one, and milder or none before)"
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -30,6 +32,7 @@ Examples:
   mutator compare runs/before runs/after
   mutator compare runs/before runs/after --only 'module == "vision_input"'
   mutator compare runs/main runs/change --fail-on new-hazard,new-crash,harness-error
+  mutator compare runs/main runs/change --fail-on severity:S2
 
 With --fail-on, exit code 1 if anything of that kind is found (each is named), else 3 if experiments have no
 result in a run, for then nobody can say that nothing got worse.
@@ -93,7 +96,9 @@ def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
         terminal.table(["what differs", found.names.a, found.names.b], differing)
         terminal.say(compared.files_text)
         terminal.say()
-    for sheet in found.sheets[:SHOWN]:
+    for sheet in found.sheets:
+        if sheet.name.endswith("_by_fault_type"):
+            continue
         terminal.say(sheet.title, style="bold")
         heads, lines = list(sheet.heads), sheet.table().rows
         terminal.table(heads, lines, right=range(1, len(heads)), total=sheet.name == "changes")

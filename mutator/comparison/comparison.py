@@ -6,7 +6,8 @@ from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
-from mutator.comparison.differences import Fact, Files, facts, files, remarks
+from mutator.comparison.differences import Fact, Files, facts, files, remarks, severity_remarks
+from mutator.comparison.metric_sheets import metrics_sheets, severity_sheet
 from mutator.comparison.pairs import Change, Matching, Pair, match, time_to_hazard
 from mutator.comparison.sheets import (
     Names,
@@ -28,12 +29,18 @@ class Gate(StrEnum):
 
     NEW_HAZARD = Change.NEW_HAZARD.value
     OTHER_HAZARD = Change.OTHER_HAZARD.value
+    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value
     EARLIER_HAZARD = Change.EARLIER_HAZARD.value
     LOST_ALERT = Change.LOST_ALERT.value
     WORSE = Change.WORSE.value
     NEW_CRASH = Change.NEW_CRASH.value
     HARNESS_ERROR = Change.HARNESS_ERROR.value
     UNMATCHED = "unmatched"
+    # a contact of this class or a worse one, where it was a milder one or none before
+    SEVERITY_S0 = "severity:S0"
+    SEVERITY_S1 = "severity:S1"
+    SEVERITY_S2 = "severity:S2"
+    SEVERITY_S3 = "severity:S3"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +94,7 @@ class Comparison:
         """What to know before believing the tables."""
         noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
         own = tuple(f"{name}: {note}" for name, note in noted if note)
-        return remarks(self.a, self.b, self.matching) + own
+        return remarks(self.a, self.b, self.matching) + severity_remarks(self.a, self.b) + own
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
@@ -96,7 +103,13 @@ class Comparison:
         rates, rates_by_type = rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_sheet(self.pairs, self.names), changes_sheet(self.pairs))
-        return (*counts, rates, spans, rates_by_type, spans_by_type)
+        metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)
+        severity = severity_sheet(self.pairs, self.names)
+        return (
+            *(*counts, rates, spans),
+            *(sheet for sheet in (severity, metrics) if sheet.lines),
+            *(rates_by_type, spans_by_type, *([metrics_by_type] if metrics.lines else [])),
+        )
 
     @cached_property
     def unmatched(self) -> tuple[tuple[str, Experiment], ...]:
@@ -130,6 +143,8 @@ def compare(
     MutatorError when none of them has a partner; CheckFailed when the proof of a run failed.
     """
     a, b = read_side(run_a, only), read_side(run_b, only)
+    scale = b.folder.scale if a.folder.scale else None  # both by one scale, or neither
+    a, b = a.classed(scale), b.classed(scale)
     matching = match(a, b)
     if not matching.pairs:
         raise MutatorError(
@@ -151,12 +166,27 @@ def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ..
             m = comparison.matching
             strangers = (*m.only_a, *m.only_b, *m.ambiguous)
             found += [Finding(gate=gate, experiment_id=e.id, words=e.label) for e in strangers]
-        else:
-            found += [
-                Finding(gate=gate, experiment_id=p.b.id, words=f"{p.b.label}: {ending_change(p)}")
-                for p in comparison.having(Change(gate.value))
-            ]
+            continue
+        _, is_severity, least = gate.value.partition(":")
+        pairs = _reaching(comparison, least) if is_severity else comparison.having(Change(gate.value))
+        found += [
+            Finding(gate=gate, experiment_id=p.b.id, words=f"{p.b.label}: {ending_change(p)}") for p in pairs
+        ]
     return tuple(found)
+
+
+def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
+    """The pairs that are in this class of severity, or a worse one, in the second run alone."""
+    for side in (comparison.a, comparison.b):
+        if side.folder.scale is None:
+            raise MutatorError(
+                f"{side.name} has no classes of severity",
+                where=side.folder.path,
+                argument="fail_on",
+                expected="runs of a target whose manifest has `severity`, both planned since it had",
+                remedy="leave out the severity, or run the campaign again",
+            )
+    return tuple(p for p in comparison.pairs if p.usable and p.row_a.severity < least <= p.row_b.severity)
 
 
 def ending_change(pair: Pair) -> str:
@@ -170,6 +200,8 @@ def _ending(row: Row) -> str:
     if row.hazards:
         names = ", ".join(name for name, _ in row.hazards)
         details.append(names if time is None else f"{names} {time:.2f} s after activation")
+    if row.severity:
+        details.append(f"{row.severity}, delta-v {row.delta_v:.1f} m/s")
     if row.alerts:
         details.append(f"alert {', '.join(row.alerts)}")
     if not row.usable or (row.detail and not details):

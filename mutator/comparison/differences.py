@@ -55,6 +55,9 @@ def _facts(side: Side) -> dict[str, str]:
     told["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
     told["chosen"] = ", ".join(f"{k} {v}" for k, v in head["choices"].items() if v is not None) or "-"
     told |= {f"digest of {name}": value[:_SHORT] for name, value in head["sources"].items()}
+    if scale := side.folder.scale:
+        bounds = ", ".join(f"{name} from {least:.3g} m/s" for name, least, _ in scale.classes[1:])
+        told["scale of severity"] = f"{scale.name}: {bounds}"
     told["digest of plan"] = head["plan"][:_SHORT]
     told["mutator"] = head["provenance"]["mutator"]
     return told | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
@@ -93,6 +96,17 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
         *(f"The content of {side.name} is {not_verifiable(side.folder)}." for side in old),
         *(f"{n} of {len(matching.pairs)} pairs {what}." for n, what in counts if n),
     )
+
+
+def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
+    """What to know of the classes of severity: both runs are put into those of the second one."""
+    scales = [side.folder.scale for side in (a, b)]
+    if None in scales:
+        (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
+        return (f"Severity is not compared: {without.name} has none.",) if any(scales) else ()
+    if scales[0] == scales[1]:
+        return ()
+    return (f"The runs have different scales of severity; both are put into the classes of {b.name}.",)
 
 
 def _hold(experiment: Any) -> tuple[object, ...]:

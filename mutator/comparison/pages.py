@@ -180,6 +180,8 @@ def _ending(row: Row) -> str:
     from markupsafe import Markup
 
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
+    if row.severity:
+        details.insert(0, row.severity)
     if row.detail:
         details.append(row.detail)
     return Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
@@ -212,6 +214,8 @@ def _side_cells(row: Row) -> Iterator[tuple[str, object]]:
     yield "t_hazard", row.hazards[0][1] if row.hazards else None
     yield "alerts", ";".join(row.alerts)
     yield "t_alert", row.t_alert
+    yield "severity", row.severity
+    yield "delta_v", row.delta_v
 
 
 def _table(lines: Iterable[Mapping[str, object]], heads: tuple[str, ...] = ()) -> bytes:

@@ -10,7 +10,7 @@ from mutator.comparison.sides import Side, key_of
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.rows import Row
 
-_SEVERITY = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
+_HARM = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
 _TIME_DIGITS = 6  # of a time from activation: floats apart, equal times are equal
 
 
@@ -19,7 +19,9 @@ class Change(StrEnum):
 
     NEW_HAZARD = "new-hazard"  # a hazard, where there was none
     OTHER_HAZARD = "other-hazard"  # a hazard that did not come before, beside one that did
+    HIGHER_SEVERITY = "higher-severity"  # a contact of a higher class, or where there was none
     HAZARD_GONE = "hazard-gone"
+    LOWER_SEVERITY = "lower-severity"
     EARLIER_HAZARD = "earlier-hazard"  # the first hazard comes sooner after the activation
     LATER_HAZARD = "later-hazard"
     LOST_ALERT = "lost-alert"
@@ -106,20 +108,22 @@ def _changes(a: Row, b: Row) -> Iterable[Change]:
     if (a.status is Status.OK) != (b.status is Status.OK):
         yield Change.NEW_CRASH if a.status is Status.OK else Change.CRASH_GONE
     elif a.ending != b.ending:
-        yield _by_severity(_severity(b) - _severity(a))
+        yield _by_harm(_harm(b) - _harm(a))
     yield from _hazard_changes(a, b)
+    if a.severity != b.severity:
+        yield Change.HIGHER_SEVERITY if a.severity < b.severity else Change.LOWER_SEVERITY
     if bool(a.alerts) != bool(b.alerts):
         yield Change.LOST_ALERT if a.alerts else Change.NEW_ALERT
 
 
-def _by_severity(difference: int) -> Change:
+def _by_harm(difference: int) -> Change:
     if difference:
         return Change.WORSE if difference > 0 else Change.BETTER
     return Change.OTHERWISE
 
 
-def _severity(row: Row) -> int:
-    return _SEVERITY[row.outcome] if row.outcome else 0
+def _harm(row: Row) -> int:
+    return _HARM[row.outcome] if row.outcome else 0
 
 
 def _hazard_changes(a: Row, b: Row) -> Iterable[Change]:

@@ -69,7 +69,7 @@ def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
     parts: list[tuple[Cell, ...]] = []
     for flag in FLAGS:
         found = {str(kind): _rates(group, flag) for kind, group in frame.groupby("kind")}
-        parts += _adjusted(flag, found)
+        parts += adjusted(flag, found)
     note = (
         f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
         "(of 1), its interval resampled by fault (variant and value; none where all of them say the same). "
@@ -80,7 +80,7 @@ def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
         *("pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
         *("difference", "difference, low", "difference, high", "p"),
     )
-    return _both("rates", "What came in how many runs", note, ("what", heads), whole, parts)
+    return whole_and_parts("rates", "What came in how many runs", note, ("what", heads), whole, parts)
 
 
 def _rates(frame: pd.DataFrame, flag: str) -> tuple[Cell, ...]:
@@ -99,14 +99,16 @@ def times_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
     whole = tuple((name, *_times(some, name)) for name, some in known.items() if len(some))
     parts: list[tuple[Cell, ...]] = []
     for name, some in known.items():
-        parts += _adjusted(name, {str(kind): _times(group, name) for kind, group in some.groupby("kind")})
+        parts += adjusted(name, {str(kind): _times(group, name) for kind, group in some.groupby("kind")})
     note = (
         f"Medians in s. Difference: the median of the pairs' differences, {names.b} less {names.a}, with its "
         "exact interval (none for fewer than six pairs). p: Wilcoxon's signed-rank test (none where no pair "
         "differs)"
     )
     heads = ("pairs", names.a, names.b, "difference", "difference, low", "difference, high", "p")
-    return _both("times", "How long it took, where it came in both runs", note, ("time", heads), whole, parts)
+    return whole_and_parts(
+        "times", "How long it took, where it came in both runs", note, ("time", heads), whole, parts
+    )
 
 
 def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
@@ -114,7 +116,7 @@ def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
     return (t.n, t.first, t.second, t.median.difference, t.median.low, t.median.high, P(t.p))
 
 
-def _adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
+def adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
     """The lines of one thing by fault type; behind p, which is the last cell, what it is after Holm."""
     p_values = {kind: cells[-1] for kind, cells in found.items()}
     known = {kind: p for kind, p in p_values.items() if isinstance(p, P) and not math.isnan(p)}
@@ -122,7 +124,7 @@ def _adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Ce
     return [(name, kind, *cells, holm_values.get(kind)) for kind, cells in found.items()]
 
 
-def _both(
+def whole_and_parts(
     name: str,
     title: str,
     note: str,
@@ -130,6 +132,7 @@ def _both(
     whole: tuple[tuple[Cell, ...], ...],
     parts: Sequence[tuple[Cell, ...]],
 ) -> tuple[Sheet, Sheet]:
+    """A table of all pairs, and one by fault type; `heads` are that of the first column, and the rest."""
     what, numbers = heads
     return (
         Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),

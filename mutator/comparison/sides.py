@@ -1,16 +1,17 @@
 """The two sides of a comparison: the experiments of a run, and what became of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
 from mutator.campaigns.filters import compile_filter
-from mutator.model import Experiment, Value
-from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
+from mutator.model import Experiment, Record, Value
+from mutator.outcomes.columns import PLAN_COLUMNS, T_END, plan_row
 from mutator.outcomes.reader import row_of
 from mutator.outcomes.rows import Row
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
+from mutator.targets.severity import Scale
 from mutator.verification import equivalence
 
 
@@ -29,15 +30,29 @@ class Key(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One run: its folder, the experiments that were planned for it, and the rows of those that have one."""
+    """One run: its folder, the experiments that were planned for it, and the rows of those that have one.
+
+    Rows and metrics are by experiment id; of the metrics, by their names, only those that have a value.
+    """
 
     folder: RunFolder
     experiments: tuple[Experiment, ...]
-    rows: dict[str, Row]  # by experiment id
+    rows: dict[str, Row]
+    metrics: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         return self.folder.path.name
+
+    def classed(self, scale: Scale | None) -> "Side":
+        """The same run with the contacts in the classes of a scale; in none without one."""
+        rows = {}
+        for name, row in self.rows.items():
+            severity = ""
+            if scale and row.severity and row.delta_v is not None:
+                severity = scale.class_of(row.delta_v)
+            rows[name] = replace(row, severity=severity)
+        return replace(self, rows=rows)
 
 
 def read_side(run: Path, only: str | None = None) -> Side:
@@ -52,8 +67,17 @@ def read_side(run: Path, only: str | None = None) -> Side:
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
     hazards = folder.head["hazards"]
-    rows = {e.id: row_of(e, records[e.id], hazards) for e in experiments if e.id in records}
-    return Side(folder=folder, experiments=experiments, rows=rows)
+    done = {e.id: (e, records[e.id]) for e in experiments if e.id in records}
+    return Side(
+        folder=folder,
+        experiments=experiments,
+        rows={name: row_of(e, record, hazards, folder.scale) for name, (e, record) in done.items()},
+        metrics={name: _metrics(record) for name, (_, record) in done.items()},
+    )
+
+
+def _metrics(record: Record) -> dict[str, float]:
+    return dict(record.metrics) | ({T_END: record.t_end} if record.t_end is not None else {})
 
 
 def key_of(experiment: Experiment) -> Key:

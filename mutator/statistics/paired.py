@@ -119,7 +119,7 @@ def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
 def times(first: pd.Series, second: pd.Series) -> Times:
     """Times of the pairs that have both compared: medians, their difference (scipy: exact interval from the
     order statistics), Wilcoxon's signed-rank test (scipy; NaN where no time differs)."""
-    from scipy.stats import quantile_test, wilcoxon
+    from scipy.stats import quantile_test
 
     known = first.notna() & second.notna()
     before, after = first[known], second[known]
@@ -135,5 +135,13 @@ def times(first: pd.Series, second: pd.Series) -> Times:
         median=Difference(
             difference=float(change.median()), low=float(interval.low), high=float(interval.high)
         ),
-        p=float(wilcoxon(change.to_numpy()).pvalue) if change.any() else math.nan,
+        p=wilcoxon(before, after),
     )
+
+
+def wilcoxon(first: pd.Series, second: pd.Series) -> float:
+    """p of Wilcoxon's signed-rank test (scipy) of pairs without a NaN; NaN where no pair differs."""
+    from scipy.stats import wilcoxon as signed_rank
+
+    change = (second - first).round(_DIGITS)
+    return float(signed_rank(change.to_numpy()).pvalue) if change.any() else math.nan

@@ -1,0 +1,74 @@
+"""How bad it was, in both runs: medians of metrics in pairs, classes of severity."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import pandas as pd
+
+from mutator.comparison.pairs import Pair
+from mutator.comparison.sheets import Names, adjusted, whole_and_parts
+from mutator.comparison.sides import Side
+from mutator.outcomes.rows import by_fault_type
+from mutator.statistics.medians import median_difference
+from mutator.statistics.paired import wilcoxon
+from mutator.statistics.sheet import Cell, P, Sheet
+from mutator.targets.severity import CLASSES
+
+NO_CONTACT = "no contact"
+
+
+def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tuple[Sheet, Sheet]:
+    """Of each metric that both runs have, medians, their difference and Wilcoxon's test over the pairs with a
+    value on both sides: of all pairs, and by fault type."""
+    whole: list[tuple[Cell, ...]] = []
+    parts: list[tuple[Cell, ...]] = []
+    units = {name: (unit, worse) for name, unit, _, worse in a.folder.head.get("metrics", ())}
+    usable = [pair for pair in pairs if pair.usable]
+    for name, unit, _, worse in b.folder.head.get("metrics", ()):
+        frame = _values(usable, a, b, name)
+        if units.get(name) != (unit, worse) or frame.empty:
+            continue
+        whole.append((name, unit, worse, *_medians(frame)))
+        groups = {str(kind): (unit, worse, *_medians(group)) for kind, group in frame.groupby("kind")}
+        parts += adjusted(name, groups)
+    note = (
+        f"Of pairs with a value on both sides. Difference: the median of {names.b} less that of {names.a}, "
+        "its interval resampled by fault (variant and value; none where all of them say the same). p: "
+        "Wilcoxon's signed-rank test (none where no pair differs)"
+    )
+    heads = ("unit", "worse", "pairs", names.a, names.b, "difference", "difference, low", "difference, high")
+    return whole_and_parts("metrics", "How bad it was", note, ("metric", (*heads, "p")), tuple(whole), parts)
+
+
+def _values(pairs: Sequence[Pair], a: Side, b: Side, name: str) -> pd.DataFrame:
+    """The pairs that have a value of a metric on both sides: `kind`, `fault`, `first`, `second`."""
+    rows = [
+        (by_fault_type(p.row_a), p.row_a.fault, a.metrics[p.a.id].get(name), b.metrics[p.b.id].get(name))
+        for p in pairs
+    ]
+    return pd.DataFrame(rows, columns=["kind", "fault", "first", "second"]).dropna()
+
+
+def _medians(frame: pd.DataFrame) -> tuple[Cell, ...]:
+    first, second = frame["first"], frame["second"]
+    found = median_difference(first, second, frame["fault"])
+    medians = (float(first.median()), float(second.median()))
+    interval = (found.difference, found.low, found.high)
+    return (len(frame), *medians, *interval, P(wilcoxon(first, second)))
+
+
+def severity_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
+    """How many pairs had a contact of which class in the first run (lines) and in the second (columns);
+    without lines where there was none."""
+    order = [*CLASSES[::-1], ""]
+    counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.usable)
+    seen = [name for name in order if any(name in pair for pair in counts)]
+    return Sheet(
+        name="severity",
+        title="How severe they were",
+        note=f"Each line is the class of the contact in {names.a}, each column that in {names.b}.",
+        heads=(f"{names.a} / {names.b}", *(name or NO_CONTACT for name in seen)),
+        lines=tuple((one or NO_CONTACT, *(counts[one, other] for other in seen)) for one in seen)
+        if any(seen)
+        else (),
+    )

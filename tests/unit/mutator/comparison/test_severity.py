@@ -1,0 +1,151 @@
+"""Severity and metrics of two runs compared."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.comparison.comparison import Comparison, Gate, compare, findings
+from mutator.comparison.pages import pair_line, summary
+from mutator.comparison.pairs import Change
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Method, Outcome
+from mutator.workspace import Workspace
+
+MANIFEST = """\
+hazards: {H1: {about: contact, when: gap <= 0, terminal: true}, H3: {}, TOO_FAST: {}}
+metrics:
+  closing: {at_end: speed, unit: m/s, worse: higher, about: x}
+  way: {integral: speed, unit: m, worse: lower, about: x}
+severity: {contact: H1, contact_speed: closing, mass_kg: 1000, other_mass_kg: 1000, scale: hard}
+"""
+SCALE = """\
+schema: severity/1
+source: x
+classes:
+  S0: {from_kph: 0, about: a}
+  S1: {from_kph: 3.6, about: b}
+  S2: {from_kph: S2_FROM, about: c}
+  S3: {from_kph: 36, about: d}
+"""
+
+
+def contact(delta_v: float, **more: float) -> dict[str, Any]:
+    metrics = ({"closing": 2 * delta_v, "way": 10.0, "delta_v": delta_v} | more).items()
+    return {
+        "outcome": Outcome.HAZARD,
+        "t_manifest": 2.5,
+        "t_end": 4.0,
+        "hazards": (("H1", 4.0),),
+        "metrics": tuple(metrics),
+    }
+
+
+def before(e: Experiment) -> dict[str, Any]:
+    """Faults of the lane end in light contacts; nothing else does anything."""
+    return contact(2.0) if e.fault.fault_type == "lane" else {"metrics": (("way", 20.0),)}
+
+
+def after(e: Experiment) -> dict[str, Any]:
+    """Contacts of guided faults of the lane are harder, those of random ones gone; faults of distance end in
+    one, and go less far."""
+    if e.fault.fault_type == "lane":
+        return contact(12.0) if e.method is Method.GUIDED else {"metrics": (("way", 30.0),)}
+    return contact(5.0, way=16.0) if e.fault.fault_type == "distance" else {"metrics": (("way", 20.0),)}
+
+
+@pytest.fixture(scope="module")
+def runs(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+) -> tuple[Path, ...]:
+    """Runs of the toy with severity: before, after, and one of before with a scale of its own; then one of a
+    target without."""
+    place = tmp_path_factory.mktemp("runs")
+    toycar = copy_toycar(place)
+    without = write_run(toycar, place / "without")
+    manifest, scale = toycar.targets["toycar"], toycar.library / "severity" / "hard.yaml"
+    text = manifest.read_text()
+    manifest.write_text(text.replace("hazards: [H1, H3, TOO_FAST]\n", MANIFEST))
+    scale.parent.mkdir()
+    scale.write_text(SCALE.replace("S2_FROM", "18"))
+    made = write_run(toycar, place / "before", before), write_run(toycar, place / "after", after)
+    scale.write_text(SCALE.replace("S2_FROM", "5"))
+    return *made, write_run(toycar, place / "strict", before), without
+
+
+@pytest.fixture(scope="module")
+def found(runs: tuple[Path, ...]) -> Comparison:
+    return compare(runs[0], runs[1])
+
+
+def kinds(found: Comparison, change: Change) -> set[tuple[str, str]]:
+    pairs = found.having(change)
+    return {(p.b.fault.fault_type, f"{p.row_a.severity}>{p.row_b.severity}") for p in pairs}
+
+
+def test_each_experiment_whose_severity_changed_is_listed(found: Comparison) -> None:
+    """A higher class, or a contact where there was none, is worse; a lower one, or none, is better."""
+    assert kinds(found, Change.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
+    assert kinds(found, Change.LOWER_SEVERITY) == {("lane", "S1>")}
+    assert "higher-severity" in summary(found)
+    line = pair_line(found.having(Change.HIGHER_SEVERITY)[0])
+    assert (line["delta_v_b"], line["severity_b"]) in {(12.0, "S3"), (5.0, "S2")}
+
+
+def test_the_gate_finds_new_contacts_of_a_class_or_a_worse_one(found: Comparison) -> None:
+    """S2 finds what was milder before, and not what was in the class already."""
+    counts = {gate: len(findings(found, [gate])) for gate in Gate if gate.value.startswith("severity:")}
+    distance = sum(p.b.fault.fault_type == "distance" for p in found.pairs)
+    harder = sum(p.b.fault.fault_type == "lane" and p.b.method is Method.GUIDED for p in found.pairs)
+    assert 0 < harder < distance + harder
+    assert list(counts.values()) == [distance, distance, distance + harder, harder]
+    assert any("S2, delta-v 5.0 m/s" in f.words for f in findings(found, [Gate.SEVERITY_S2]))
+    assert len(findings(found, [Gate.HIGHER_SEVERITY])) == distance + harder
+
+
+def test_medians_of_metrics_in_pairs(found: Comparison) -> None:
+    """The difference is that of the medians of pairs with a value on both sides; p is by Wilcoxon."""
+    sheets = {sheet.name: sheet for sheet in found.sheets}
+    lines = [dict(zip(sheets["metrics"].heads, line, strict=True)) for line in sheets["metrics"].lines]
+    way = next(line for line in lines if line["metric"] == "way")
+    assert (way["pairs"], way["unit"], way["worse"]) == (len(found.pairs), "m", "lower")
+    by_type = {
+        line[1]: dict(zip(sheets["metrics_by_fault_type"].heads, line, strict=True))
+        for line in sheets["metrics_by_fault_type"].lines
+        if line[0] == "way"
+    }
+    told = {kind: (line["before"], line["after"], line["difference"]) for kind, line in by_type.items()}
+    assert told["sensor/distance"] == (20.0, 16.0, -4.0)
+    assert told["sensor/silence"] == (20.0, 20.0, 0.0)
+
+
+def test_classes_of_both_runs_in_a_table(found: Comparison) -> None:
+    """Each pair is counted once, by the class in either run."""
+    sheet = next(sheet for sheet in found.sheets if sheet.name == "severity")
+    assert sheet.heads == ("before / after", "S3", "S2", "S1", "no contact")
+    assert sum(sum(line[1:]) for line in sheet.lines) == len(found.pairs)  # type: ignore[arg-type]
+
+
+def test_both_runs_are_classed_by_one_scale(runs: tuple[Path, ...]) -> None:
+    """The second run's scale counts for both, and that they differ is said; no class has changed."""
+    found = compare(runs[0], runs[2])
+    assert found.changed == ()
+    assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
+    assert (
+        found.remarks[-1]
+        == "The runs have different scales of severity; both are put into the classes of strict."
+    )
+    assert [fact.name for fact in found.facts if fact.differs] == ["scale of severity"]
+
+
+@pytest.mark.parametrize("order", [(0, 3), (3, 0)])
+def test_a_run_without_severity_changes_nothing(runs: tuple[Path, ...], order: tuple[int, int]) -> None:
+    """Where one run has no classes there is no change of severity, and a gate on it is refused."""
+    found = compare(*(runs[i] for i in order))
+    assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
+    assert "Severity is not compared: without has none." in found.remarks
+    with pytest.raises(MutatorError, match="without has no classes of severity"):
+        findings(found, [Gate.SEVERITY_S1])
