@@ -5,19 +5,22 @@ An answer links to the list of experiments, filtered to those it speaks of.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 from urllib.parse import quote
 
 import pandas as pd
 
 from mutator._common.text import counted
+from mutator.outcomes.ranking import worst
 from mutator.outcomes.rows import Row
-from mutator.report.ranking import SEVERITY, contact_measure, worst_first
 from mutator.report.studies import ReportedRun
 
 WORST = 10  # experiments that are listed as the most dangerous
 TYPES = 6  # fault types that an answer lists
 NO_ALERT, LATE = "no alert", "alert after the hazard"  # values of the page's filter `warning`
 FIRST = "alert before the hazard"
+MARGIN = "margin_"  # how the columns of margins to a hazard begin
+SEVERITY = "severity"  # column: S0 to S3, empty without contact
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +45,10 @@ Cell = str | Link | Part
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Listing:
-    """A small table; `numbers` are its columns that hold numbers."""
+    """A small table."""
 
     heads: tuple[str, ...]
     lines: Sequence[tuple[Cell, ...]]
-    numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,10 +77,12 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with the words for fault, hazards and warning."""
+    """The usable experiments with their place among the worst, and the words for fault, hazards, warning."""
     rows = {row.experiment_id: row for row in run.rows}
     shown = [rows[name] for name in run.frame["experiment_id"]]
+    place = {row.experiment_id: i for i, row in enumerate(worst(run.rows))}
     return run.frame.assign(
+        place=run.frame["experiment_id"].map(place),
         fault=[row.fault for row in shown],
         hazard_names=[", ".join(name for name, _ in row.hazards) for row in shown],
         warning=[warning(row) for row in shown],
@@ -116,20 +120,18 @@ def _warned(row: Row) -> str:
 
 def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_alerts: bool) -> Answer:
     """The worst experiments, and the fault types that end in a hazard most often."""
-    active, ranked = int(frame["is_activated"].sum()), worst_first(frame, metrics)
+    active = frame[frame["is_activated"]]
+    ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     contact = contact_measure(frame)
-    says = f"{share(len(ranked), active, 'activated faults')} led to a hazard."
+    says = f"{share(len(ranked), len(active), 'activated faults')} led to a hazard."
     if SEVERITY in frame:
-        says += f" {_classes(ranked)}."
+        says += f" By severity: {_classes(ranked)}."
     elif contact:
         hits = int((pd.to_numeric(ranked[contact]) > 0).sum())
         says += f" {share(hits, len(ranked), 'hazards')} came with contact."
-    sort = f"-{contact}" if contact else "t_hazard"
-    links = (
-        (Link(f"All {len(ranked):,} hazards", to_list({"outcome": ["hazard"]}, sort)),) if len(ranked) else ()
-    )
+    every = Link(f"All {len(ranked):,} hazards", to_list({"outcome": ["hazard"]}, "rank"))
     units = {name: unit for name, unit, *_ in metrics}
-    by_kind = _by_kind(ranked, frame[frame["is_activated"]])
+    by_kind = _by_kind(ranked, active)
     kinds = Listing(
         heads=("fault types, most hazards first", "hazards / activated"),
         lines=[
@@ -141,8 +143,13 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
         title="What is dangerous",
         says=says,
         listings=(_worst(ranked.head(WORST), units, has_alerts=has_alerts), kinds),
-        links=links,
+        links=(every,) if len(ranked) else (),
     )
+
+
+def contact_measure(frame: pd.DataFrame) -> str:
+    """The column that tells how hard a contact was, the better one first; '' if the target has none."""
+    return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
 
 
 def _classes(hazards: pd.DataFrame) -> str:
@@ -152,32 +159,37 @@ def _classes(hazards: pd.DataFrame) -> str:
     return ", ".join((*told, f"without contact {counts.get('', 0)}"))
 
 
-def _worst(worst: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool) -> Listing:
+def _worst(ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool) -> Listing:
     """The experiments with what tells how bad they are."""
-    contact = contact_measure(worst)
-    heads, numbers = ["the worst", "scenario", "hazards"], []
-    columns = [worst["scenario"], worst["hazard_names"]]
-    if SEVERITY in worst:
+    contact = contact_measure(ranked)
+    heads = ["the worst", "scenario", "hazards"]
+    columns = [ranked["scenario"], ranked["hazard_names"]]
+    if SEVERITY in ranked:
         heads.append("severity")
-        columns.append(worst[SEVERITY].replace("", "no contact"))
-    if contact:
-        numbers.append(len(heads))
-        heads.append(f"{contact.replace('_', ' ')} [{units.get(contact, '')}]")
-        columns.append(pd.to_numeric(worst[contact]).map(_number))
-    numbers.append(len(heads))
-    heads.append("hazard after [s]")
-    columns.append((worst["t_hazard"] - worst["t_activation"]).map(_number))
+        columns.append(ranked[SEVERITY].replace("", "-"))
+    if contact or any(name.startswith(MARGIN) for name in units):
+        heads.append("how bad")
+        told = [_how_bad(row, contact, units) for row in ranked.to_dict("records")]
+        columns.append(pd.Series(told, ranked.index, dtype=str))
+    heads.append("hazard after")
+    columns.append((ranked["t_hazard"] - ranked["t_activation"]).map("{:.2f} s".format))
     if has_alerts:
         heads.append("alert before")
-        columns.append(worst["warned"])
+        columns.append(ranked["warned"])
     links = [
-        Link(fault, f"e={name}") for fault, name in zip(worst["fault"], worst["experiment_id"], strict=True)
+        Link(fault, f"e={name}") for fault, name in zip(ranked["fault"], ranked["experiment_id"], strict=True)
     ]
-    return Listing(heads=tuple(heads), lines=list(zip(links, *columns, strict=True)), numbers=tuple(numbers))
+    return Listing(heads=tuple(heads), lines=list(zip(links, *columns, strict=True)))
 
 
-def _number(value: float) -> str:
-    return "-" if pd.isna(value) else f"{value:.2f}"
+def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
+    """`delta-v 6.70 m/s` of a contact, else the least margin to the hazards that came; '-': not known."""
+    if contact and row[contact] not in ("", "0.0"):
+        words = "delta-v" if contact == "delta_v" else "contact at"
+        return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"
+    names = [f"{MARGIN}{name.lower()}" for name in row["hazard_names"].split(", ")]
+    margins = [(float(row[name]), units[name]) for name in names if name in units and row[name] != ""]
+    return "margin {:.2f} {}".format(*min(margins)) if margins else "-"
 
 
 def unwarned(frame: pd.DataFrame) -> Answer:

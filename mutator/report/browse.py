@@ -21,6 +21,7 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, Experiment, Fault
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes.columns import is_text
+from mutator.outcomes.ranking import worst
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report import series as report_series
@@ -61,7 +62,13 @@ def browse_data(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "W
     series = [Markup(embedded(data, f"series-{name}")) for name, data in carried.items()]
     data = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
     data["table"], data["details"] = tables_of(folder, rows)
-    facts = {**_of_target(folder, workspace), "series": report_series.kept(out)}
+    facts = {
+        **_of_target(folder, workspace),
+        "series": report_series.kept(out),
+        "metrics": folder.head.get("metrics", []),
+        "severity": folder.head.get("severity"),
+        "hazards": folder.head.get("about_hazards", []),
+    }
     return Browse(
         facts=Markup(json.dumps(facts).replace("<", "\\u003c")),
         scripts=(*(Markup(embedded(value, name)) for name, value in data.items()), *series),
@@ -98,7 +105,7 @@ def reading_order(row: Row) -> tuple[str, ...]:
 
 def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bool = True) -> dict[str, Any]:
     """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
-    `warning`, `t_hazard`. Those of alerts only for a target that has `alerts`."""
+    `warning`, `rank` (1: the worst), `t_hazard`. Those of alerts only for a target that has `alerts`."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -109,6 +116,8 @@ def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bo
     columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
     if alerts:
         columns["warning"] = [warning(r) for r in rows]
+    place = {row.experiment_id: i for i, row in enumerate(worst(rows), 1)}
+    columns["rank"] = [str(place[r.experiment_id]) for r in rows]
     columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
     checked = sorted({name for r in rows for name in r.checked})
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]

@@ -20,6 +20,7 @@ SCRIPTS = (  # each uses those before it
     "filters.js",
     "heat.js",
     "grid.js",
+    "columns.js",
     "details.js",
     "series.js",
     "replay_formula.js",

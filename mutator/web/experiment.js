@@ -98,14 +98,41 @@ class Experiment {
     const at = (name) => this.table.number(this.row, name), begin = at("t_activation");
     const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in all)`],
       ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
-      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, `hazard ${hazard}`])]
+      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)])]
       .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
     if (!happened.length) return el("p", {}, "The fault was never active, and nothing came of it.");
     const reaction = at("reaction_time");
     return el("div", {}, el("table.events", {}, el("thead", {}, el("tr", {}, ["time [s]", "from activation [s]", "what"].map((t) => el("th", { scope: "col" }, t)))),
       el("tbody", {}, happened.map(([t, what]) => el("tr", {}, el("td.time", {}, t.toFixed(2)),
         el("td.time", {}, Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)}`), el("td", {}, what))))),
-      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time, from the first alert to the first hazard: ${reaction.toFixed(2)} s.`));
+      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time, from the first alert to the first hazard: ${reaction.toFixed(2)} s.`),
+      this.#severity(), this.#metrics());
+  }
+
+  /** A hazard in words: `hazard H1: contact with the vehicle ahead`. */
+  #hazard(name) {
+    const about = (this.facts.hazards || []).find((hazard) => hazard.name === name)?.about;
+    return `hazard ${name}${about ? `: ${about}` : ""}`;
+  }
+
+  /** The class of the contact, and what it means. */
+  #severity() {
+    const { el } = Dom;
+    const name = this.text("severity"), scale = this.facts.severity;
+    if (!name || !scale) return "";
+    const about = scale.classes.find(([of]) => of === name)?.[2];
+    return el("p", {}, el("b", {}, `Severity ${name}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
+      about ? `, ${about}` : "", ". ", el("span.quiet", {}, `${scale.name}, ${scale.source}`));
+  }
+
+  /** The metrics of this run, with their meaning. */
+  #metrics() {
+    const { el } = Dom;
+    const known = (this.facts.metrics || []).filter(([name]) => this.text(name) !== "");
+    if (!known.length) return "";
+    return el("details", {}, el("summary", {}, `Metrics (${known.length})`), el("div.scroll", { tabindex: 0 }, el("table.plain", {}, el("tbody", {},
+      known.map(([name, unit, about]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")),
+        el("td.number", {}, Grid.number(this.table.number(this.row, name))), el("td", {}, unit), el("td", {}, about)))))));
   }
 
   command(text) {

@@ -8,17 +8,17 @@ class Filters {
     this.facets = table.facets.map((facet) => this.#facet(facet)).filter(Boolean);
     place.append(...this.facets.map((f) => f.element));
     document.addEventListener("click", (event) => this.#closeOthers(event.target));
-    place.addEventListener("keydown", (event) => {
-      const open = event.key === "Escape" && event.target.closest("details[open]");
+    document.addEventListener("keydown", (event) => {
+      const open = event.key === "Escape" && event.target.closest("details.facet[open]");
       if (!open) return;
       open.open = false;
       open.querySelector("summary").focus();
-      event.stopPropagation();
+      event.preventDefault(); // not for an opened experiment, too
     });
   }
 
   #closeOthers(target) {
-    for (const { element } of this.facets) if (!element.contains(target)) element.open = false;
+    for (const element of document.querySelectorAll("details.facet[open]")) if (!element.contains(target)) element.open = false;
   }
 
   #facet(facet) {

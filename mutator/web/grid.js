@@ -15,6 +15,7 @@ class Grid {
     { name: "method", title: "method", px: 74 },
     { name: "trigger", title: "trigger", px: 86 },
     { name: "ending", title: "outcome", px: 112, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
+    { name: "severity", title: "severity", px: 78, narrow: true },
     { name: "t_activation", title: "activated", px: 86, time: true },
     { name: "t_manifest", title: "manifested", px: 100, time: true },
     { name: "hazards", title: "hazards", px: 72 },
@@ -30,25 +31,54 @@ class Grid {
     return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
   }
 
-  constructor(place, table, state) {
+  /** A number of whatever size in three digits; '' for none. */
+  static number(value) {
+    return Number.isNaN(value) ? "" : String(Number(value.toPrecision(3)));
+  }
+
+  constructor(place, table, state, metrics = []) {
     this.place = place;
     place.style.setProperty("--rows", table.count); // a short table has a low window
     this.table = table;
-    this.columns = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // alerts: not of every target
     this.state = state;
     this.rows = [];
     this.current = 0; // place in `rows` of the row that has the keyboard
     this.isOnPaper = false;
+    this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // alerts: not of every target
+    this.more = Grid.#more(table, metrics);
+    this.#choose();
     this.#build();
     place.addEventListener("scroll", () => this.#soon(), { passive: true });
     new ResizeObserver(() => this.#soon()).observe(place);
+  }
+
+  /** The columns of the table that the list does not show by itself, metrics with unit and meaning. */
+  static #more(table, metrics) {
+    const known = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
+    const names = [...table.columns.keys()].filter((name) => !Grid.COLUMNS.some((column) => column.name === name));
+    names.sort((a, b) => known.has(b) - known.has(a));
+    return names.map((name) => {
+      const { unit, about } = known.get(name) || {};
+      const title = name.replaceAll("_", " ") + (unit && unit !== "-" ? ` [${unit}]` : "");
+      const isNumber = Boolean(table.columns.get(name).numbers);
+      return { name, title, about, isNumber, px: Math.max(70, 24 + 7.5 * title.length) };
+    });
+  }
+
+  /** Take the columns of the state, or the usual ones. */
+  #choose() {
+    const wanted = this.state.columns;
+    this.chosen = wanted.join();
+    const all = [...this.usual, ...this.more];
+    const found = wanted.length ? all.filter((column) => wanted.includes(column.name)) : this.usual;
+    this.columns = found.length ? found : this.usual;
   }
 
   #build() {
     const { el } = Dom;
     this.heads = this.columns.map((column) => {
       const button = el("button", { type: "button", onclick: () => this.#sortBy(column.name) }, column.title, el("span.arrow", { "aria-hidden": "true" }));
-      return el(`th.${column.narrow ? "narrow" : "wide"}${column.time ? ".time" : ""}`, { scope: "col", style: `width: ${column.px}px`, "data-column": column.name }, button);
+      return el(`th.${Grid.#classes(column)}`, { scope: "col", style: `width: ${column.px}px`, "data-column": column.name, title: column.about }, button);
     });
     this.body = el("tbody");
     const width = this.columns.reduce((sum, column) => sum + column.px, 0);
@@ -61,6 +91,10 @@ class Grid {
     this.place.replaceChildren(this.element);
   }
 
+  static #classes(column) {
+    return `${column.narrow ? "narrow" : "wide"}${column.time || column.isNumber ? ".time" : ""}`;
+  }
+
   #sortBy(name) {
     const by = this.state.sort;
     this.state.set({ sort: by === name ? `-${name}` : by === `-${name}` ? "" : name });
@@ -69,6 +103,10 @@ class Grid {
   /** Show these rows; `experiment` has the keyboard, if it is among them. */
   show(rows) {
     this.rows = rows;
+    if (this.state.columns.join() !== this.chosen) {
+      this.#choose();
+      this.#build();
+    }
     const opened = this.state.experiment ? this.rows.indexOf(this.table.find(this.state.experiment)) : -1;
     if (opened >= 0) this.current = opened;
     this.current = Math.max(0, Math.min(this.current, rows.length - 1));
@@ -132,7 +170,8 @@ class Grid {
     const row = this.rows[at], id = this.table.text(row, "experiment_id");
     const isCurrent = at === this.current, isOpen = id === this.state.experiment;
     const cells = this.columns.map((column) => {
-      const classes = `td.${column.narrow ? "narrow" : "wide"}${column.time ? ".time" : ""}`;
+      const classes = `td.${Grid.#classes(column)}`;
+      if (column.isNumber) return el(classes, {}, Grid.number(this.table.number(row, column.name)));
       if (!column.time) return el(classes, {}, column.cell ? column.cell(this.table, row) : this.table.text(row, column.name));
       const value = this.table.number(row, column.name);
       return el(classes, {}, Number.isNaN(value) ? "" : value.toFixed(2));

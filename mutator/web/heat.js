@@ -1,27 +1,49 @@
 "use strict";
-// Fault type x scenario: a count of a count in each cell, as text and as colour. A cell filters.
+// Fault type x scenario: in each cell a count of a count, or a metric's median or worst value, as text and as colour.
+// A cell filters.
 
 class HeatMap {
   static ROW = "kind";
   static COLUMN = "scenario";
   /** Facets whose filters do not change the map: its own two, and results, which it counts itself. */
-  static FREE = ["kind", "scenario", "outcome", "status", "hazards", "alerts", "warning"];
+  static FREE = ["kind", "scenario", "outcome", "status", "severity", "hazards", "alerts", "warning", "reached", "stopped_at"];
 
-  constructor(place, picker, table, state) {
+  constructor(place, picker, table, state, metrics = []) {
     this.place = place;
     this.table = table;
     this.state = state;
     const find = (name) => table.facets.find((f) => f.name === name);
     this.rows = find(HeatMap.ROW);
     this.columns = find(HeatMap.COLUMN);
-    this.measures = HeatMap.measures(table);
-    picker.append(...this.measures.map((m) => Dom.el("option", { value: m.name }, m.title)));
+    const groups = [["Shares", HeatMap.shares(table)], ["Severity", HeatMap.severities(table)], ["Metrics of activated faults", HeatMap.values(table, metrics)]];
+    this.measures = groups.flatMap(([, measures]) => measures);
+    picker.append(...groups.filter(([, measures]) => measures.length).map(([label, measures]) =>
+      Dom.el("optgroup", { label }, measures.map((m) => Dom.el("option", { value: m.name }, m.title)))));
     picker.addEventListener("change", () => state.set({ heat: picker.value === this.measures[0].name ? "" : picker.value }));
     this.picker = picker;
   }
 
-  /** What can be shown: how many of which rows. */
-  static measures(table) {
+  /** How many of the activated faults had a contact of a class or a worse one. */
+  static severities(table) {
+    const found = table.facets.find((f) => f.name === "severity");
+    const classes = found ? found.values.filter((value) => value !== found.none).sort() : [];
+    return classes.map((name) => ({
+      name: `severity-${name}`, title: `${name} or worse / activated`,
+      part: (row) => table.text(row, "severity") >= name, of: (row) => table.text(row, "t_activation") !== "",
+    }));
+  }
+
+  /** Median and worst value of each metric, over activated faults. */
+  static values(table, metrics) {
+    const of = (row) => table.text(row, "t_activation") !== "";
+    return metrics.filter(([name]) => table.columns.get(name)?.numbers).flatMap(([name, unit, , worse]) => ["median", "worst"].map((which) => ({
+      name: `${which}-${name}`, title: `${which} ${name.replaceAll("_", " ")}${unit && unit !== "-" ? ` [${unit}]` : ""}`,
+      value: (row) => table.number(row, name), of, which, turn: worse === "higher" ? 1 : -1,
+    })));
+  }
+
+  /** What can be counted: how many of which rows. */
+  static shares(table) {
     const has = (name) => (row) => table.text(row, name) !== "";
     const isActive = has("t_activation"), isHazard = has("hazards"), isAlert = has("alerts"), all = () => true;
     const made = [
@@ -47,35 +69,50 @@ class HeatMap {
     this.picker.value = measure.name;
     if (!this.rows || !this.columns) return;
     const width = this.columns.values.length + 1, height = this.rows.values.length + 1;
-    const part = new Uint32Array(width * height), of = new Uint32Array(width * height);
+    const cells = Array.from({ length: width * height }, () => []);
     for (const row of rows) {
       if (!this.table.usable(row) || !measure.of(row)) continue;
+      const told = measure.value ? measure.value(row) : measure.part(row);
+      if (Number.isNaN(told)) continue; // a run that has no value of this metric
       const [y] = this.rows.members[this.rows.codes[row]], [x] = this.columns.members[this.columns.codes[row]];
-      const isPart = measure.part(row);
       // last row and column: all of them
-      for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) {
-        of[at]++;
-        if (isPart) part[at]++;
-      }
+      for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(told);
     }
-    this.#draw(measure, part, of, width, height);
+    this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width, height);
   }
 
-  #draw(measure, part, of, width, height) {
+  /** Text, words and colour (0 to 1) of a cell that counts. */
+  static #share(told) {
+    const all = told.length, n = told.filter(Boolean).length;
+    return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "", rate: all ? n / all : 0 };
+  }
+
+  /** The same of cells that sum up a metric: the worst of them has the full colour. */
+  static #summaries({ which, turn }, cells) {
+    const values = cells.map((told) => {
+      const sorted = told.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
+      if (!sorted.length) return NaN;
+      return which === "worst" ? sorted.at(-1) : (sorted[Math.floor(middle)] + sorted[Math.ceil(middle)]) / 2;
+    });
+    const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
+    const rate = (value) => (high > low && Number.isFinite(value) ? (turn > 0 ? value - low : high - value) / (high - low) : 0);
+    return values.map((value, at) => ({ all: cells[at].length, text: Grid.number(value), what: `${Grid.number(value)}, over ${cells[at].length}`, rate: rate(value) }));
+  }
+
+  #draw(measure, cells, width, height) {
     const { el } = Dom;
     const kinds = [...this.rows.values, null], scenarios = [...this.columns.values, null];
     const focused = this.place.contains(document.activeElement) ? document.activeElement.dataset.at : null;
     const cell = (y, x) => {
-      const at = y * width + x, n = part[at], all = of[at], rate = all ? n / all : 0;
-      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`;
-      const what = all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "none to count";
+      const { all, text, what, rate } = cells[y * width + x];
+      const where = `${kinds[y] || "all fault types"} in ${scenarios[x] || "all scenarios"}`, said = all ? what : "none to count";
       const isChosen = this.#isChosen(HeatMap.ROW, kinds[y]) && this.#isChosen(HeatMap.COLUMN, scenarios[x]);
       return el("td", {}, el("button.cell", {
         type: "button", "data-at": `${y},${x}`, "aria-pressed": String(isChosen && this.#isAny), style: `--rate: ${rate.toFixed(3)}`,
         class: `cell${all ? "" : " nothing"}${rate > 0.55 ? " strong" : ""}`,
-        title: `${where}\n${measure.title}: ${what}`, "aria-label": `${where}: ${measure.title} ${what}`,
+        title: `${where}\n${measure.title}: ${said}`, "aria-label": `${where}: ${measure.title} ${said}`,
         onclick: () => this.#choose(kinds[y], scenarios[x], isChosen && this.#isAny),
-      }, all ? `${n}/${all}` : "·"));
+      }, all ? text : "·"));
     };
     const head = el("tr", {}, el("td"), scenarios.map((s) => el("th", { scope: "col" }, s || "all")));
     const body = kinds.map((kind, y) =>

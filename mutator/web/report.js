@@ -20,9 +20,10 @@ const Report = (() => {
     const table = new Rows.Table(data);
     let drawn = null;
     const state = new State(() => update());
-    const heat = new HeatMap(find("heat"), find("measure"), table, state);
+    const heat = new HeatMap(find("heat"), find("measure"), table, state, given.metrics);
     const filters = new Filters(find("facets"), find("chips"), table, state);
-    const grid = new Grid(find("grid"), table, state);
+    const grid = new Grid(find("grid"), table, state, given.metrics);
+    const columns = new Columns(find("search").parentElement, grid, state);
     const actions = { move: (by) => grid.move(by), close, place: () => grid.placeOf(state.experiment) };
     const experiment = new Experiment(find("experiment"), table, state, facts, actions);
     const search = find("search"), wide = matchMedia(WIDE);
@@ -30,7 +31,7 @@ const Report = (() => {
 
     /** Show the state. Rows are found and sorted again only when what they depend on has changed. */
     function update() {
-      const key = JSON.stringify([state.query, [...state.chosen].map(([n, v]) => [n, [...v]]), state.sort, state.heat]);
+      const key = JSON.stringify([state.query, [...state.chosen].map(([n, v]) => [n, [...v]]), state.sort, state.heat, state.columns]);
       if (key !== drawn) {
         drawn = key;
         const { rows, apart, counts } = table.filter(state.query, state.chosen, HeatMap.FREE);
@@ -38,6 +39,7 @@ const Report = (() => {
         grid.show(sorted);
         heat.show(apart);
         filters.show(counts);
+        columns.show();
         find("found").textContent = state.isFiltered
           ? `${rows.length.toLocaleString("en")} of ${table.count.toLocaleString("en")} experiments`
           : `${table.count.toLocaleString("en")} experiment${table.count === 1 ? "" : "s"}`;

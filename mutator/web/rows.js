@@ -11,12 +11,18 @@ const Rows = (() => {
     { name: "trigger", title: "Trigger" },
     { name: "outcome", title: "Outcome", none: "no outcome" },
     { name: "status", title: "Status" },
+    { name: "severity", title: "Severity", none: "no contact" },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
     { name: "warning", title: "Warning", none: "no hazard" },
+    { name: "reached", title: "Reached", none: "not active" },
+    { name: "stopped_at", title: "Stopped at", none: "not stopped" },
   ];
   const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
     "ending", "hazards", "alerts", "detail"];
+
+  const COMPARISON = /^([a-z]\w*)(<=|>=|<|>|=)(.+)$/; // smallest_ttc<1, severity>=S2
+  const COMPARED = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b, "=": (a, b) => a === b };
 
   const number = (value) => (value === null ? NaN : Number(value)); // infinite ones are named
 
@@ -83,11 +89,23 @@ const Rows = (() => {
       return (row) => found.text(row).toLowerCase().includes(token);
     }
 
-    /** Which rows have all words of `query`, in whatever column; null: no query. */
+    /** `smallest_ttc<1` as a function of the row; null: no comparison with a column. An empty cell fits none. */
+    #comparison(token) {
+      const [, name, sign, wanted] = COMPARISON.exec(token) || [];
+      const found = this.columns.get(name), compare = COMPARED[sign];
+      if (!found) return null;
+      if (found.numbers) return Number.isNaN(Number(wanted)) ? null : (row) => compare(found.number(row), Number(wanted));
+      return (row) => found.text(row) !== "" && compare(found.text(row).toLowerCase(), wanted);
+    }
+
+    /** Which rows have all words of `query`, in whatever column, and fit its comparisons; null: no query. */
     #searched(query) {
       const tokens = query.toLowerCase().split(/\s+/).filter(Boolean);
       if (!tokens.length) return null;
-      const tests = tokens.map((token) => SEARCHED.map((name) => this.#has(name, token)).filter(Boolean));
+      const tests = tokens.map((token) => {
+        const fits = this.#comparison(token);
+        return fits ? [fits] : SEARCHED.map((name) => this.#has(name, token)).filter(Boolean);
+      });
       const found = new Uint8Array(this.count);
       for (let row = 0; row < this.count; row++) {
         found[row] = tests.every((any) => any.some((has) => has(row))) ? 1 : 0;

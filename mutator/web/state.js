@@ -1,6 +1,6 @@
 "use strict";
 // What is shown, kept in the address behind #, so that it can be shared and Back goes back:
-// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=warned
+// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=warned&cols=kind,delta_v
 
 class State {
   /** `changed(state)` is called after every change, whoever made it. */
@@ -37,6 +37,7 @@ class State {
     this.query = one("q", "");
     this.sort = one("sort", "");
     this.heat = one("heat", "");
+    this.columns = (given.get("cols") || []).filter(Boolean); // of the list; none: those it has by itself
     this.chosen = new Map();
     for (const { name } of Rows.FACETS) if (given.has(name)) this.chosen.set(name, new Set(given.get(name)));
   }
@@ -53,10 +54,11 @@ class State {
     }
     if (this.sort) add("sort", [this.sort]);
     if (this.heat) add("heat", [this.heat]);
+    if (this.columns.length) add("cols", this.columns);
     return parts.join("&");
   }
 
-  /** Change something (`{query, sort, heat, experiment}`); `replace`: a step too small for Back. */
+  /** Change something (`{query, sort, heat, columns, experiment}`); `replace`: a step too small for Back. */
   set(change, { replace = false } = {}) {
     Object.assign(this, change);
     this.#write(replace);

@@ -5,6 +5,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -207,6 +208,49 @@ def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]
     page.choose("method", "guided")
     guided = [row for row in used if row["method"] == "guided"]
     assert page.page.inner_text(cell).endswith(f"/{len(guided)}")
+
+
+MEDIANS = """async () => {
+    const table = new Rows.Table(await Packed.read("table"));
+    const place = document.createElement("div"), picker = document.createElement("select");
+    const state = { heat: "median-t_activation", chosen: new Map(), set() {} };
+    const metrics = [["t_activation", "s", "", "higher"]];
+    new HeatMap(place, picker, table, state, metrics).show(table.filter("", new Map()).rows);
+    const cell = place.querySelector('[aria-label^="all fault types in all scenarios"]');
+    return [cell.textContent, [...picker.querySelectorAll("option")].map((o) => o.textContent)];
+}"""
+
+
+def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
+    """Over the activated faults; medians and worst values can be chosen beside the shares."""
+    used = [row for row in rows if row["status"] != "harness_error"]
+    times = [float(row["t_activation"]) for row in used if row["t_activation"]]
+    text, options = page.page.evaluate(MEDIANS)
+    assert float(text) == pytest.approx(median(times), rel=1e-2)
+    assert options[-2:] == ["median t activation [s]", "worst t activation [s]"]
+
+
+def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict[str, str]]) -> None:
+    """A chosen column is shown, sorted by and in the address; a comparison in the search leaves what fits."""
+    page.page.click("summary:has-text('Columns')")
+    page.page.check(".option:has-text('max dev gas') input")
+    page.page.uncheck(".option:has-text('variant') input")
+    page.page.keyboard.press("Escape")
+    assert page.column("max_dev_gas")[0] != ""
+    assert page.page.locator('#grid th[data-column="variant"]').count() == 0
+    assert "max_dev_gas" in page.fragment and "cols=" in page.fragment
+    page.page.fill("#search", "max_dev_gas>=1.5 scenario=b")
+    fit = [r for r in rows if r["max_dev_gas"] and float(r["max_dev_gas"]) >= 1.5 and r["scenario"] == "B"]
+    page.wait_for_rows(len(fit))
+    assert 0 < len(fit) < COUNT
+    page.page.click('#grid th[data-column="max_dev_gas"] button')
+    shown, fragment = page.column("max_dev_gas"), page.fragment
+    assert [float(text) for text in shown] == sorted(float(text) for text in shown)
+    page.open(fragment)
+    assert page.column("max_dev_gas") == shown
+    page.page.click("summary:has-text('Columns')")
+    page.page.click("text=The usual ones")
+    assert page.page.locator('#grid th[data-column="variant"]').count() == 1
 
 
 def test_a_shared_link_shows_the_same(page: "Page") -> None:

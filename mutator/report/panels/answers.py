@@ -1,5 +1,7 @@
 """The first thing a report says: answers to what a reader asks first."""
 
+import re
+
 from markupsafe import Markup
 
 from mutator._common.tables import Table
@@ -39,7 +41,7 @@ def answers_panel(run: ReportedRun) -> Panel:
 
 def _table(listing: Listing) -> Table:
     rows = [[cell if isinstance(cell, str) else cell.text for cell in line] for line in listing.lines]
-    return Table(heads=listing.heads, rows=rows, right=listing.numbers)
+    return Table(heads=listing.heads, rows=rows)
 
 
 def _html(listing: Listing) -> Markup:
@@ -51,7 +53,7 @@ def _html(listing: Listing) -> Markup:
         ]
         for line in listing.lines
     ]
-    return Table(heads=listing.heads, rows=rows, right=listing.numbers).as_html("plain")
+    return Table(heads=listing.heads, rows=rows).as_html("plain")
 
 
 def _labelled(head: str, cell: str) -> str:
@@ -60,7 +62,10 @@ def _labelled(head: str, cell: str) -> str:
 
 def _cell(cell: Cell) -> str:
     if isinstance(cell, Link):
-        return Markup('<a href="#{}">{}</a>').format(cell.to, cell.text)
+        text = Markup("<wbr>").join(
+            re.split(r"(?<=[/_])", cell.text)
+        )  # where a long name may go on in the next line
+        return Markup('<a href="#{}">{}</a>').format(cell.to, text)
     if isinstance(cell, Part):
         return Markup(_BAR).format(cell.part / cell.of if cell.of else 0.0, cell.text)
     return cell

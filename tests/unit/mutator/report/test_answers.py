@@ -79,15 +79,15 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
         Link("car/speed/x", f"e={'4' * 16}"),
         Link("car/speed/x", f"e={'3' * 16}"),
     ]
-    assert worst.heads[3:] == ("contact speed [m/s]", "hazard after [s]", "alert before")
+    assert worst.heads[3:] == ("how bad", "hazard after", "alert before")
     assert [line[3:] for line in worst.lines] == [
-        ("9.00", "4.00", "fcw, 1.0 s"),
-        ("4.00", "3.00", "none"),
-        ("-", "7.00", "none"),
-        ("-", "5.00", "too late"),
+        ("contact at 9.00 m/s", "4.00 s", "fcw, 1.0 s"),
+        ("contact at 4.00 m/s", "3.00 s", "none"),
+        ("margin -0.50 m", "7.00 s", "none"),
+        ("margin -0.25 m", "5.00 s", "too late"),
     ]
     assert [line[1] for line in kinds.lines] == [Part(2, 3, "2 of 3"), Part(2, 3, "2 of 3")]
-    assert answer.links == (Link("All 4 hazards", "outcome=hazard&sort=-contact_speed"),)
+    assert answer.links == (Link("All 4 hazards", "outcome=hazard&sort=rank"),)
 
 
 def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> None:
