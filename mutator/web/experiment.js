@@ -109,7 +109,7 @@ class Experiment {
       this.#severity(), this.#metrics());
   }
 
-  /** A hazard in words: `hazard H1: contact with the vehicle ahead`. */
+  /** A hazard with its meaning, where the manifest gives one. */
   #hazard(name) {
     const about = (this.facts.hazards || []).find((hazard) => hazard.name === name)?.about;
     return `hazard ${name}${about ? `: ${about}` : ""}`;

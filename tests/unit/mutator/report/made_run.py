@@ -89,7 +89,7 @@ def make_run(folder: Path, **head: object) -> Path:
 class Page(HTMLParser):
     """Text and links of a page; fails on tags that are not closed in order."""
 
-    VOID = ("meta", "link", "br", "img", "input")
+    VOID = ("meta", "link", "br", "img", "input", "wbr")
 
     def __init__(self, text: str) -> None:
         super().__init__()
