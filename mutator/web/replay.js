@@ -21,15 +21,11 @@ const Replay = (() => {
       this.axes = this.channels.map((channel) => ReplayData.range(channel, ReplayData.until(series)));
       const at = Math.max(series.start, (series.active?.[0] ?? series.marks[0]?.[1] ?? series.start) - BEFORE);
       this.clock = new ReplayClock({ start: series.start, end: series.end, stops: series.tEnd === null ? [] : [series.tEnd], steps: ReplayData.steps(series), at },
-        () => this.#draw());
+        () => this.draw());
       this.scene = this.#scene();
       this.#build();
       this.plots.begin();
-      new ResizeObserver(() => {
-        this.plots.width = this.drawn = 0;
-        this.clock.redraw();
-      }).observe(this.root);
-      for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => this.clock.redraw());
+      new ResizeObserver(() => this.clock.redraw()).observe(this.root);
     }
 
     /** The scene, where the target has one and its formulas can be evaluated over this series. */
@@ -57,7 +53,9 @@ const Replay = (() => {
       this.states = el("span.states");
       this.live = el("p.visually-hidden", { "aria-live": "polite" });
       this.root = el("div.replay-player", { role: "group", "aria-label": "Replay. Space plays, arrows step, Shift and an arrow goes a second.",
-        onkeydown: (event) => this.#key(event) },
+        onkeydown: (event) => this.#key(event), onpointerdown: ({ target }) => {
+          if (!target.closest("button, select")) this.bar.element.focus({ preventScroll: true }); // for the keys
+        } },
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
         this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,
         this.gauges.element, this.plots.element, this.live);
@@ -67,10 +65,7 @@ const Replay = (() => {
     #view() {
       if (!this.scene) return null;
       const about = this.facts.scene.actors.map(({ name, about: what }) => what || name).join(", ");
-      this.canvas = Dom.el("canvas.scene", { role: "img", "aria-label": `The drive from above: ${about}. Golden run as an outline.`, onclick: () => {
-        this.clock.toggle();
-        this.bar.element.focus({ preventScroll: true });
-      } });
+      this.canvas = Dom.el("canvas.scene", { role: "img", "aria-label": `The drive from above: ${about}. Golden run as an outline.`, onclick: () => this.clock.toggle() });
       return this.canvas;
     }
 
@@ -108,13 +103,13 @@ const Replay = (() => {
 
     /** The state at a time in words. */
     describe(t) {
-      const { series } = this, words = [`${t.toFixed(2)} s`, ...this.#stateAt(t).map(([, text]) => text)];
+      const words = [`${t.toFixed(2)} s`, ...this.#stateAt(t).map(([, text]) => text)];
       const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.held(c, "faulty", t), ReplayData.held(c, "golden", t)));
       for (const channel of (differ.length ? differ : this.channels).slice(0, SPOKEN)) {
         const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.held(channel, run, t), places);
-        words.push(`${channel.name} ${of("faulty")} ${ReplayData.unit(channel)}${differ.length ? `, golden ${of("golden")}` : ""}`.trim());
+        words.push([channel.name, of("faulty"), ReplayData.unit(channel), differ.length ? `(golden ${of("golden")})` : ""].filter(Boolean).join(" "));
       }
-      return `${words.join(", ")}${differ.length || t < series.start ? "" : ", as golden"}`;
+      return `${words.join(", ")}${differ.length ? "" : ", as golden"}`;
     }
 
     /** [kind, text] of what is so at a time: fault active, the last alert, hazards, the end. */
@@ -133,7 +128,7 @@ const Replay = (() => {
     }
 
     /** Draw the time of the clock: all that is shown follows from it. */
-    #draw() {
+    draw() {
       if (!this.root.isConnected) return this.clock.pause();
       const { clock, series } = this, { t, isPlaying } = clock, now = performance.now(), colours = ReplayColours.now();
       const isAfter = series.tEnd !== null && t > series.tEnd + ReplayData.TINY;
@@ -151,8 +146,8 @@ const Replay = (() => {
 
     #drawScene(t, colours) {
       const width = this.root.clientWidth, height = Math.round(Math.min(260, Math.max(160, width * 0.27)));
-      if (this.drawn !== width) {
-        this.drawn = width;
+      if (this.drawn !== width || this.colours !== colours) {
+        Object.assign(this, { drawn: width, colours });
         this.context = ReplayColours.fitted(this.canvas, width, height);
       }
       this.scene.draw(this.context, width, height, t, colours);
@@ -185,9 +180,16 @@ const Replay = (() => {
     }
   }
 
-  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` of the page: scene, hazards. */
+  let current = null;
+  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => current?.draw());
+
+  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` of the page: scene, hazards. Returns the player, null
+   *  for a series without channels. */
   function show(place, series, facts) {
-    return new Player(place, series, facts);
+    current?.clock.pause();
+    current = series.channels.length ? new Player(place, series, facts) : null;
+    if (!current) place.replaceChildren(Dom.el("p.quiet", {}, "The series of this experiment has no channel."));
+    return current;
   }
 
   return { show, rate: 0 };

@@ -81,9 +81,9 @@ class ReplayClock {
     const passed = this.#last === null ? 0 : Math.min(ReplayClock.CALM, now - this.#last); // a page in the back gets no frames
     this.#last = now;
     const from = this.t, to = Math.min(this.end, from + (passed / 1000) * this.speed);
-    const stop = this.stops.find((t) => from < t - ReplayData.TINY && to >= t);
-    this.t = stop ?? to;
-    if (stop !== undefined || this.t >= this.end) this.isPlaying = false;
+    const stop = this.stops.map((t) => t - ReplayData.TINY).findIndex((t) => from < t && to >= t);
+    this.t = this.stops[stop] ?? to;
+    if (stop >= 0 || this.t >= this.end) this.isPlaying = false;
     this.#frames.push(now);
     while (now - this.#frames[0] > 1000) this.#frames.shift();
     const span = now - this.#frames[0];

@@ -2,17 +2,21 @@
 // The colours of the page for canvases, light or dark as it is, and canvases as sharp as the screen.
 
 const ReplayColours = (() => {
-  let made = null;
-  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => (made = null));
+  const modes = ["(prefers-color-scheme: dark)", "print"].map((query) => matchMedia(query)), made = new Map();
 
   /** Colours by name; the same object until they change. */
   function now() {
-    if (made) return made;
+    const mode = modes.map(({ matches }) => matches).join();
+    if (!made.has(mode)) made.set(mode, read());
+    return made.get(mode);
+  }
+
+  function read() {
     const style = getComputedStyle(document.documentElement), of = (name) => style.getPropertyValue(`--${name}`).trim();
     const names = ["golden", "faulty", "hazard", "ink", "quiet", "line", "raised", "road", "verge", "post", "paint", "other", "glass", "edge", "halo", "burst",
       "active", "after", "late", "between", "belief"];
-    made = Object.fromEntries(names.map((name) => [name, of(`replay-${name}`) || of(name)]));
-    return Object.assign(made, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), activation: of("ink"), goldenText: of("accent") });
+    const found = Object.fromEntries(names.map((name) => [name, of(`replay-${name}`) || of(name)]));
+    return Object.assign(found, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), activation: of("ink"), goldenText: of("accent") });
   }
 
   /** The context of a canvas of so many CSS pixels, made anew and empty. */

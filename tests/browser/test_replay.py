@@ -1,0 +1,275 @@
+"""The replay of an experiment: what it shows at a time, and how the time is changed."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from .conftest import Page
+
+# A car that hits the one ahead at 4 s because its fault keeps it from braking from 2 s on.
+STEPS, DT, BEGIN, END = 121, 0.05, 2.0, 4.0
+TIMES = [i * DT for i in range(STEPS)]
+SPEED = {"golden": [20.0 - 4.0 * max(0.0, t - BEGIN) for t in TIMES], "faulty": [20.0 for _ in TIMES]}
+GAP = {
+    "golden": [40.0 - 5.0 * t for t in TIMES],
+    "faulty": [40.0 - 5.0 * t - (7.5 * (t - BEGIN) ** 2 if t > BEGIN else 0.0) for t in TIMES],
+}
+BRAKE = {"golden": [min(1.0, max(0.0, t - BEGIN)) for t in TIMES], "faulty": [0.0 for _ in TIMES]}
+CALM = {"golden": [math.sin(t) for t in TIMES], "faulty": [math.sin(t) for t in TIMES]}
+SERIES = {
+    "id": "0" * 16,
+    "start": 0.0,
+    "end": TIMES[-1],
+    "tEnd": END,
+    "active": [BEGIN, 5.5],
+    "marks": [
+        ["activation", BEGIN, "activated"],
+        ["manifest", 2.05, "manifested"],
+        ["alert", 3.0, "brake_hard"],
+        ["hazard", END, "H1"],
+    ],
+    "channels": [
+        {"name": name, "unit": unit, "role": role, "component": "", "about": "", "t": TIMES, **values}
+        for name, unit, role, values in (
+            ("gap", "m", "truth", GAP),
+            ("speed", "m/s", "truth", SPEED),
+            ("calm", "-", "internal", CALM),
+            ("brake", "-", "actuator", BRAKE),
+        )
+    ],
+}
+ACTOR = {"shape": "box", "length": 4.0, "width": 2.0, "y": 0.0, "heading": 0.0, "visible": True, "about": ""}
+SCENE = {
+    "follow": "car",
+    "speed": "speed",
+    "actors": [
+        ACTOR | {"name": "car", "x": -2.0, "believed": False},
+        ACTOR | {"name": "ahead", "x": ["+", "gap", 2.0], "believed": False},
+    ],
+    "lines": [
+        {"name": n, "points": [], "y": y, "dashed": False} for n, y in (("left", 2.0), ("right", -2.0))
+    ],
+}
+FACTS = {"scene": SCENE, "hazards": [{"name": "H1", "about": "the car hits the one ahead", "terminal": True}]}
+SHOW = """([series, facts]) => {
+    for (const channel of series.channels) {
+        channel.t = Float64Array.from(channel.t);
+        for (const run of ["golden", "faulty"]) channel[run] = Float32Array.from(channel[run]);
+    }
+    const place = document.createElement("div");
+    document.body.replaceChildren(place);
+    window.told = [];
+    document.body.addEventListener("replay-time", (event) => window.told.push(event.detail.t));
+    window.player = Replay.show(place, series, facts);
+}"""
+T = "Number(document.querySelector('.replay-player').dataset.t)"
+
+
+class Replayed:
+    """A replay alone in a page."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+
+    def show(self, facts: dict[str, Any]) -> None:
+        self.page.evaluate(SHOW, [SERIES, facts])
+        self.page.wait_for_function(f"{T} >= 0")
+
+    @property
+    def t(self) -> float:
+        self.settle()
+        return float(self.page.evaluate(T))
+
+    def settle(self) -> None:
+        """Wait until what is due is drawn."""
+        frames = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        self.page.evaluate(frames)
+
+    def press(self, *keys: str) -> None:
+        for key in keys:
+            self.page.keyboard.press(key)
+        self.settle()
+
+    def text(self, selector: str) -> str:
+        self.settle()
+        return str(self.page.inner_text(selector))
+
+    def pixels(self, selector: str) -> set[tuple[int, ...]]:
+        """The opaque colours of a canvas."""
+        script = """(canvas) => {
+            const { width, height } = canvas, copy = new OffscreenCanvas(width, height), found = new Set();
+            const context = copy.getContext("2d", { willReadFrequently: true });
+            context.drawImage(canvas, 0, 0);
+            const { data } = context.getImageData(0, 0, width, height);
+            for (let i = 0; i < data.length; i += 4) {
+                if (data[i + 3] === 255) found.add(data.slice(i, i + 3).join());
+            }
+            return [...found];
+        }"""
+        return {tuple(map(int, text.split(","))) for text in self.page.eval_on_selector(selector, script)}
+
+
+@pytest.fixture(scope="module")
+def replayed(browser: Any, run: "Path") -> Iterator[Replayed]:
+    """The replay on a wide screen in a page that may move."""
+    context = browser.new_context(viewport={"width": 1000, "height": 900}, reduced_motion="no-preference")
+    page, errors = context.new_page(), list[str]()
+    page.on("console", lambda m: errors.append(m.text) if m.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((run / "report" / "index.html").as_uri())
+    page.wait_for_selector("html[data-ready]")
+    made = Replayed(page)
+    made.show(FACTS)
+    yield made
+    context.close()
+    assert errors == []
+
+
+def seek(replayed: Replayed, t: float) -> None:
+    replayed.page.evaluate("(t) => { player.clock.pause(); player.clock.seek(t); }", t)
+    replayed.page.focus(".timebar")
+    replayed.settle()
+
+
+def test_it_waits_shortly_before_the_activation(browser: Any, replayed: Replayed) -> None:
+    """Nothing plays by itself; the scene and the plots of what differs are there, actuators come first."""
+    replayed.show(FACTS)
+    assert replayed.t == BEGIN - 1.0
+    assert not replayed.page.evaluate("player.clock.isPlaying")
+    assert replayed.page.is_visible("canvas.scene")
+    names = "all => all.map((e) => e.getAttribute('aria-label'))"
+    gauges = replayed.page.eval_on_selector_all(".gauge", names)
+    assert gauges[0] == "Plot of brake"
+    plots = replayed.page.eval_on_selector_all(".plot-of", "all => all.map((e) => e.dataset.channel)")
+    assert sorted(plots) == ["brake", "gap", "speed"]
+
+
+def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
+    """An arrow is a sample, with Shift a second; End is the end of the drive; the page's events follow."""
+    seek(replayed, 1.0)
+    replayed.press("ArrowRight")
+    assert replayed.t == 1.05
+    replayed.press("Shift+ArrowRight", "ArrowLeft")
+    assert replayed.t == 2.0
+    assert replayed.page.evaluate("told.at(-1)") == 2.0
+    assert replayed.text(".state") == "2.00 s\nfault active"
+    replayed.press("End")
+    assert replayed.t == END
+    replayed.press("Home")
+    assert replayed.t == 0.0
+    assert replayed.text(".state") == "0.00 s\nfault not active yet"
+
+
+def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replayed) -> None:
+    """A drag to the middle is half of the run, a mark's button goes there, and the bar says the state."""
+    bar = replayed.page.locator(".timebar").bounding_box()
+    y = bar["y"] + bar["height"] / 2
+    replayed.page.mouse.move(bar["x"] + 5, y)
+    replayed.page.mouse.down()
+    replayed.page.mouse.move(bar["x"] + bar["width"] / 2, y, steps=3)
+    replayed.page.mouse.up()
+    assert abs(replayed.t - TIMES[-1] / 2) < 0.02
+    assert replayed.page.locator(".timebar .mark").count() == 4
+    replayed.page.click(".jump:has-text('brake_hard')")
+    assert replayed.t == 3.0
+    told = replayed.page.get_attribute(".timebar", "aria-valuetext")
+    assert told.startswith("3.00 s, fault active, brake_hard, brake 0.000 (golden 1.000)")
+    assert "gap 17.5" in told
+
+
+def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
+    """At the time of the replay, and where the pointer is, without going there."""
+    seek(replayed, 3.0)
+    at = TIMES.index(3.0)
+    head = '.plot-of[data-channel="gap"] .value'
+    assert replayed.text(f"{head}.golden") == f"{GAP['golden'][at]:.2f}"
+    assert replayed.text(f"{head}.faulty") == f"{GAP['faulty'][at]:.2f}"
+    assert replayed.text(f"{head}.by") == "−7.50"
+    room = replayed.page.locator('.plot-of[data-channel="gap"] .room').bounding_box()
+    replayed.page.mouse.move(room["x"] + room["width"] / 2, room["y"] + 30)
+    looked = float(replayed.text(".plots .told").removesuffix(" s"))
+    assert 1.0 < looked < 3.0
+    index = next(i for i in reversed(range(STEPS)) if TIMES[i] <= looked + 0.005)
+    assert replayed.text(f"{head}.golden") in {f"{GAP['golden'][i]:.2f}" for i in (index - 1, index)}
+    assert replayed.t == 3.0
+    replayed.page.mouse.move(5, 5)
+
+
+def test_plots_are_chosen_and_zoomed(replayed: Replayed) -> None:
+    """An instrument is the switch of its plot; + and 0 zoom, and the bar shows which part is seen."""
+    replayed.page.click(".gauge:has-text('calm')")
+    assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 1
+    assert replayed.page.get_attribute(".gauge:has-text('calm')", "aria-pressed") == "true"
+    replayed.page.click(".gauge:has-text('calm')")
+    assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 0
+    seek(replayed, 3.0)
+    replayed.press("0")
+    assert not replayed.page.is_visible(".timebar .window")
+    replayed.press("+", "+")
+    assert replayed.page.is_visible(".timebar .window")
+    view = replayed.page.evaluate("player.plots.view")
+    assert view["to"] - view["from"] == pytest.approx(TIMES[-1] / 1.6**2)
+    assert view["from"] < 3.0 < view["to"]
+
+
+def vivid(colours: set[tuple[int, ...]]) -> bool:
+    return any(max(colour) - min(colour) > 60 for colour in colours)
+
+
+def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
+    """Up to the end the lines have colours; later there are none in the plots, and the scene is marked so."""
+    seek(replayed, END)
+    assert replayed.text(".state").endswith("H1: the car hits the one ahead")
+    assert replayed.page.locator(".is-after").count() == 0
+    seek(replayed, END + 0.05)
+    assert replayed.text(".state").endswith("after the end of the drive")
+    assert replayed.page.locator(".is-after canvas.scene").count() == 1
+    room = 'canvas[aria-label^="gap"]'
+    replayed.page.evaluate("player.plots.view = { from: 1, to: 3 }; player.plots.width = 0; player.draw()")
+    assert vivid(replayed.pixels(room))
+    replayed.page.evaluate("player.plots.view = { from: 4.2, to: 6 }; player.plots.width = 0; player.draw()")
+    assert not vivid(replayed.pixels(room))
+
+
+def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
+    """It pauses at the end of the drive, and goes on if asked to; its frame rate is said."""
+    replayed.show(FACTS)
+    seek(replayed, 2.2)
+    replayed.press(" ")
+    replayed.page.wait_for_function("!player.clock.isPlaying")
+    rate = float(replayed.page.get_attribute(".replay-player", "data-rate"))
+    print(f"replay: {rate:.0f} frames a second")
+    assert replayed.t == END
+    assert rate > 0
+    replayed.press(" ")
+    assert replayed.page.evaluate("player.clock.isPlaying")
+    replayed.page.wait_for_function(f"{T} > {END}")
+    replayed.press(" ")
+    assert not replayed.page.evaluate("player.clock.isPlaying")
+
+
+def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) -> None:
+    """Neither a missing scene nor one with a channel that the series lacks takes anything else away."""
+    replayed.show(FACTS | {"scene": None})
+    assert replayed.page.locator("canvas.scene").count() == 0
+    assert replayed.page.locator(".gauge").count() == 4
+    replayed.show(FACTS | {"scene": SCENE | {"speed": "v_ego"}})
+    assert "The scene cannot be drawn: no channel v_ego." in replayed.text(".replay-player")
+    assert replayed.page.locator(".plot-of").count() == 3
+
+
+def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> None:
+    """Playing goes in steps of half a second."""
+    page.page.evaluate(SHOW, [SERIES, FACTS])
+    page.page.click(".replay-player .play")
+    page.page.wait_for_function(f"{T} > 2")
+    page.page.click(".replay-player .play")
+    steps = page.page.evaluate("[...new Set(told)]")
+    assert len(steps) <= 5
+    assert all(b - a > 0.4 for a, b in pairwise(steps[1:]))
