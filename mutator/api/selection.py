@@ -1,6 +1,7 @@
 """From what a user types to a workspace, a target, faults and triggers."""
 
 import dataclasses
+import warnings
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +10,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 from mutator._common.arguments import check_number, check_whole
-from mutator.errors import MutatorError
+from mutator.campaigns.plan_warnings import changes_nothing
+from mutator.config import units
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.specs import FaultSpec, Variant
@@ -73,12 +76,17 @@ class Bench:
         return self.workspace.fault_models()
 
     def faults(self, choice: FaultChoice) -> tuple[Fault, ...]:
-        """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line."""
+        """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line.
+        MutatorWarning for a chosen value that changes nothing, or that the spec does not declare."""
         check_whole("seed", 0 if choice.seed is None else choice.seed)
-        spec = choice.narrowed(self.workspace.spec(choice.spec))
+        declared = self.workspace.spec(choice.spec)
+        spec = choice.narrowed(declared)
         for problem in check_spec(spec, self.models, self.manifest):
             raise problem
-        return expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
+        faults = expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
+        if choice.value is not None:
+            _warn_of_value(choice.value, declared, faults, self.models)
+        return faults
 
     def fault(
         self, given: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
@@ -159,6 +167,26 @@ def _split(name: str) -> tuple[str, str | None]:
     if len(parts) == 3 and not name.endswith((".yaml", ".yml")):
         return "/".join(parts[:2]), parts[2]
     return name, None
+
+
+def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault], models: FaultModels) -> None:
+    """Warn of a value that somebody chose for these faults."""
+    idle = [fault.label for fault in faults if changes_nothing(fault, models)]
+    if idle:
+        warnings.warn(f"{', '.join(idle)} changes nothing", MutatorWarning, stacklevel=4)
+    outside = []
+    for variant in declared:
+        if variant.draw and f"{declared.name}/{variant.name}" in {fault.spec for fault in faults}:
+            low, high = variant.draw.bounds
+            unit = f" {units.UNITS[variant.draw.unit].symbol}" if variant.draw.unit else ""
+            if not low <= value <= high:
+                outside.append(f"{declared.name}/{variant.name}, {low:g} to {high:g}{unit}")
+    if outside:
+        warnings.warn(
+            f"value {value:g} is outside of what the spec declares: {'; '.join(outside)}",
+            MutatorWarning,
+            stacklevel=4,
+        )
 
 
 def _with_value(spec: FaultSpec, variant: Variant, value: float) -> Variant:

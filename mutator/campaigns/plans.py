@@ -20,6 +20,7 @@ from mutator.campaigns.campaign_files import Campaign, check_readings, load_camp
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.plan_warnings import warn_of_values
 from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
@@ -154,7 +155,8 @@ class Plan:
 def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
     """Expand a campaign (a name of the library or a file) into its plan; nothing is written or run.
 
-    MutatorError for a choice that does not fit the campaign, and when no experiment is left.
+    MutatorError for a choice that does not fit the campaign, and when no experiment is left; MutatorWarning
+    for values that change nothing.
     """
     choices = Choices() if choices is None else choices
     check_type("choices", choices, Choices, "mutator.Choices")
@@ -169,6 +171,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
     once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
+    warn_of_values(experiments, workspace.fault_models())
     canary = expansion.canary()
     chunks = cut_runs(once, loaded.chunk)
     if choices.shard is not None and Shard.parse(choices.shard).of > len(chunks):

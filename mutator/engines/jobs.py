@@ -37,7 +37,8 @@ class Job:
     injections: tuple[str, ...] = ()  # ids that it must report on
     hash_seed: int = 0
     golden: Path | None = None  # output folder of the run without the fault, where it is known
-    watch: bool = False  # note calls that keep a target from being deterministic, and what the probe observes
+    observe: bool = False  # keep what the probe observes
+    watch: bool = False  # the same, and note calls that keep a target from being deterministic
 
     def problem_of(self, report: object) -> str:
         """What is wrong with what its probe reported; empty if nothing is, or if it has no probe."""
@@ -82,7 +83,8 @@ class Execution:
     report if the tree has one; `log` the tail of what the run printed. `mode` says how it was carried out,
     and `why` another engine did it than the one that was asked; `start` is the step before which the golden
     run did its work. `modules` are the top-level modules that the run imported from neither its
-    package nor the standard library, `watched` what a watched one noted (of the reference engine alone).
+    package nor the standard library, `watched` what a watched one noted, and what its probe observed
+    (`seen`), of the reference engine alone.
     """
 
     status: Status

@@ -137,13 +137,14 @@ class ReferenceEngine:
             "memory_mb": self.limits.memory_mb,
             "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
-            "watch": self._watch() if job.watch else None,
+            "watch": job.watch,
+            "observe": self._observed() if job.watch or job.observe else None,
         }
         path = folder / "job.json"
         path.write_text(json.dumps(request), encoding="utf-8")
         return path
 
-    def _watch(self) -> tuple[str, list[str]]:
+    def _observed(self) -> tuple[str, list[str]]:
         """Where a probe keeps what it observes, and the names of the observed values."""
         holder, _ = state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]

@@ -65,7 +65,7 @@ def endings(outcomes: Counter[str]) -> str:
 
 def remaining(progress: "Progress") -> str:
     """How long the stage will still take, when that is known."""
-    return "" if progress.remaining_s is None else f"{duration(progress.remaining_s)} left"
+    return "" if not progress.remaining_s else f"{duration(progress.remaining_s)} left"
 
 
 def duration(seconds: float) -> str:

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base
 from mutator.engines.registry import choose_engine, not_worth_forking
-from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWarning
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
@@ -33,7 +34,7 @@ from mutator.store.progress import Progress, label
 from mutator.store.run_folder import RunFolder
 from mutator.targets.requirements import check_requirements
 from mutator.verification import equivalence
-from mutator.verification.preflight import are_there, run_checks
+from mutator.verification.preflight import are_there, run_checks, unreached_triggers
 from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
@@ -119,6 +120,8 @@ class Session:
             check_requirements(self._manifest)
             check_versions(self.folder, accept=self._accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
+            for remark in unreached_triggers(self.workspace, self.folder):
+                warnings.warn(remark, MutatorWarning, stacklevel=2)
             prepare_base(self._manifest, self.folder.base)
             begin_stretch(
                 self.folder,

@@ -38,7 +38,8 @@ class ParamSchema:
     """One parameter of a model.
 
     `unit` is None (a plain number), 'target' (the unit of the changed variable), or the unit that the
-    template wants (`s`). `min` and `max` are inclusive, in that unit.
+    template wants (`s`). `min` and `max` are inclusive, in that unit. `neutral` is the value with which the
+    model changes nothing.
     """
 
     name: str
@@ -48,6 +49,7 @@ class ParamSchema:
     optional: bool = False
     min: float | None = None
     max: float | None = None
+    neutral: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +83,12 @@ class FaultModel:
     def param(self, name: str) -> ParamSchema | None:
         """The parameter `name`, if the model has it."""
         return next((p for p in self.params if p.name == name), None)
+
+    def changes_nothing(self, params: Mapping[str, object]) -> bool:
+        """Whether these values leave everything as it is; one with a bound may not."""
+        bounded = any(p.optional and p.type == "number" and p.name in params for p in self.params)
+        neutral = (p.neutral is not None and params.get(p.name) == p.neutral for p in self.params)
+        return any(neutral) and not bounded
 
 
 @dataclass(frozen=True)
@@ -123,6 +131,9 @@ class _ParamModel(StrictModel, title="A parameter"):
     optional: bool = Field(False, description="May be left out; the template then finds `none`.")
     min: float | None = Field(None, description="The least value, in that unit.")
     max: float | None = Field(None, description="The greatest value, in that unit.")
+    neutral: float | None = Field(
+        None, description="The value with which a fault changes nothing; plans and `try` warn of it."
+    )
 
 
 class _ExampleModel(StrictModel, title="An example"):

@@ -44,6 +44,12 @@ class Draw:
         """How many values it makes."""
         return len(self.values) if self.kind == "list" else len(self.ranges)
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value that it can make."""
+        ends = self.values or [end for ends in self.ranges for end in ends]
+        return min(ends), max(ends) if self.cap is None else min(max(ends), self.cap)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:

@@ -31,7 +31,7 @@ from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
-from mutator.verification import canary, preflight_cache
+from mutator.verification import canary, preflight_cache, unreached
 from mutator.verification.preflight_rules import (
     CheckRun,
     digest_of,
@@ -71,8 +71,17 @@ def run_checks(
             remedy="mend target, templates or canary; `mutator check --drive` tells more. The campaign does "
             "not start before all pass",
         )
-    preflight_cache.store(preflight_cache.entry(checks.digest), folder.path, FILE)
+    preflight_cache.store(preflight_cache.entry(checks.digest), folder.path, FILE, checks.kept)
     return results
+
+
+def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
+    """What to say of the plan's triggers that no golden run reaches; nothing unless the checks have just
+    driven the golden runs, or found them cached."""
+    experiments = ((golden_key(e.scenario, e.changes), e) for e in plan_file.read_all(folder.path))
+    observed = unreached.read_observed(_kept(folder))
+    manifest = workspace.manifest(folder.head["target"])
+    return unreached.unreached(workspace, manifest, experiments, observed) if observed else []
 
 
 def are_there(folder: RunFolder) -> bool:
@@ -82,6 +91,11 @@ def are_there(folder: RunFolder) -> bool:
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
 
+def _kept(folder: RunFolder) -> Path:
+    """Where golden runs are until they are known to be the run's; what they observed stays there."""
+    return folder.work / "kept"
+
+
 class _Checks:
     """The checks of one run folder."""
 
@@ -89,6 +103,7 @@ class _Checks:
         head = folder.head
         self.workspace = workspace
         self.folder = folder
+        self.kept = _kept(folder)
         self.manifest: TargetManifest = workspace.manifest(head["target"])
         self.models = workspace.fault_models()
         self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
@@ -114,7 +129,7 @@ class _Checks:
         as they were; they are then here."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
-        copy = self._kept
+        copy = self.kept
         try:
             with raising_disk_full(copy):
                 preflight_cache.fetch(preflight_cache.entry(self.digest), copy, FILE)
@@ -159,14 +174,9 @@ class _Checks:
         self._install(json_bytes(checks))
         yield from results
 
-    @property
-    def _kept(self) -> Path:
-        """Where golden runs are until they are known to be the run's."""
-        return self.folder.work / "kept"
-
     def _install(self, checks: bytes) -> None:
         """Make the kept golden runs and these results those of the run folder."""
-        run, golden = self.folder.path, self._kept / "golden"
+        run, golden = self.folder.path, self.kept / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
         new = {name: Digest.of(path.read_bytes()) for name, path in files.items() if path.is_file()}
@@ -196,7 +206,7 @@ class _Checks:
     def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], CheckRun]:
         """Every run of every check, `workers` at a time."""
         work = self.folder.work / "checks"
-        for scratch in (work, self._kept):
+        for scratch in (work, self.kept):
             remove_folder(scratch)
         work.mkdir(parents=True)
         base = prepare_base(self.manifest, self.folder.base)
@@ -233,7 +243,7 @@ class _Checks:
                 "changes": changes,
             }
             name = golden_key(*key)
-            jobs[_NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, **common)
+            jobs[_NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
             jobs[_GOLDEN, key] = Job(name=f"a-{name}", **common)
             jobs[_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
         return dict(sorted(jobs.items(), key=lambda one: one[0][0] != _NULL))  # the checks first
@@ -243,8 +253,10 @@ class _Checks:
         try:
             execution = engine.execute(job, scratch)
             run = look(self.manifest, execution)
+            if name[0] == _NULL:
+                unreached.write_observed(self.kept, golden_key(*name[1]), execution.watched.get("seen", ()))
             if name[0] == _GOLDEN and not run.problem:
-                place = self._kept / "golden" / golden_key(*name[1])
+                place = self.kept / "golden" / golden_key(*name[1])
                 place.parent.mkdir(parents=True, exist_ok=True)
                 execution.out.rename(place)
             return run

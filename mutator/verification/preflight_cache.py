@@ -12,6 +12,7 @@ from pathlib import Path
 from mutator._common import caches
 from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
+from mutator.verification.unreached import FOLDER
 
 _SUM = "sum"  # the file with the digest of all others of an entry
 
@@ -35,15 +36,25 @@ def copy(source: Path, to: Path, file: str) -> None:
     to.mkdir(parents=True, exist_ok=True)
     shutil.copytree(source / "golden", to / "golden")
     shutil.copy(source / file, to / file)
+    copy_observed(source, to)
 
 
-def store(place: Path, run: Path, file: str) -> None:
-    """Keep a run folder's passed checks at `place`; an unwritable cache is ignored."""
+def copy_observed(source: Path, to: Path) -> None:
+    """Copy what golden runs observed, where that is kept."""
+    shutil.rmtree(to / FOLDER, ignore_errors=True)
+    if (source / FOLDER).is_dir():
+        shutil.copytree(source / FOLDER, to / FOLDER)
+
+
+def store(place: Path, run: Path, file: str, observed: Path) -> None:
+    """Keep a run folder's passed checks at `place`, with what is `observed`; an unwritable cache is
+    ignored."""
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:
             made = Path(scratch) / "entry"
             copy(run, made, file)
+            copy_observed(observed, made)
             (made / _SUM).write_bytes(_sum(made, file))
             shutil.rmtree(place, ignore_errors=True)  # it was not there, or was damaged
             made.rename(place)
@@ -52,7 +63,8 @@ def store(place: Path, run: Path, file: str) -> None:
 
 
 def _sum(folder: Path, file: str) -> bytes:
-    """Digest of the names and contents of golden runs and results."""
-    files = [folder / file, *(path for path in (folder / "golden").rglob("*") if path.is_file())]
+    """Digest of the names and contents of golden runs, of what they observed, and of results."""
+    kept = (path for kind in ("golden", FOLDER) for path in (folder / kind).rglob("*"))
+    files = [folder / file, *(path for path in kept if path.is_file())]
     found = sorted((path.relative_to(folder).as_posix(), digest(path.read_bytes())) for path in files)
     return digest(found).encode()

@@ -15,10 +15,10 @@ from mutator.campaigns.trigger_choice import listed_triggers
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
 from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
 from mutator.mutants.building import Mutant, build
-from mutator.mutants.probe import decision, probe_path
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always, at_time
 from mutator.verification.findings import Finding, Level, Place
+from mutator.verification.unreached import arming, holds
 from mutator.workspace import Workspace
 
 _COUNT = "count_only"
@@ -54,9 +54,7 @@ class Reach:
         self.untriggered = list(_triggers(workspace, manifest, campaigns))
         self._triggers = len(self.untriggered)
         self._driven: list[str] = []  # scenarios with their changes
-        self._conditions = {
-            one.trigger: decision(_probe(workspace, manifest, one.trigger)) for one in self.untriggered
-        }
+        self._armings = {one.trigger: arming(workspace, manifest, one.trigger) for one in self.untriggered}
 
     def take(
         self,
@@ -78,7 +76,7 @@ class Reach:
             if one.location not in executed or not set(one.changes) <= set(changes)
         ]
         rows = list(seen)
-        self.untriggered = [one for one in self.untriggered if not self._holds(one.trigger, rows)]
+        self.untriggered = [one for one in self.untriggered if not holds(self._armings[one.trigger], rows)]
 
     def findings(self) -> list[Finding]:
         """What no run came to, of all that were taken in."""
@@ -106,10 +104,6 @@ class Reach:
         found = f"{len(left)} of {whole} never reached in {', '.join(self._driven)}"
         places = tuple(left[:_MOST])
         return Finding(name=name, level=Level.WARN, found=found, remedy=remedy, places=places)
-
-    def _holds(self, trigger: Trigger, rows: list[Sequence[float]]) -> bool:
-        armed_t, holds = self._conditions[trigger]
-        return any(row[0] >= armed_t and holds(*row) for row in rows)
 
 
 def _statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[Wanted]:
@@ -201,9 +195,3 @@ def _listed(campaign: Campaign, manifest: TargetManifest, armed_after_s: float) 
 
 def _place(path: Path, line: int | None, what: str) -> Place:
     return Place(file=str(path), line=line, what=what)
-
-
-def _probe(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Any:
-    path = probe_path(manifest.package)
-    built = build(manifest, workspace.fault_models(), None, trigger)
-    return compile(built.files[path], path, "exec")

@@ -86,14 +86,15 @@ def run(job: dict[str, Any]) -> None:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
             note_activation(probe, job["inactive"])
-        if watcher and probe:
-            seen = beside("swap").keep_observations(probe, *job["watch"])
+        if probe and job["observe"]:
+            seen = beside("swap").keep_observations(probe, *job["observe"])
+        if probe and watcher:
             watcher.look_for_threads(probe, seen)
         run_module(job["module"], job["args"])
     except BaseException as err:
         report |= describe(err, job["tree"], job["probe"])
-    if watcher:
-        report["watched"] = {**watcher.found(), "seen": seen}
+    if job["observe"]:
+        report["watched"] = {**(watcher.found() if watcher else {}), "seen": seen}
     report |= asked(probe, job["tree"], job["probe"]) if probe else {"probe": None}
     report["outside"] = imported_elsewhere(job["packages"], job["tree"], sys.modules)
     report["modules"] = third_party(known, job["packages"])

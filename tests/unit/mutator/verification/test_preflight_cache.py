@@ -126,7 +126,7 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
     """What is kept next stands in the place of what was damaged."""
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
-    preflight_cache.store(cache, checked[1].path, "checks.json")
+    preflight_cache.store(cache, checked[1].path, "checks.json", checked[1].work)
     assert (cache / "checks.json").read_bytes() == good
     assert list(cache.parent.iterdir()) == [cache]
 
@@ -134,5 +134,5 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
 def test_no_room_for_a_cache_is_no_error(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     """Where the cache cannot be, nothing is kept and nothing is said."""
     (tmp_path / "file").write_text("")
-    preflight_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json")
+    preflight_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json", checked[1].work)
     assert (tmp_path / "file").read_text() == ""

@@ -1,0 +1,92 @@
+"""Triggers that no golden run reaches.
+
+Until it is active, a faulty run is the golden run: a trigger that never holds there never fires. What golden
+runs observe is kept by their null mutants, whose runs are the same.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from mutator._common.text import counted
+from mutator.model import Experiment, Trigger
+from mutator.mutants.building import build
+from mutator.mutants.probe import decision, probe_path
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import time_of
+from mutator.workspace import Workspace
+
+FOLDER = "observed"
+_NAMED = 4  # triggers that a warning names
+
+# a row for each observation: the time (s), and the values
+Observed: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+Arming = tuple[float, Callable[..., bool]]  # when a trigger is armed (s), and its condition
+
+
+def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
+    """Keep what the golden run `key` observed in `folder`."""
+    (folder / FOLDER).mkdir(parents=True, exist_ok=True)
+    np.save(folder / FOLDER / f"{key}.npy", np.array(list(seen), dtype=float))
+
+
+def read_observed(folder: Path) -> dict[str, Observed]:
+    """What the golden runs observed, by their keys; without those that are not kept in `folder`."""
+    return {path.stem: np.load(path) for path in (folder / FOLDER).glob("*.npy")}
+
+
+def arming(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Arming:
+    """When a trigger is armed, and its condition over what the target observes."""
+    path = probe_path(manifest.package)
+    built = build(manifest, workspace.fault_models(), None, trigger)
+    return decision(compile(built.files[path], path, "exec"))
+
+
+def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
+    """Whether a trigger holds in one of these observations."""
+    armed_t, condition = trigger
+    return any(row[0] >= armed_t and condition(*row) for row in rows)
+
+
+def unreached(
+    workspace: Workspace,
+    manifest: TargetManifest,
+    experiments: Iterable[tuple[str, Experiment]],
+    observed: Mapping[str, Observed],
+) -> list[str]:
+    """What to say of experiments, each with the key of its golden run, whose triggers never hold."""
+    late, never = Counter[str](), Counter[str]()
+    armings: dict[Trigger, Arming] = {}
+    known: dict[tuple[str, Trigger], bool] = {}
+    total = 0
+    for key, experiment in experiments:
+        total += 1
+        trigger = experiment.trigger
+        if key not in observed or not len(observed[key]):
+            continue
+        if (time := time_of(trigger)) is not None:
+            if time > (end := observed[key][:, 0].max()):
+                late[f"{experiment.scenario}, which ends at {end:g} s"] += 1
+            continue
+        if (key, trigger) not in known:
+            if trigger not in armings:
+                armings[trigger] = arming(workspace, manifest, trigger)
+            known[key, trigger] = holds(armings[trigger], observed[key].tolist())
+        if not known[key, trigger]:
+            never[f"{trigger.name} in {experiment.scenario}"] += 1
+    return list(_sentences(total, late, never))
+
+
+def _sentences(total: int, late: Counter[str], never: Counter[str]) -> Iterator[str]:
+    for counts, what in (
+        (late, "the scenario ends before the time of"),
+        (never, "no golden run reaches the trigger of"),
+    ):
+        if counts:
+            named = [f"{name}: {count}" for name, count in counts.most_common(_NAMED)]
+            more = [f"{len(counts) - _NAMED} more"] if len(counts) > _NAMED else []
+            count = f"{counts.total()} of {counted(total, 'experiment')}"
+            yield f"{what} {count}, whose faults are never active ({', '.join(named + more)})"

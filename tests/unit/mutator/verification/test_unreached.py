@@ -1,0 +1,75 @@
+"""Triggers that golden runs never come to."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mutator.campaigns.plans import freeze, make_plan
+from mutator.model import Experiment, Trigger
+from mutator.triggers.kinds import at_time
+from mutator.verification.preflight import run_checks, unreached_triggers
+from mutator.verification.unreached import read_observed, unreached, write_observed
+from mutator.workspace import Workspace
+
+MakeExperiment = Callable[..., Experiment]
+# of the toy: t, d_rel, v_ego, v_lead; the headway time is 2 s, then 1 s
+SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0)]
+
+
+@pytest.mark.parametrize(
+    ("trigger", "said"),
+    [
+        (at_time(2.0), []),
+        (at_time(2.1), ["the scenario ends before the time of", "(S1, which ends at 2 s: 2)"]),
+        (Trigger(name="near", condition="hwt <= 1.5"), []),
+        (Trigger(name="near", condition="hwt <= 1.5", armed_after_s=1.5), ["near in S1: 2"]),
+        (Trigger(name="nearer", condition="hwt <= 0.9"), ["no golden run reaches", "nearer in S1: 2"]),
+        (Trigger(name="always", condition="True"), []),
+    ],
+)
+def test_what_never_holds_is_told(
+    toycar: Workspace, experiment: MakeExperiment, trigger: Trigger, said: list[str]
+) -> None:
+    """A time after the last observation, and a condition that holds in none while it is armed, are told with
+    the number of experiments that wait for it."""
+    waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
+    told = unreached(
+        toycar,
+        toycar.manifest("toycar"),
+        [*waiting, ("S2", replace(experiment(), trigger=trigger))],  # of S2 nothing is known
+        {"S1": np.array(SEEN)},
+    )
+    assert len(told) == bool(said)
+    for part in ["2 of 3 experiments", *said] if said else []:
+        assert part in told[0]
+
+
+def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
+    """Observations come back as they were, by the keys of their golden runs; without any there are none."""
+    assert read_observed(tmp_path) == {}
+    write_observed(tmp_path, "A+alone", SEEN)
+    assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
+        "A+alone": [list(row) for row in SEEN]
+    }
+
+
+def test_triggers_are_told_of_cached_checks_too(toycar: Workspace, tmp_path: Path) -> None:
+    """Of golden runs that were driven for another folder it is known as well what they come to; a run that
+    goes on says nothing a second time."""
+    campaign = toycar.library / "campaigns" / "small.yaml"
+    text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
+    campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))
+    for name in ("driven", "cached"):
+        folder = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
+        run_checks(toycar, folder)
+        late, never = unreached_triggers(toycar, folder)
+        assert late.startswith("the scenario ends before the time of 3 of 6 experiments, whose faults")
+        assert "v_ego > 99.0 in A: 3" in never
+        assert (folder.path / "checks.json").is_file()
+    again = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
+    folder.path.joinpath("work").rename(tmp_path / "gone")
+    run_checks(toycar, again)
+    assert unreached_triggers(toycar, again) == []
