@@ -81,7 +81,7 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
     experiments = ((golden_key(e.scenario, e.changes), e) for e in plan_file.read_all(folder.path))
     observed = unreached.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head["target"])
-    return unreached.unreached(workspace, manifest, experiments, observed) if observed else []
+    return unreached.remarks(workspace, manifest, experiments, observed) if observed else []
 
 
 def are_there(folder: RunFolder) -> bool:

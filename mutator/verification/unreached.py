@@ -51,7 +51,7 @@ def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
     return any(row[0] >= armed_t and condition(*row) for row in rows)
 
 
-def unreached(
+def remarks(
     workspace: Workspace,
     manifest: TargetManifest,
     experiments: Iterable[tuple[str, Experiment]],

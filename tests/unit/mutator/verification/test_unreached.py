@@ -11,7 +11,7 @@ from mutator.campaigns.plans import freeze, make_plan
 from mutator.model import Experiment, Trigger
 from mutator.triggers.kinds import at_time
 from mutator.verification.preflight import run_checks, unreached_triggers
-from mutator.verification.unreached import read_observed, unreached, write_observed
+from mutator.verification.unreached import read_observed, remarks, write_observed
 from mutator.workspace import Workspace
 
 MakeExperiment = Callable[..., Experiment]
@@ -36,7 +36,7 @@ def test_what_never_holds_is_told(
     """A time after the last observation, and a condition that holds in none while it is armed, are told with
     the number of experiments that wait for it."""
     waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
-    told = unreached(
+    told = remarks(
         toycar,
         toycar.manifest("toycar"),
         [*waiting, ("S2", replace(experiment(), trigger=trigger))],  # of S2 nothing is known
