@@ -10,8 +10,9 @@ from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes.golden import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
-from mutator.outcomes.verdicts import reaction_time
+from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +54,7 @@ class ExperimentResult(ABC):
         return text_html(repr(self)) + diff_html(self.diff) + facts_html(self._facts())
 
     def _facts(self) -> list[tuple[str, object]]:
-        facts = describe(self.experiment) | (verdict(self.record) if self.record else {"status": "not run"})
+        facts = describe(self.experiment) | (self.verdict if self.record else {"status": "not run"})
         texts = {
             name: ", ".join(f"{k} {v if isinstance(v, str) else f'{v:.4g}'}" for k, v in value.items())
             or None
@@ -100,7 +101,12 @@ class ExperimentResult(ABC):
     @property
     def verdict(self) -> dict[str, Any]:
         """What became of it, as plain data; times in s of simulation, None: did not happen."""
-        return verdict(self.record) if self.record else {"status": None}
+        return verdict(self.record, self.scale) if self.record else {"status": None}
+
+    @property
+    @abstractmethod
+    def scale(self) -> Scale | None:
+        """What makes a class of severity of its contact; None for a target without."""
 
     @property
     @abstractmethod
@@ -118,7 +124,8 @@ class ExperimentResult(ABC):
         facts = describe(self.experiment)
         title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
         marks = marks_of(self.record) if self.record else ()
-        return draw_run(golden, faulty, self._target(), title=title, marks=marks)
+        end = self.record.t_end if self.record else None
+        return draw_run(golden, faulty, self._target(), title=title, marks=marks, end=end)
 
     @abstractmethod
     def _target(self) -> TargetManifest: ...
@@ -161,8 +168,11 @@ def describe(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def verdict(record: Record) -> dict[str, Any]:
-    """What became of it, for people and as JSON. Times in s of simulation; None: did not happen."""
+def verdict(record: Record, scale: Scale | None) -> dict[str, Any]:
+    """What became of it, for people and as JSON. Times in s of simulation; None: did not happen.
+
+    `largest_difference` is that of the whole run, `difference_in_drive` up to the end of the drive.
+    """
     activation = record.activation
     return {
         "status": record.status.value,
@@ -176,7 +186,11 @@ def verdict(record: Record) -> dict[str, Any]:
         "hazards_s": dict(record.hazards),
         "alerts_s": dict(record.alerts),
         "reaction_time_s": reaction_time(record.hazards, record.alerts),
+        "severity": severity_of(record, scale),
+        "fault_tolerant_time_s": since_activation(record),
+        "manifest_to_hazard_s": since_manifestation(record),
         "largest_difference": dict(record.max_dev),
+        "difference_in_drive": dict(record.max_dev) | dict(record.dev),
         "drive_ended_s": record.t_end,
         "metrics": dict(record.metrics),
         "trace_digest": record.trace_digest,

@@ -36,6 +36,7 @@ from mutator.store import cleaning, plan_file
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
 from mutator.verification import equivalence
 from mutator.verification.seal import not_verifiable, seal_of
 from mutator.workspace import Workspace
@@ -297,6 +298,11 @@ class RunExperiment(ExperimentResult):
             return kept.decode("utf-8", "surrogateescape")
         return built(self.run._bench, self.fault, self.experiment.trigger).patch
 
+    @property
+    def scale(self) -> Scale | None:
+        """The scale of severity that the run was planned with."""
+        return self.run.folder.scale
+
     def traces(self, *, exact: bool = False) -> TraceFrames:
         """Golden and faulty run as pandas frames.
 
@@ -326,7 +332,13 @@ class RunExperiment(ExperimentResult):
         out = temporary.path / self.id if temporary else None
         single, same = rerun(run.workspace, folder.path, self.id, out=out)
         manifest = run._bench.manifest
-        trial = trial_of(single, manifest, same_as_record=same if self.record else None, temporary=temporary)
+        trial = trial_of(
+            single,
+            manifest,
+            scale=self.scale,
+            same_as_record=same if self.record else None,
+            temporary=temporary,
+        )
         if keep and trial.save_plot(self.plot_file):
             golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
             series.keep(folder, manifest, golden, faulty, single.record)

@@ -14,6 +14,7 @@ from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.judging import load_judged
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -27,6 +28,7 @@ class Trial(ExperimentResult):
     record: Record
     single: Single
     manifest: TargetManifest
+    scale: Scale | None = None
     same_as_record: bool | None = None
     _temporary: ScratchFolder | None = field(default=None)
 
@@ -117,13 +119,15 @@ def try_fault(
     temporary = ScratchFolder("mutator-try-") if out is None else None
     folder = (temporary.path if temporary else Path(out or "")) / experiment.id
     single = run_single(bench.workspace, bench.manifest, experiment, folder)
-    return trial_of(single, bench.manifest, temporary=temporary)
+    scale = bench.workspace.scale_of(bench.manifest)
+    return trial_of(single, bench.manifest, scale=scale, temporary=temporary)
 
 
 def trial_of(
     single: Single,
     manifest: TargetManifest,
     *,
+    scale: Scale | None,
     same_as_record: bool | None = None,
     temporary: ScratchFolder | None = None,
 ) -> Trial:
@@ -133,6 +137,7 @@ def trial_of(
         record=single.record,
         single=single,
         manifest=manifest,
+        scale=scale,
         same_as_record=same_as_record,
         _temporary=temporary,
     )

@@ -3,21 +3,62 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator.api.experiment_results import describe, verdict
+from mutator._common.text import counted
+from mutator.api.experiment_results import describe
 from mutator.api.runs import load_run, newest_run
-from mutator.cli.console import STYLES, Terminal
+from mutator.api.worst import worst_results
+from mutator.cli.console import STYLES, Terminal, short_path
 from mutator.mutants.readable_diffs import readable
 
 if TYPE_CHECKING:
+    from mutator.api.experiment_results import ExperimentResult
     from mutator.api.runs import RunExperiment
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
+    from mutator.outcomes.rows import Row
     from mutator.workspace import Workspace
+
+_TIMES = {
+    "fault_tolerant_time_s": "fault-tolerant time (first hazard - activation)",
+    "reaction_time_s": "reaction time (first hazard - first alert)",
+}
 
 
 def find_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
     """The one experiment whose id starts with `prefix` in `run`, or in the newest run."""
     return load_run(run or newest_run(workspace.library.parent), workspace=workspace).experiment(prefix)
+
+
+def list_worst(
+    terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
+) -> None:
+    """The worst results of `run`, or of the newest run, as a table, those that the filter accepts."""
+    folder = run or newest_run(workspace.library.parent)
+    found = worst_results(load_run(folder).path, only)
+    rows = [_line(row) for row in found[:limit]]
+    if terminal.as_json:
+        terminal.emit({"run": str(folder), "count": len(found), "worst": rows})
+        return
+    heads = tuple(rows[0]) if rows else ()
+    terminal.table(heads, [tuple(row.values()) for row in rows], right=(3, 5))
+    terminal.say(
+        f"{len(rows)} of {counted(len(found), 'experiment')} in {short_path(folder)}, the worst first"
+    )
+
+
+def _line(row: "Row") -> dict[str, object]:
+    """A line of that table."""
+    return {
+        "experiment": row.experiment_id,
+        "ending": row.ending,
+        "severity": row.severity,
+        "delta-v [m/s]": None if row.delta_v is None or not row.severity else round(row.delta_v, 2),
+        "hazards": ", ".join(name for name, _ in row.hazards),
+        "margin": None if row.margin is None else round(row.margin, 3),
+        "first alert": row.alerts[0] if row.alerts else "",
+        "fault": row.fault,
+        "drive": f"{row.scenario}, {row.trigger}",
+    }
 
 
 def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -> None:
@@ -33,8 +74,11 @@ def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -
     terminal.say()
 
 
-def print_verdict(terminal: Terminal, record: "Record") -> None:
-    """The verdict and a table of what happened when, counted from the activation."""
+def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
+    """The verdict of an experiment that ran and a table of what happened when, counted from the activation;
+    differences from golden are those up to the end of the drive."""
+    record = result.record
+    assert record is not None
     ending = record.outcome.value if record.outcome else record.status.value
     terminal.say(f"verdict: {ending}", style=STYLES.get(ending))
     if record.detail:
@@ -47,12 +91,19 @@ def print_verdict(terminal: Terminal, record: "Record") -> None:
             for t, what in sorted(events, key=lambda e: e[0])
         ]
         terminal.table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
-    time_left = verdict(record)["reaction_time_s"]
-    if time_left is not None:
-        terminal.say(f"reaction time (first hazard - first alert): {time_left:.2f} s")
-    deviations = ", ".join(f"{name} {value:.4g}" for name, value in record.max_dev)
+    told = result.verdict
+    if told["severity"]:
+        terminal.say(f"severity: {told['severity']}, delta-v {told['metrics']['delta_v']:.2f} m/s")
+    for name, what in _TIMES.items():
+        if told[name] is not None:
+            terminal.say(f"{what}: {told[name]:.2f} s")
+    deviations = ", ".join(f"{name} {value:.4g}" for name, value in told["difference_in_drive"].items())
     if deviations:
-        terminal.say(f"largest difference from golden: {deviations}")
+        until = "" if record.t_end is None else " up to the end of the drive"
+        terminal.say(f"largest difference from golden{until}: {deviations}")
+    metrics = ", ".join(f"{name} {value:.4g}" for name, value in record.metrics)
+    if metrics:
+        terminal.say(f"metrics: {metrics}")
 
 
 def _events(record: "Record") -> list[tuple[float, str]]:
@@ -65,7 +116,10 @@ def _events(record: "Record") -> list[tuple[float, str]]:
         events.append((record.t_manifest, "manifested: an actuator differs from golden"))
     events += [(t, f"alert {name}") for name, t in record.alerts]
     events += [(t, f"hazard {name}") for name, t in record.hazards]
-    return events
+    if (end := record.t_end) is None:
+        return events
+    late = ", after the end of the drive"
+    return [*((t, what + late * (t > end)) for t, what in events), (end, "end of the drive")]
 
 
 def show_trial(terminal: Terminal, trial: "Trial") -> None:
@@ -73,12 +127,12 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
     with terminal.wait("drawing"):
         drawn = trial.save_plot(trial.folder / "plot.svg")
     if terminal.as_json:
-        facts = {**describe(trial.experiment), **verdict(trial.record), "patch": trial.patch}
+        facts = {**describe(trial.experiment), **trial.verdict, "patch": trial.patch}
         facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
         terminal.emit(facts | {"traces": str(trial.single.faulty), "plot": str(drawn) if drawn else None})
         return
     print_experiment(terminal, trial.experiment, trial.patch)
-    print_verdict(terminal, trial.record)
+    print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)
         terminal.say(f"the fault-free run reaches {reached} itself: that need not be the fault's doing")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
+from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
@@ -27,6 +28,8 @@ SHOW_EXAMPLES = """\b
 Examples:
   mutator show 3f9a                          of the newest run in runs/
   mutator show 3f9a --run runs/first --no-plot
+  mutator show                               the ten worst
+  mutator show --only 'severity >= "S2"' --limit 30
   mutator show 3f9a --video 3f9a.mp4         drives both runs again, with a film
   mutator show 3f9a --still 14.5             a picture of it, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
@@ -35,7 +38,15 @@ Examples:
 
 @with_place
 def show(
-    experiment: ExperimentId,
+    experiment: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[EXPERIMENT]",
+            help="Id of an experiment, or the start of one; without it, the worst are listed.",
+            show_default=False,
+            autocompletion=completion.experiments,
+        ),
+    ] = None,
     run: Run = None,
     plot: Annotated[
         bool, typer.Option(help="Draw golden against faulty (drives it again if no trace was kept).")
@@ -49,15 +60,26 @@ def show(
             metavar="T=FILE", help="One picture of that film, at T seconds: a .png or .jpg. May be repeated."
         ),
     ] = None,
+    only: Annotated[
+        str | None,
+        typer.Option(metavar="EXPR", help="List only those for whose results this holds: 'delta_v > 5'."),
+    ] = None,
+    limit: Annotated[int, typer.Option(min=1, help="List so many.")] = 10,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Show diff, times, verdict, plot of golden against faulty; or watch them."""
+    """Show diff, times, verdict, plot of golden against faulty; or watch them.
+
+    Without an experiment the worst of a run are listed: by class of severity and delta-v, then by margin.
+    """
     from mutator.api.experiment_results import describe
     from mutator.cli import experiment_view
 
     terminal = Terminal(as_json)
+    if experiment is None:
+        experiment_view.list_worst(terminal, place.workspace(), run, only, limit)
+        return
     found = experiment_view.find_experiment(place.workspace(), run, experiment)
     patch = found.patch
     drawn = _plot(terminal, found) if plot and found.record else None
@@ -73,7 +95,7 @@ def show(
     if found.record is None:
         terminal.say(str(found.not_run()))
     else:
-        experiment_view.print_verdict(terminal, found.record)
+        experiment_view.print_verdict(terminal, found)
     if stretch:
         terminal.say(f"run with: {stretch}")
     if not found.run.verifiable:
@@ -155,7 +177,7 @@ def rerun(
     if as_json:
         facts = {**describe(found.experiment), **trial.verdict, "same_as_record": same}
         terminal.emit(facts | {"traces": str(traces) if trace else None, "plot": str(plot) if plot else None})
-    experiment_view.print_verdict(terminal, trial.record)
+    experiment_view.print_verdict(terminal, trial)
     terminal.say(_comparison(same), style="bold red" if same is False else None)
     if trace:
         terminal.say(f"trace: {short_path(traces)}")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: told apart by colour-blind readers and in grey
 FAULTY_COLOUR = "#d55e00"
+LATER_COLOUR = "#999999"  # of what comes after the end of the drive
 PANEL_HEIGHT = 1.1  # inches
 WIDTH = 9.0
 PNG_DPI = 110
@@ -70,12 +71,18 @@ def marks_of(record: Record) -> tuple[Mark, ...]:
 
 
 def draw_run(
-    golden: Trace, faulty: Trace, manifest: TargetManifest, *, title: str, marks: Iterable[Mark] = ()
+    golden: Trace,
+    faulty: Trace,
+    manifest: TargetManifest,
+    *,
+    title: str,
+    marks: Iterable[Mark] = (),
+    end: float | None = None,
 ) -> "Figure":
     """The manifest's channels of two runs, one panel a channel; `save` writes the figure.
 
-    Compared channels (actuators) come first. A channel that either run lacks is left out; MutatorError when
-    none is left.
+    What comes after the `end` of the drive (s) is grey, and no axis is made for it. Compared channels
+    (actuators) come first. A channel that either run lacks is left out; MutatorError when none is left.
     """
     channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
     if not channels:
@@ -84,8 +91,8 @@ def draw_run(
     time = manifest.time_channel
     for axis, channel in zip(axes, channels, strict=True):
         lines = [(times_of(trace, channel.name, time), trace[channel.name]) for trace in (golden, faulty)]
-        _panel(axis, channel, *lines)
-    _decorate(figure, axes, title, tuple(marks))
+        _panel(axis, channel, lines[0], lines[1], np.inf if end is None else end)
+    _decorate(figure, axes, title, tuple(marks), end)
     return figure
 
 
@@ -109,26 +116,40 @@ def _figure_type() -> type["Figure"]:
     return RunFigure
 
 
-def _panel(axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any]) -> None:
+def _panel(
+    axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
+) -> None:
     """One channel: golden broad beneath, faulty narrow above, so that equal lines show in both colours."""
-    axis.plot(*map(finite, golden), color=GOLDEN_COLOUR, linewidth=2.4, alpha=0.55, label="golden")
-    axis.plot(*map(finite, faulty), color=FAULTY_COLOUR, linewidth=1.1, label="faulty")
+    looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
+    axis.margins(x=0.01, y=0.12)
+    for (time, values), colour, width, alpha, label in looks:
+        driven = np.where(time <= end, finite(values), np.nan)
+        axis.plot(time, driven, color=colour, linewidth=width, alpha=alpha, label=label)
+    axis.set_ylim(axis.get_ylim())  # of the drive alone
+    for (time, values), _, width, alpha, _ in looks:
+        if (time > end).any():
+            later = np.where(time >= end, finite(values), np.nan)
+            axis.plot(time, later, color=LATER_COLOUR, linewidth=width, alpha=alpha)
     unit = f"\n[{channel.unit}]" if channel.unit not in ("", "-") else ""
     axis.set_ylabel(channel.name + unit, fontsize=8)
     axis.tick_params(labelsize=8)
     axis.grid(visible=True, linewidth=0.4, alpha=0.5)
-    axis.margins(x=0.01, y=0.12)
 
 
-def _decorate(figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mark, ...]) -> None:
+def _decorate(
+    figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mark, ...], end: float | None
+) -> None:
+    colours = [LATER_COLOUR if end is not None and m.t > end else MARK_COLOURS[m.kind] for m in marks]
+    left, right = axes[0].get_xlim()
     for axis in axes:
-        for mark in marks:
-            axis.axvline(
-                mark.t, color=MARK_COLOURS[mark.kind], linestyle=MARK_LINES[mark.kind], linewidth=1.0
-            )
+        for mark, colour in zip(marks, colours, strict=True):
+            axis.axvline(mark.t, color=colour, linestyle=MARK_LINES[mark.kind], linewidth=1.0)
+        if end is not None:
+            axis.axvspan(end, right, color=LATER_COLOUR, alpha=0.15, linewidth=0)
+    axes[0].set_xlim(left, right)
     top = axes[0]
     # Names of marks close together would lie on each other, so they take turns on three levels.
-    for i, mark in enumerate(marks):
+    for i, (mark, colour) in enumerate(zip(marks, colours, strict=True)):
         top.annotate(
             f"{mark.label} {mark.t:.2f}",
             (mark.t, 1.0),
@@ -136,7 +157,7 @@ def _decorate(figure: "Figure", axes: list["Axes"], title: str, marks: tuple[Mar
             xytext=(2, 2 + 9 * (i % 3)),
             textcoords="offset points",
             fontsize=7,
-            color=MARK_COLOURS[mark.kind],
+            color=colour,
         )
     axes[-1].set_xlabel("time [s]", fontsize=8)
     top.legend(loc="best", fontsize=7, ncols=2, frameon=False)

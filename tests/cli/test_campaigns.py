@@ -275,6 +275,22 @@ def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
     assert series.read_bytes() == kept
 
 
+def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None:
+    """Hazards come first; a filter over the results leaves out what it does not hold for."""
+    listed = cli("show", "--json").json
+    endings = [line["ending"] for line in listed["worst"]]
+    assert endings == sorted(endings, key=lambda ending: ending != "hazard")
+    assert (endings[0], len(endings)) == ("hazard", min(10, listed["count"]))
+    only = cli("show", "--only", 'outcome == "hazard" and t_activation > 0', "--limit", "1", "--json").json
+    assert (len(only["worst"]), only["worst"][0]) == (1, listed["worst"][0])
+    assert only["count"] < listed["count"]
+    answer = cli("show", "--run", run)
+    assert answer.code == 0
+    assert listed["worst"][0]["experiment"] in answer.out
+    assert "the worst first" in answer.out
+    assert "unknown column `speed`" in cli("show", "--only", "speed > 3").err
+
+
 def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
     """As many digits as needed are enough; the newest run is taken unless one is named."""
     name = experiment_with(run, "hazard")

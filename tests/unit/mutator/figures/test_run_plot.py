@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.figures.run_plot import Mark, MarkKind, draw_run, marks_of, save
+from mutator.figures.run_plot import (
+    LATER_COLOUR,
+    MARK_COLOURS,
+    Mark,
+    MarkKind,
+    draw_run,
+    marks_of,
+    save,
+)
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.targets.channels import Channel
 
@@ -50,6 +58,23 @@ def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleN
     ):
         assert wanted in text
     assert "not_recorded" not in text
+
+
+def test_what_comes_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
+    """Lines and marks after the end are grey, and no axis reaches for them; without an end nothing is."""
+    faulty = trace()
+    faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
+    marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
+    gas, _ = draw_run(trace(), faulty, manifest, title="x", marks=marks, end=2.0).axes
+    golden_line, faulty_line, *later = gas.lines[:4]
+    assert -1.0 < gas.get_ylim()[0] < 0.0 < 1.0 < gas.get_ylim()[1] < 2.0
+    for line in (golden_line, faulty_line):
+        assert np.nanmax(np.where(np.isnan(line.get_ydata()), np.nan, line.get_xdata())) == 2.0
+    assert {line.get_color() for line in later} == {LATER_COLOUR}
+    assert np.nanmin(later[1].get_ydata()) == -500.0
+    assert [line.get_color() for line in gas.lines[4:]] == [MARK_COLOURS[MarkKind.HAZARD], LATER_COLOUR]
+    whole, _ = draw_run(trace(), faulty, manifest, title="x").axes
+    assert (len(whole.lines), whole.get_ylim()[0] < -500.0) == (2, True)
 
 
 def test_the_same_run_draws_the_same_svg(tmp_path: Path, manifest: SimpleNamespace) -> None:
