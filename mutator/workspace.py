@@ -241,10 +241,16 @@ class Workspace:
 
     def _file(self, folder: str, name: str | Path, what: str) -> Path:
         """A file of the library by name, or the file at a path that ends in .yaml."""
-        if str(name).endswith((".yaml", ".yml")) and Path(name).is_file():
+        known = self._files(folder)
+        if str(name).endswith((".yaml", ".yml")):
+            if not Path(name).is_file():
+                raise MutatorError(
+                    f"no file {name}",
+                    expected=f"a {what}: the path of a YAML file, or one of {', '.join(known) or 'none'}",
+                    remedy="correct the path" + suggestion(str(Path(name).with_suffix("")), list(known)),
+                )
             check_is_text(Path(name))
             return Path(name)
-        known = self._files(folder)
         if (path := known.get(str(name))) is not None:
             check_is_text(path)
             if path.is_fifo() or path.is_socket():

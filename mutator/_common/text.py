@@ -1,6 +1,7 @@
 """Text for people: counted things, values in errors, suggestions."""
 
 import difflib
+import re
 from typing import Any
 
 
@@ -23,3 +24,14 @@ def suggestion(word: str, known: list[str]) -> str:
     """`, did you mean 'x'?` when one of `known` is close to `word`, else nothing."""
     close = difflib.get_close_matches(word, known, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
+
+
+_OPERATORS = {"&&": "and", "||": "or", "!": "not", "=": "=="}
+_WRONG = re.compile(r"&&|\|\||!(?!=)|(?<![<>=!])=(?!=)")
+_QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
+
+
+def operator_hint(text: str) -> str:
+    """What to write for the operators of other languages in an expression; empty if it has none."""
+    found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
+    return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)

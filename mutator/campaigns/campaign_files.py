@@ -28,13 +28,15 @@ _Told = TypeVar("_Told")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """Faults taken from the library: specs by glob over `<module>/<fault_type>/<variant>`.
+    """Faults taken from the library: specs by glob over `<module>/<fault_type>/<variant>`; or `file`, a spec
+    file, whole.
 
     `values` is how many of a variant's values are taken, spread evenly over them in the order of the spec
     (None: all).
     """
 
     spec: str
+    file: Path | None = None
     values: int | None = None
 
 
@@ -113,10 +115,11 @@ def _in(told: Mapping[str, _Told], reading: str) -> _Told:
 
 
 class _SelectionModel(StrictModel, title="A selection"):
-    """Faults of the library, by the names of their specs."""
+    """Faults of the library, by the names of their specs, or of a spec file."""
 
     spec: str = Field(
-        description="A glob over `<module>/<fault_type>/<variant>`: `sensor/*`, `sensor/speed/low`."
+        description="A glob over `<module>/<fault_type>/<variant>`: `sensor/*`, `sensor/speed/low`; or a "
+        "spec file that is not in the library, by its path from the folder of the campaign: `my_fault.yaml`."
     )
     values: int | None = Field(
         None, ge=1, description="How many of each variant's values, spread evenly; without it, all."
@@ -240,7 +243,10 @@ def load_campaign(path: Path) -> Campaign:
         target=model.target,
         scenarios=tuple(model.scenarios),
         setting={reading: tuple(names) for reading, names in model.setting.items()},
-        faults=tuple(Selection(spec=item.spec, values=item.values) for item in model.faults),
+        faults=tuple(
+            Selection(spec=item.spec, file=_spec_file(path, item.spec), values=item.values)
+            for item in model.faults
+        ),
         reading=model.reading,
         methods=tuple(Method(name) for name in model.methods),
         table=triggers.table,
@@ -257,6 +263,11 @@ def load_campaign(path: Path) -> Campaign:
         chunk=model.chunk,
         yaml=source,
     )
+
+
+def _spec_file(campaign: Path, spec: str) -> Path | None:
+    """The spec file that a selection names; None: it names specs of the library."""
+    return campaign.parent / spec if spec.endswith((".yaml", ".yml")) else None
 
 
 def load_study(campaign: Campaign) -> Study | None:

@@ -1,8 +1,10 @@
 """From a campaign to its experiments: faults selected and expanded, triggers made, random times drawn."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
+from itertools import chain
+from pathlib import Path
 
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import Campaign
@@ -11,6 +13,7 @@ from mutator.campaigns.trigger_choice import listed_triggers
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
+from mutator.faults.specs import FaultSpec
 from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import at_time, draw_time
@@ -57,7 +60,8 @@ class Expansion:
                 expected=f"one of {', '.join(self.manifest.hazards)}",
                 remedy="name a hazard of the target's manifest",
             )
-        faults = [fault for _, fault in self._library() if fault.spec == canary.spec]
+        known = (*self._library(), *chain.from_iterable(self._files().values()))
+        faults = [fault for _, fault in known if fault.spec == canary.spec]
         if not faults:
             raise self._unmatched(("canary", "spec"), canary.spec)
         worst = max(faults, key=lambda fault: fault.size)
@@ -77,9 +81,38 @@ class Expansion:
 
     def _library(self) -> list[_Numbered]:
         """Every fault of the library with its number within its variant."""
+        return self._expanded(self.workspace.specs())
+
+    def _files(self) -> dict[int, list[_Numbered]]:
+        """The faults of the spec files that the campaign names, by the places of its selections."""
+        files = {i: one.file for i, one in enumerate(self.campaign.faults) if one.file is not None}
+        return {i: self._expanded([self._spec_of_file(("faults", i, "spec"), files[i])]) for i in files}
+
+    def _spec_of_file(self, keys: Keys, file: Path) -> FaultSpec:
+        """The spec of a file, which has no other one's name."""
+        if not file.is_file():
+            raise self.campaign.error(
+                keys,
+                f"no file {file}",
+                expected="a spec file, by its path from the folder of the campaign",
+                remedy="correct the path",
+            )
+        spec = self.workspace.spec(file)
+        known = self.workspace.library / "faults" / f"{spec.name}.yaml"
+        if known.exists() and not known.samefile(file):
+            raise self.campaign.error(
+                keys,
+                f"{file.name} is called {spec.name}, as a spec of the library is",
+                expected="a name of its own",
+                remedy="change `fault_type` in the file",
+            )
+        return spec
+
+    def _expanded(self, specs: Iterable[FaultSpec]) -> list[_Numbered]:
+        """Every fault of these specs with its number within its variant."""
         numbered: list[_Numbered] = []
         models = self.workspace.fault_models()
-        for spec in self.workspace.specs():
+        for spec in specs:
             seen: dict[str, int] = {}
             for fault in expand(spec, self.seed, self.reading, models=models, manifest=self.manifest):
                 number = seen.get(fault.spec, 0)
@@ -88,12 +121,12 @@ class Expansion:
         return numbered
 
     def _selected(self) -> list[_Numbered]:
-        library = self._library()
+        library, files = self._library(), self._files()
         selected: dict[str, _Numbered] = {}
         for i, selection in enumerate(self.campaign.faults):
             variants: dict[str, list[_Numbered]] = {}
-            for numbered in library:
-                if fnmatchcase(numbered[1].spec, selection.spec):
+            for numbered in files.get(i, library):
+                if i in files or fnmatchcase(numbered[1].spec, selection.spec):
                     variants.setdefault(numbered[1].spec, []).append(numbered)
             if not variants:
                 raise self._unmatched(("faults", i, "spec"), selection.spec, library)

@@ -9,6 +9,7 @@ import operator
 from collections.abc import Callable, Collection, Mapping
 from fnmatch import fnmatchcase
 
+from mutator._common.text import operator_hint
 from mutator.errors import MutatorError
 
 Row = Mapping[str, object]
@@ -40,11 +41,12 @@ def compile_filter(text: str, columns: Collection[str]) -> Predicate:
         tree = ast.parse(text.strip(), mode="eval")
         return _Compiler(text, columns).predicate(tree.body)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as err:
-        raise _error(text, f"not an expression ({getattr(err, 'msg', err)})", _ALLOWED) from None
+        got = f"not an expression ({getattr(err, 'msg', err)})"
+        raise _error(text, got, _ALLOWED, operator_hint(text)) from None
 
 
-def _error(text: str, got: str, expected: str) -> MutatorError:
-    return MutatorError(f"{got} in the filter `{text}`", expected=expected)
+def _error(text: str, got: str, expected: str, remedy: str = "") -> MutatorError:
+    return MutatorError(f"{got} in the filter `{text}`", expected=expected, remedy=remedy or None)
 
 
 class _Compiler:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
 
+from mutator._common.text import operator_hint
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
@@ -118,7 +119,8 @@ def parse(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise _refuse(f"{getattr(error, 'msg', error)}", text, None) from None
+        hint = operator_hint(text) or "rewrite it"
+        raise _refuse(f"{getattr(error, 'msg', error)}", text, None, hint) from None
 
 
 class _Writer:

@@ -1,0 +1,68 @@
+"""Campaigns with fault specs that are not in the library."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import make_plan
+from mutator.errors import MutatorError
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def mine(toycar: Workspace, tmp_path: Path) -> Path:
+    """A campaign outside of the library, with a spec file in a folder beside it."""
+    spec = (toycar.library / "faults" / "sensor" / "lane.yaml").read_text()
+    (tmp_path / "specs").mkdir()
+    spec = spec.replace("fault_type: lane", "fault_type: drifting")
+    (tmp_path / "specs" / "drifting.yaml").write_text(spec)
+    text = toycar.campaign("small").read_text()
+    text = text.replace("  random_until_s: 5.5\n", "").replace("[guided, random]", "[guided]")
+    text = text.replace("spec: sensor/silence/no_data", "{spec: specs/drifting.yaml, values: 2}")
+    text = text.replace("canary: {spec: sensor/lane", "canary: {spec: sensor/drifting")
+    campaign = tmp_path / "mine.yaml"
+    campaign.write_text(text)
+    return campaign
+
+
+def test_a_spec_file_is_found_from_the_campaign(
+    toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Faults of a named spec file join those of the library, wherever one works; so may the canary. Random
+    times need a latest one, guided triggers none."""
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    plan = make_plan(toycar, mine)
+    specs = [experiment.fault.spec for experiment in plan.experiments]
+    assert specs.count("sensor/drifting/shifted") == 4  # two values, two contexts
+    assert specs.count("sensor/lane/shifted") == 2
+    assert plan.canary.fault.spec == "sensor/drifting/shifted"
+
+
+def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
+    """A spec file that is not there is called a missing file, at the campaign's line."""
+    (mine.parent / "specs" / "drifting.yaml").unlink()
+    with pytest.raises(
+        MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected a spec file"
+    ):
+        make_plan(toycar, mine)
+
+
+def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> None:
+    """Two different specs of one name would be one in every table; the library's own file may be named."""
+    file = mine.parent / "specs" / "drifting.yaml"
+    file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
+    with pytest.raises(MutatorError, match="is called sensor/lane, as a spec of the library is"):
+        make_plan(toycar, mine)
+    own = toycar.library / "faults" / "sensor" / "lane.yaml"
+    text = mine.read_text().replace("specs/drifting.yaml", str(own)).replace("drifting/", "lane/")
+    mine.write_text(text)
+    assert {e.fault.spec for e in make_plan(toycar, mine).experiments} >= {"sensor/lane/shifted"}
+
+
+def test_a_missing_campaign_file_is_told(toycar: Workspace) -> None:
+    """A name that ends in .yaml is a file's; without the ending it may be a campaign's."""
+    with pytest.raises(MutatorError, match=r"no file nosuch\.yaml; expected a campaign: the path of a YAML"):
+        toycar.campaign("nosuch.yaml")
+    with pytest.raises(MutatorError, match=r"no file smal\.yaml.*did you mean 'small'\?"):
+        toycar.campaign("smal.yaml")
