@@ -140,6 +140,7 @@ def write(size: int, out: Path) -> dict[str, float]:
         outcomes=outcome_counts(rows),
         planned="",
         notes="",
+        study="",
         answers=answers_panel(ReportedRun.open(RunFolder.open(out), None)),
         panels=(),
         browse=browse,

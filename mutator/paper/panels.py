@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from mutator._common.files import write_atomic
 from mutator.outcomes.fault_free import own_alerts
 from mutator.paper import observations, observations_page
+from mutator.paper.observations import Verdict
 from mutator.paper.published import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import write_csv
@@ -15,7 +16,9 @@ _HTML = """\
 <h2>The paper's observations</h2>
 <p>{{ coverage }}</p>
 {% for one in observations %}
-<h3>{{ one.number }}. {{ one.title }} <span class="verdict">{{ one.verdict.value }}</span></h3>
+<details class="table"{{ " open" if one.verdict.value != undecided }}>
+<summary><h3>{{ one.number }}. {{ one.title }}
+<span class="verdict">{{ one.verdict.value }}</span></h3></summary>
 {{ table(one).as_html() }}
 <details><summary>Queries</summary>
 <pre>{{ session }}
@@ -29,6 +32,7 @@ _HTML = """\
 {% endfor %}
 {% endfor %}
 </pre></details>
+</details>
 {% endfor %}
 <p>{{ rules }}</p>
 """
@@ -37,7 +41,8 @@ _HTML = """\
 def observations_panel(run: ReportedRun) -> Panel | None:
     """The observations that the library cites, with observations.md and tables/observations.csv.
 
-    None when the library cites none, or when the run has none of the published fault types.
+    None when the library cites none, when the run has none of the published fault types, or when its
+    experiments decide none of the observations. Those that they decide come first.
     """
     if run.workspace is None:
         return None
@@ -53,6 +58,8 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     frame = run.frame.assign(t_end=run.frame["scenario"].map(ends))
     judged = observations.judge(file, frame, list(_lacks(run, missing)))
     coverage = _coverage(run, len(kinds), missing)
+    if all(one.verdict is Verdict.UNDECIDED for one in judged):
+        return None
     shown_ends = tuple(sorted(ends.items()))
     write_atomic(run.out / FILE, observations_page.markdown(judged, shown_ends, coverage).encode())
     write_csv(observations_page.sheet(judged), run.out)
@@ -65,7 +72,8 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     html = rendered(
         _HTML,
         coverage=coverage,
-        observations=judged,
+        observations=sorted(judged, key=lambda one: one.verdict is Verdict.UNDECIDED),
+        undecided=Verdict.UNDECIDED.value,
         table=observations_page.table,
         session=observations_page.session(shown_ends),
         rules=observations_page.rules(),

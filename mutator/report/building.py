@@ -3,16 +3,17 @@
 Written from results.csv and the run folder, so it can be made again at any time, the same each time.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mutator._common.files import write_atomic
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import outcome_counts
 from mutator.report.browse import browse_data
-from mutator.report.page import Content, markdown, page_html
-from mutator.report.panel import FOLDER
-from mutator.report.panels import PANELS
+from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
+from mutator.report.panel import FOLDER, Panel
+from mutator.report.panels import PANELS, study_panels
 from mutator.report.panels.answers import answers_panel
 from mutator.report.panels.tables import notes
 from mutator.report.stamp import is_current, made_from, remove_stamp, write_stamp
@@ -28,6 +29,9 @@ class Report:
     markdown: Path
     page: Path
     rows: int
+
+
+STUDY_FILES = ("STUDY.md", "study.html")  # of the report, where a study has something to say
 
 
 def ensure(run: Path, workspace: Workspace | None) -> Report:
@@ -51,12 +55,25 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     remove_stamp(out)
     sources = made_from(folder, workspace)
     reported = ReportedRun.open(folder, workspace)
-    content = _content(reported)
+    study = study_panels(reported)
+    content = _content(replace(reported, compared=bool(study)))
     text, hypertext = _files(out)
+    _write_study(content, study, out)
     write_atomic(text, markdown(content).encode())
     write_atomic(hypertext, page_html(content).encode())
     write_stamp(out, sources)
     return Report(markdown=text, page=hypertext, rows=len(reported.rows))
+
+
+def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:
+    """The page of the study; what an earlier report said of it is not of these results."""
+    text, hypertext = (out / name for name in STUDY_FILES)
+    if not panels:
+        text.unlink(missing_ok=True)
+        hypertext.unlink(missing_ok=True)
+        return
+    write_atomic(text, study_markdown(content, panels).encode())
+    write_atomic(hypertext, study_html(content, panels).encode())
 
 
 def _files(out: Path) -> tuple[Path, Path]:
@@ -64,14 +81,14 @@ def _files(out: Path) -> tuple[Path, Path]:
 
 
 def _content(run: ReportedRun) -> Content:
-    providers = (*(run.study.panels if run.study else ()), *PANELS)
-    panels = [panel for panel_of in providers if (panel := panel_of(run)) is not None]
+    panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
     return Content(
         name=str(run.folder.head["campaign"]),
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
         outcomes=outcome_counts(run.rows),
         planned=_planned(run.folder),
         notes=notes(run.folder).replace("*", ""),
+        study=run.study.about if run.study and run.compared else "",
         answers=answers_panel(run),
         panels=panels,
         browse=browse_data(run.folder, run.rows, run.out, run.workspace),

@@ -45,6 +45,7 @@ class Content:
 
     `alarm` stands before everything else, empty if there is none. `outcomes` counts how experiments ended,
     `planned` says in words how many there are to be, `notes` what the words of the counts mean.
+    `study` cites the study that has a page of its own, empty if there is none.
     `answers` come first, the list of experiments follows, then the other `panels`.
     """
 
@@ -53,6 +54,7 @@ class Content:
     outcomes: Mapping[str, int]
     planned: str
     notes: str
+    study: str
     answers: Panel
     panels: Sequence[Panel]
     browse: Browse  # the experiments themselves; the page alone has them
@@ -68,6 +70,7 @@ def markdown(content: Content) -> str:
         f"{counted(total, 'experiment')}: {endings}. {content.planned}",
         content.answers.markdown,
         *(panel.markdown for panel in content.panels),
+        f"Beside the published numbers: [STUDY.md](STUDY.md) ({content.study})." if content.study else "",
         "The table of all experiments is `results.csv`; `index.html` lists them with their diffs.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -86,3 +89,21 @@ def page_html(content: Content) -> str:
         scripts=[Markup(asset(name)) for name in SCRIPTS],
     )
     return str(html)
+
+
+def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
+    """The page of the study as Markdown."""
+    parts = (
+        f"# {content.name}, beside its study",
+        f"{content.study}.",
+        *(panel.markdown for panel in panels),
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def study_html(content: Content, panels: Sequence[Panel]) -> str:
+    """The page of the study as HTML that needs no other file."""
+    from markupsafe import Markup
+
+    styles = [Markup(asset(name)) for name in STYLES]
+    return str(rendered(asset("study.html"), content=content, panels=panels, styles=styles))

@@ -30,7 +30,7 @@ class ReportedRun:
 
     `rows` are all experiments of results.csv, `frame` the usable ones. Without a workspace nothing can be
     driven again, and no study can be asked. `study` is None if the campaign asks for none or if it is not
-    installed here.
+    installed here. `compared`: the study has something to say of these results, on a page of its own.
     """
 
     folder: RunFolder
@@ -39,6 +39,7 @@ class ReportedRun:
     frame: "DataFrame"
     engines: EngineSummary | None
     study: "Study | None"
+    compared: bool = False
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
@@ -92,8 +93,8 @@ class Study:
     """Published work, as its entry point in `mutator.studies` provides it; `about` cites it.
 
     `check` finds problems of its data in a fault library. `published` gives the counts that stand beside a
-    run's in the tables, None where they do not fit the run. Each of `panels` may add a part to the report
-    and write files beside it; `drawings` adds figures.
+    run's in the tables, None where they do not fit the run. Each of `panels` may give a part of the study's
+    page and write files beside it; without any there is no such page. `drawings` are figures of that page.
     """
 
     about: str

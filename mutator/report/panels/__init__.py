@@ -15,3 +15,15 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
     failed.failed_panel,
     origin.origin_panel,
 )
+
+
+def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
+    """The page of a run's study: what it says of these results, tables and figures beside the published ones.
+
+    Empty where the study has nothing to say: too few experiments, or none of its faults.
+    """
+    said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
+    if not said:
+        return ()
+    beside = (tables.published_panel(run), figures.study_figures(run))
+    return (*said, *(panel for panel in beside if panel))

@@ -3,7 +3,7 @@
 import base64
 from pathlib import Path
 
-from mutator.figures.figures import drawings, write_drawings
+from mutator.figures.figures import Drawing, drawings, write_drawings
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
@@ -23,8 +23,16 @@ _HTML = """\
 
 
 def figures_panel(run: ReportedRun) -> Panel | None:
-    """Figures of all results, then those that the study adds; None where there are none."""
-    made = drawings(run.frame) + (run.study.drawings(run) if run.study else ())
+    """Figures of all results; None where there are none."""
+    return _panel(drawings(run.frame), run)
+
+
+def study_figures(run: ReportedRun) -> Panel | None:
+    """The figures that the run's study adds; None where there are none."""
+    return _panel(run.study.drawings(run), run) if run.study else None
+
+
+def _panel(made: tuple[Drawing, ...], run: ReportedRun) -> Panel | None:
     write_drawings(made, run.out)
     if not made:
         return None

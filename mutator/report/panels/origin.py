@@ -61,7 +61,8 @@ def _study(run: ReportedRun) -> dict[str, str]:
         return {}
     if run.study and run.workspace:
         problems = study_problems(name, run.study, run.workspace)
-        why = f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else ""
+        silent = "" if run.compared else "; these results decide nothing of it"
+        why = f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else silent
         return {"study": f"{name} ({run.study.about}){why}"}
     why = "cannot be loaded here" if run.workspace else "needs a fault library, of which there is none here"
     return {"study": f"{name}, which {why}"}

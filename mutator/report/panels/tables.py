@@ -18,6 +18,7 @@ from mutator.outcomes.rows import (
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
+from mutator.statistics.published import Published
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.sheets import run_sheets
 from mutator.store.run_folder import RunFolder
@@ -36,23 +37,29 @@ _GROUPS = (
     ("By method", "method", by_method),
 )
 _HTML = """\
-<h2>Tables</h2>
+<h2>{{ title }}</h2>
 {% for title, table in counts %}
-<h3>{{ title }}</h3>
+<details class="table"{{ " open" if loop.first }}>
+<summary><h3>{{ title }}</h3></summary>
 {% if note %}
 <p>{{ note }}</p>
 {% endif %}
 {{ table.as_html("counts") }}
+</details>
 {% endfor %}
 {% if fault_free %}
-<h3>Fault-free runs</h3>
+<details class="table">
+<summary><h3>Fault-free runs</h3></summary>
 <p>{{ about }}</p>
 {{ fault_free.as_html() }}
+</details>
 {% endif %}
 {% for sheet in sheets %}
-<h3>{{ sheet.title }}</h3>
+<details class="table">
+<summary><h3>{{ sheet.title }}</h3></summary>
 <p>{{ sheet.note }}</p>
 {{ sheet.table().as_html() }}
+</details>
 {% endfor %}
 """
 
@@ -63,10 +70,12 @@ def notes(folder: RunFolder) -> str:
 
 
 def tables_panel(run: ReportedRun) -> Panel:
-    """Counts by fault type, scenario and method, then what statistics say of them."""
+    """Counts by fault type, scenario and method, then what statistics say of them; statistics that stand
+    beside published ones are on the page of the study."""
     runs = run.fault_free()
     note = own_alerts(runs)
-    counts, sheets = _counts(run), [_noted(sheet, note) for sheet in _sheets(run)]
+    own = () if run.compared else _statistics(run, None)
+    counts, sheets = _counts(run), [_noted(sheet, note) for sheet in (*own, *_spreads(run))]
     write_sheets(sheets, run.out)
     parts = [notes(run.folder)]
     for title, table in counts:
@@ -75,8 +84,30 @@ def tables_panel(run: ReportedRun) -> Panel:
     if fault_free:
         parts += ["## Fault-free runs", FAULT_FREE, fault_free.as_markdown()]
     parts += [sheet.markdown().rstrip() for sheet in sheets]
-    html = rendered(_HTML, counts=counts, note=note, fault_free=fault_free, about=FAULT_FREE, sheets=sheets)
+    html = rendered(
+        _HTML,
+        title="Tables",
+        counts=counts,
+        note=note,
+        fault_free=fault_free,
+        about=FAULT_FREE,
+        sheets=sheets,
+    )
     return Panel(anchor="tables", link="Tables", markdown="\n\n".join(parts), html=html)
+
+
+def published_panel(run: ReportedRun) -> Panel | None:
+    """The statistics of a run beside those that its study published; None where there are none."""
+    note = own_alerts(run.fault_free())
+    published = run.study.published(run) if run.study else None
+    sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
+    if not sheets:
+        return None
+    write_sheets(sheets, run.out)
+    title = "Tables beside the published ones"
+    markdown = "\n\n".join([f"## {title}", *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
+    html = rendered(_HTML, title=title, counts=(), fault_free=None, sheets=sheets)
+    return Panel(anchor="tables", link="Tables", markdown=markdown, html=html)
 
 
 def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
@@ -88,17 +119,20 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
     return made
 
 
-def _sheets(run: ReportedRun) -> tuple[Sheet, ...]:
-    """The statistics of a run, beside published counts if its study has some of its fault types."""
-    published = run.study.published(run) if run.study else None
+def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
+    """What can be compared by method and scenario, beside published counts if there are some."""
     alerts = {name: record.alerts for name, record in run.folder.records().items()}
-    sheets = run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
-    more = (
+    return run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
+
+
+def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
+    """How bad the runs were: severity, times to the hazard, metrics."""
+    made = (
         severity_sheet(run.frame),
         tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
         metrics_sheet(run.frame, run.folder.head.get("metrics", ())),
     )
-    return (*sheets, *(sheet for sheet in more if sheet.lines))
+    return tuple(sheet for sheet in made if sheet.lines)
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:

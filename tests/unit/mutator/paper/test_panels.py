@@ -28,7 +28,17 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
     folder = RunFolder.open(tmp_path / "run")
     (folder.path / "report").mkdir()
     kinds = [kind.split("/") for _, kind in load_paper(REFERENCES).coverage]
-    frame = results(*({"module": m, "fault_type": kind, "seed": i} for i, (m, kind) in enumerate(kinds)))
+    against = {
+        "module": "vision_output",
+        "fault_type": "relative_distance",
+        "t_activation": 1,
+        "h1": 1,
+        "t_h1": 2,
+    }
+    all_kinds = [{"module": m, "fault_type": kind, "seed": i} for i, (m, kind) in enumerate(kinds)]
+    frame = results(
+        *all_kinds, against
+    )  # the paper saw no hazard of this kind: its second observation is decided
     of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
     assert of_all
     for done in (folder.planned - 1, folder.planned):
@@ -38,3 +48,14 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
         text = (folder.path / "report" / "observations.md").read_text()
         why = f"cannot be told: only {done} of the 12 experiments of the plan have been run"
         assert text.count(why) == (0 if done == 12 else of_all)
+
+
+def test_results_that_decide_nothing_say_nothing_of_the_study(toycar: Workspace, tmp_path: Path) -> None:
+    """Faults of the paper that never became active: no part of a report, and no file."""
+    shutil.copytree(REFERENCES, toycar.library / "references")
+    freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+    folder = RunFolder.open(tmp_path / "run")
+    frame = results({"module": "radar", "fault_type": "chaff"})
+    run = ReportedRun(folder=folder, workspace=toycar, rows=(), frame=frame, engines=None, study=None)
+    assert observations_panel(run) is None
+    assert not (folder.path / "report").exists()

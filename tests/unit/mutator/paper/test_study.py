@@ -8,34 +8,46 @@ import pytest
 from mutator.report import building
 from mutator.workspace import Workspace
 
-from ..report.made_run import Page, make_run
+from ..report.made_run import COLUMNS, OK, Page, make_run
 
 HERE = Workspace.find(Path(__file__).parents[4])
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A made-up run whose campaign asks for the study."""
-    return make_run(tmp_path, study="driving_agent_resilience")
+    """A made-up run whose campaign asks for the study; one hazard speaks against the second observation."""
+    made = make_run(tmp_path, study="driving_agent_resilience", experiments=4)
+    with (made / "results.csv").open("a", newline="") as file:
+        kind = {"module": "vision_output", "fault_type": "relative_distance"}
+        csv.DictWriter(file, COLUMNS, restval="").writerow(OK | kind | {"experiment_id": "4" * 16})
+    return made
+
+
+def study_forms(run: Path) -> tuple[str, str]:
+    """The text of the study's Markdown and of its page."""
+    building.write(run, HERE)
+    report = run / "report"
+    return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)
 
 
 def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
-    """They are in the Markdown, in the page, and in files of their own."""
-    written = building.write(run, HERE)
+    """They are in the study's Markdown and page, not in the report's, and in files of their own."""
+    forms = study_forms(run)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
-    assert all(cell in file.read_text() for file in (written.markdown, written.page, files[0]))
+    assert all(cell in text for text in (*forms, files[0].read_text()))
+    assert not any(cell in (run / "report" / name).read_text() for name in ("REPORT.md", "index.html"))
     assert files[1].read_text().splitlines()[1].startswith("radar/chaff,paper,432,480,0.9,")
 
 
 def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
     """A claim's query stands in the file and in the page; the table has a line for each query."""
-    written = building.write(run, HERE)
+    text, page = study_forms(run)
     file, table = run / "report/observations.md", run / "report/tables/observations.csv"
     query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
     assert query in file.read_text()
-    assert query in "".join(Page(written.page.read_text()).texts)
-    assert "(observations.md)" in written.markdown.read_text()
+    assert query in page
+    assert "(observations.md)" in text
     with table.open(newline="") as lines:
         assert query in [line["query"] for line in csv.DictReader(lines)]
 
@@ -47,14 +59,28 @@ def test_without_a_library_there_are_no_observations(run: Path) -> None:
     assert not (run / "report" / "observations.md").exists()
 
 
+def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
+    """Both forms do while there is such a page; it goes once the results say nothing of the study."""
+    written = building.write(run, HERE)
+    assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
+    assert "study.html" in Page(written.page.read_text()).links
+    lines = (run / "results.csv").read_text().splitlines(keepends=True)
+    (run / "results.csv").write_text("".join(lines[:-1]))
+    written = building.write(run, HERE)
+    assert "STUDY.md" not in written.markdown.read_text()
+    assert "study.html" not in Page(written.page.read_text()).links
+    assert not (run / "report" / "study.html").exists()
+    assert "these results decide nothing of it" in written.markdown.read_text()
+
+
 def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
     """A hazard whose experiment is in no plan has no trace: both forms say so, none shows a picture."""
-    written = building.write(run, HERE)
-    for text in (written.markdown.read_text(), " ".join(Page(written.page.read_text()).texts)):
+    forms = study_forms(run)
+    for text in forms:
         assert "No figure: the traces it needs cannot be had" in text
         assert "t_h1 > t_activation" in text
-    assert "action_" not in written.markdown.read_text()
-    assert "<figure" not in written.page.read_text().replace('el("figure"', "")
+    assert "action_" not in forms[0]
+    assert "<figure" not in (run / "report" / "study.html").read_text()
 
 
 def test_a_library_without_the_papers_numbers_is_said_in_the_origin(run: Path, toycar: Workspace) -> None:
