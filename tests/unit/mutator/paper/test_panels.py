@@ -34,6 +34,7 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
         "t_activation": 1,
         "h1": 1,
         "t_h1": 2,
+        "seed": 99,
     }
     all_kinds = [{"module": m, "fault_type": kind, "seed": i} for i, (m, kind) in enumerate(kinds)]
     frame = results(
