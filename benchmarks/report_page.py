@@ -29,9 +29,9 @@ from mutator.mutants.readable_diffs import readable
 from mutator.outcomes import results
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import outcome_counts
+from mutator.outcomes.sampling import Sampler
 from mutator.report import browse as report_browse
 from mutator.report import page as report_page
-from mutator.report import series as report_series
 from mutator.report.browse import Browse
 from mutator.report.page import Content
 from mutator.report.panels.answers import answers_panel
@@ -40,6 +40,8 @@ from mutator.review.groups import shapes
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.series_format import encode
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
 from mutator.web import embedded
 from mutator.workspace import Workspace
 
@@ -60,13 +62,15 @@ TIMED = f"""async () => {{
     return performance.now() - began;
 }}"""
 CLEARED = f"async () => {{ document.querySelector('#chips .clear, #chips .chip')?.click(); {SHOWN} }}"
+SERIES = 48  # different ones
 STEPS = {  # what a reader does first
     "filter": "document.querySelector('#heat .cell:not(.nothing)').click()",
     "sort": "document.querySelector('[data-column=t_hazard] button').click()",
     "search": "const s = document.querySelector('#search'); s.value = 'chaff 35';"
     " s.dispatchEvent(new Event('input')); await new Promise((done) => setTimeout(done, 120))",
     "experiment": "document.querySelector('#grid tr[data-at]').click();"
-    " while (!document.querySelector('#experiment .diff')) await new Promise((done) => setTimeout(done, 1))",
+    " while (!document.querySelector('#experiment .replay :is(.plot, canvas)'))"
+    " await new Promise((done) => setTimeout(done, 1))",
 }
 
 
@@ -98,20 +102,27 @@ def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator
         yield experiment.id, "", known[key]
 
 
-def made_series(workspace: Workspace, records: Sequence[Record]) -> Iterator[Markup]:
-    """A series of each record, of traces that are as long as real ones."""
+def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> float:
+    """Write series of traces as long as real ones, each of them of many records; KB of the index."""
     manifest = workspace.manifest("openpilot")
     draw = np.random.default_rng(1)
-    channels = [channel.name for channel in (*manifest.compared, *manifest.plotted)]
-    for one in records:
-        golden = {"t": np.arange(3000) / 100}
-        faulty = {"t": np.arange(3000) / 100}
-        for name in channels:
-            golden[name] = draw.normal(size=3000).cumsum().cumsum()
-            change = draw.normal(size=2000).cumsum().cumsum()  # as long as the fault is active
-            faulty[name] = golden[name] + np.concatenate((np.zeros(1000), change))
-        data = report_series.packed_series(manifest, golden, faulty, one)
-        yield Markup(embedded(data, f"series-{one.experiment_id}"))
+    names = [channel.name for channel in manifest.channels]
+    time = {manifest.time_channel: np.arange(3000) / 100}
+    golden = time | {name: draw.normal(size=3000).cumsum().cumsum() for name in names}
+    sampler, made = Sampler(manifest, golden), []
+    for one in records[:SERIES]:
+        change = draw.normal(size=2000).cumsum().cumsum()  # as long as the fault is active
+        faulty = golden | {
+            name: golden[name] + np.concatenate((np.zeros(1000), change)) for name in names[:7]
+        }
+        made.append(encode(sampler.series(faulty, one), sampler.golden))
+    writer = SeriesWriter(out, "0001-main")
+    for number, one in enumerate(records):
+        data = EncodedSeries(key="S1", golden=sampler.encoded, faulty=made[number % len(made)])
+        writer.append(one.experiment_id, data)
+    writer.close()
+    pack(out, "plan", {one.experiment_id: number for number, one in enumerate(records)}, 500)
+    return (out / "series" / "index.js").stat().st_size / 1000
 
 
 def write(size: int, out: Path) -> dict[str, float]:
@@ -126,13 +137,10 @@ def write(size: int, out: Path) -> dict[str, float]:
     shown = [experiments[row.experiment_id] for row in rows]
     details = report_browse.details(shown, shapes(patches(workspace, shown)), rows)
     detail = embedded(details, "details")
-    records = [record(experiment, n) for n, experiment in enumerate(shown[: report_series.CHOSEN])]
-    series = list(made_series(workspace, records))
+    index_kb = write_series(workspace, [record(e, n) for n, e in enumerate(shown)], out)
     browse = Browse(
-        facts=Markup(json.dumps({"filmed": True, "series": []})),
-        scripts=(*map(Markup, (table, detail, embedded({}, "media"))), *series),
-        carried=len(series),
-        carried_kb=0,
+        facts=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
+        scripts=tuple(map(Markup, (table, detail, embedded({}, "media")))),
     )
     content = Content(
         name=f"{size} experiments",
@@ -146,9 +154,11 @@ def write(size: int, out: Path) -> dict[str, float]:
         browse=browse,
     )
     page = report_page.page_html(content)
-    (out / "index.html").write_text(page)
-    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "series_kb": "".join(series)}
-    return {"table_s": table_s} | {name: len(text.encode()) / 1000 for name, text in sizes.items()}
+    (out / "report").mkdir()
+    (out / "report" / "index.html").write_text(page)
+    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail}
+    found = {name: len(text.encode()) / 1000 for name, text in sizes.items()}
+    return {"table_s": table_s} | found | {"index_kb": index_kb}
 
 
 def opened(browser: Any, page_file: Path, repeat: int) -> dict[str, float]:
@@ -188,7 +198,7 @@ def main() -> int:
         for size in options.sizes:
             out = Path(folder) / str(size)
             found[size] = write(size, out)
-            found[size] |= opened(browser, out / "index.html", options.repeat)
+            found[size] |= opened(browser, out / "report" / "index.html", options.repeat)
         browser.close()
     names = list(next(iter(found.values())))
     print("experiments " + " ".join(f"{name:>13}" for name in names))

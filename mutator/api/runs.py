@@ -30,10 +30,12 @@ from mutator.outcomes import rows as tables
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs, own_alerts
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.reader import Results
-from mutator.report import building, series
+from mutator.outcomes.sampling import keep_series
+from mutator.report import building
 from mutator.report.film import Shot, film_experiment
 from mutator.store import cleaning, plan_file
 from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.series import SeriesFolder
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
@@ -219,8 +221,8 @@ class Run:
     def report(self, *, anew: bool = False) -> building.Report:
         """Write the report, Markdown and one HTML page, unless it is up to date.
 
-        `anew` writes it at any rate. It may drive a few experiments again. Where no library is found, the
-        results stand alone.
+        `anew` writes it at any rate. No experiment is driven for it. Where no library is found, the results
+        stand alone.
         """
         workspace = self._workspace_if_any()
         if not anew:
@@ -324,7 +326,7 @@ class RunExperiment(ExperimentResult):
     def rerun(self, *, keep: bool = False) -> Trial:
         """Drive it again; `Trial.same_as_record` says whether the record is the campaign's.
 
-        With `keep` its trace, its plot and what the report's page draws stay in the run folder. MutatorError
+        With `keep` its trace, its series and its plot stay in the run folder. MutatorError
         when target, templates or scenario have changed since.
         """
         run, folder = self.run, self.run.folder
@@ -341,7 +343,7 @@ class RunExperiment(ExperimentResult):
         )
         if keep and trial.save_plot(self.plot_file):
             golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
-            series.keep(folder, manifest, golden, faulty, single.record)
+            keep_series(folder.path, manifest, golden, faulty, single.record)
         return trial
 
     def film(self, shots: Sequence[Shot]) -> bool:
@@ -366,8 +368,8 @@ class RunExperiment(ExperimentResult):
 
     @property
     def is_drawn(self) -> bool:
-        """Whether the run folder has its plot and what the report's page draws."""
-        return self.plot_file.exists() and series.series_path(self.run.folder, self.id).exists()
+        """Whether the run folder has its plot and its series."""
+        return self.plot_file.exists() and SeriesFolder(self.run.path).has(self.id)
 
     def not_run(self) -> MutatorError:
         """What to say of an experiment that is only planned."""

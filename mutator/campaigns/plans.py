@@ -54,7 +54,8 @@ class Choices:
 
     `only` and `exclude` are filter expressions (`mutator.campaigns.filters`) over the columns known before
     running; `limit` keeps that many experiments, spread as a campaign's `sample` but guided and random ones
-    in pairs; `shard` (`k/n`) is the share of the plan that its run folder will run.
+    in pairs; `shard` (`k/n`) is the share of the plan that its run folder will run; `series_mb` is the budget
+    of its series, 0 for none.
     """
 
     seed: int | None = None
@@ -63,9 +64,10 @@ class Choices:
     exclude: str | None = None
     limit: int | None = None
     shard: str | None = None
+    series_mb: int | None = None
 
     def __post_init__(self) -> None:
-        for name, least in (("seed", 0), ("limit", 1)):
+        for name, least in (("seed", 0), ("limit", 1), ("series_mb", 0)):
             if (value := getattr(self, name)) is not None:
                 check_whole(name, value, least=least)
         for name in ("reading", "only", "exclude", "shard"):

@@ -3,6 +3,7 @@
 import shlex
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,6 +25,7 @@ from mutator.cli.options import (
     Place,
     Reading,
     Seed,
+    SeriesMb,
     ShardOf,
     with_place,
 )
@@ -159,6 +161,7 @@ def run(
     seed: Seed = None,
     reading: Reading = None,
     shard: ShardOf = None,
+    series_mb: SeriesMb = None,
     engine: Engine = None,
     reviewed: Annotated[
         bool,
@@ -175,6 +178,7 @@ def run(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     chosen = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
+    chosen = replace(chosen, series_mb=series_mb)
     try:
         with campaign_progress(terminal) as notify, warnings.catch_warnings():
             warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_end` says it in full

@@ -66,6 +66,15 @@ ShardOf = Annotated[
     str | None,
     typer.Option("--shard", metavar="K/N", help="Run the K-th of N shares of the plan; see `merge`."),
 ]
+SeriesMb = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        metavar="N",
+        help="Keep at most so many MB of channels over time, those of the worst experiments first; 0: none. "
+        "Default: 500.",
+    ),
+]
 Engine = Annotated[
     str | None,
     typer.Option(

@@ -19,14 +19,19 @@ from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
 from mutator.outcomes.judging import load_channels, load_judged
 from mutator.outcomes.propagation import departures
+from mutator.outcomes.sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge
+from mutator.store.run_folder import golden_key
+from mutator.store.series_format import encode
+from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
     """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
-    None without a mutant or a run. `mode`, `why` and `start` are the execution's."""
+    None without a mutant or a run. `mode`, `why` and `start` are the execution's. `series` is None where
+    none was asked for, and of what did not end well."""
 
     experiment: Experiment
     record: Record
@@ -38,6 +43,7 @@ class Finished:
     mode: RunMode | None = None  # None: it was not run
     why: str = ""
     start: int = 0
+    series: EncodedSeries | None = None
 
 
 class Goldens:
@@ -47,6 +53,7 @@ class Goldens:
         self._manifest = manifest
         self._folder_of = folder_of
         self._traces: dict[tuple[str, tuple[str, ...]], Trace] = {}
+        self._samplers: dict[str, Sampler] = {}
 
     def folder(self, experiment: Experiment) -> Path:
         """Where the run without the fault left its files."""
@@ -59,6 +66,13 @@ class Goldens:
             self._traces[key] = load_channels(self._manifest, folder)
         return self._traces[key]
 
+    def sampler(self, experiment: Experiment) -> Sampler:
+        """What makes the series of runs that are compared with the golden run of an experiment."""
+        key = golden_key(experiment.scenario, experiment.changes)
+        if key not in self._samplers:
+            self._samplers[key] = Sampler(self._manifest, self.trace(experiment))
+        return self._samplers[key]
+
 
 class Runner:
     """Runs experiments on an engine, in the engine's order."""
@@ -70,12 +84,15 @@ class Runner:
         engine: Engine,
         goldens: Goldens,
         scenario_file: Callable[[str], Path],
+        *,
+        with_series: bool = False,
     ) -> None:
         self.manifest = manifest
         self.models = models
         self.engine = engine
         self.goldens = goldens
         self.scenario_file = cache(scenario_file)
+        self.with_series = with_series
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
         """Each experiment with its record; what cannot be built has its record without being run, and what
@@ -125,8 +142,9 @@ class Runner:
         return Finished(experiment=experiment, record=_bare(experiment, status, place + err.got, None))
 
     def _finish(self, experiment: Experiment, built: Mutant, execution: Execution) -> Finished:
+        faulty = None
         try:
-            record = self._record(experiment, built, execution)
+            record, faulty = self._record(experiment, built, execution)
         except BadOutput as err:
             record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
         return Finished(
@@ -140,6 +158,17 @@ class Runner:
             mode=execution.mode,
             why=execution.why,
             start=execution.start,
+            series=self._series(experiment, record, faulty) if faulty is not None else None,
+        )
+
+    def _series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:
+        if not self.with_series:
+            return None
+        sampler = self.goldens.sampler(experiment)
+        return EncodedSeries(
+            key=golden_key(experiment.scenario, experiment.changes),
+            golden=sampler.encoded,
+            faulty=encode(sampler.series(faulty, record), sampler.golden),
         )
 
     def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
@@ -147,14 +176,17 @@ class Runner:
         models = [self.models.get(injection.model) for injection in experiment.fault.injections]
         return {name for name, model in zip(built.injections, models, strict=True) if model.raises}
 
-    def _record(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
+    def _record(
+        self, experiment: Experiment, built: Mutant, execution: Execution
+    ) -> tuple[Record, Trace | None]:
+        """The record, and the trace of a run that ended well."""
         if execution.status is not Status.OK or execution.probe is None:
             status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
             # a time-out's count depends on the machine's speed, a crash's does not
             crashed = status is Status.CRASHED
             activation = activation_of(execution.probe or {}) if crashed else None
             bare = _bare(experiment, status, detail, built, activation)
-            return replace(bare, error=error_of(execution.raised))
+            return replace(bare, error=error_of(execution.raised)), None
         activation = activation_of(execution.probe)
         reference = self.goldens.trace(experiment)
         try:
@@ -162,13 +194,13 @@ class Runner:
         except BadOutput as err:
             if activation is None:
                 raise
-            return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation)
+            return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation), None
         time = self.manifest.time_channel
         difference = golden.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
-            return _bare(experiment, Status.HARNESS_ERROR, problem, built)
+            return _bare(experiment, Status.HARNESS_ERROR, problem, built), None
         hazards = first_events(judged.hazards, activation)
-        return Record(
+        record = Record(
             experiment_id=experiment.id,
             status=Status.OK,
             outcome=judge(activation=activation, t_manifest=difference.t_first, hazards=hazards),
@@ -186,6 +218,7 @@ class Runner:
             metrics=judged.metrics,
             left=departures(reference, faulty, self.manifest.channels, time, judged.t_end),
         )
+        return record, faulty
 
 
 def _problem_of(err: BadOutput) -> str:

@@ -29,9 +29,12 @@ from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWa
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
+from mutator.outcomes.ranking import badness
+from mutator.outcomes.reader import Results
 from mutator.store import digests
 from mutator.store.progress import Progress, label
 from mutator.store.run_folder import RunFolder
+from mutator.store.series_packing import pack, segments
 from mutator.targets.requirements import check_requirements
 from mutator.verification import equivalence
 from mutator.verification.preflight import are_there, run_checks, unreached_triggers
@@ -161,6 +164,7 @@ class Session:
         with self._noting_full_disk():
             self._close_segments()
             built = results.ensure(self.folder.path)
+            self._pack_series()
         proven = equivalence.judge(self.folder, records)
         not_forked = "" if proven else self._not_forked
         if proven and done == self.folder.planned and (why := equivalence.needless(self.folder)) is not None:
@@ -197,6 +201,14 @@ class Session:
         """Enter what this session's workers wrote; if one is still dying, the next session does it."""
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
+
+    def _pack_series(self) -> None:
+        """Pack what this session's workers appended; if one is still dying, the next session does it."""
+        folder = self.folder
+        if segments(folder.path) and not wait_for_workers(folder.path):
+            rows = Results.of_run(folder.path).rows()
+            worth = {row.experiment_id: badness(row) for row in rows if row.status is Status.OK}
+            pack(folder.path, folder.head["plan"], worth, folder.series_mb)
 
 
 @contextmanager

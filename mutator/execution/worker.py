@@ -20,6 +20,7 @@ from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.series_packing import SeriesWriter
 from mutator.verification import equivalence
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
@@ -49,7 +50,10 @@ class Worker:
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
-        self._runner = self._make_runner(self._engine(assignment.engine))
+        self._series = SeriesWriter(self.folder.path, assignment.name) if self.folder.series_mb else None
+        self._runner = self._make_runner(
+            self._engine(assignment.engine), with_series=self._series is not None
+        )
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
         self._needs_proof: bool | None = None  # None: nothing that it ran itself says so
@@ -99,14 +103,16 @@ class Worker:
     def close(self) -> None:
         """End the engine; sync and close this worker's files."""
         self._runner.engine.close()
-        for writer in (self._records, self._timings, self._proofs):
+        for writer in (self._records, self._timings, self._proofs, self._series):
             if writer is not None:
                 writer.close()
 
-    def _make_runner(self, engine: Engine) -> Runner:
+    def _make_runner(self, engine: Engine, *, with_series: bool = False) -> Runner:
         goldens = Goldens(self._manifest, self.folder.golden)
         models = self._workspace.fault_models()
-        return Runner(self._manifest, models, engine, goldens, self._workspace.scenario)
+        return Runner(
+            self._manifest, models, engine, goldens, self._workspace.scenario, with_series=with_series
+        )
 
     def _engine(self, name: str) -> Engine:
         folder = self.folder
@@ -130,6 +136,8 @@ class Worker:
         """Patch first, record last: what has a record has everything."""
         if finished.mutant is not None:
             self._write_patch(finished.experiment, finished.mutant.patch_bytes)
+        if self._series is not None and finished.series is not None:
+            self._series.append(finished.experiment.id, finished.series)
         self._timings.append(
             {
                 "experiment_id": finished.experiment.id,

@@ -24,9 +24,9 @@ from mutator.outcomes.columns import is_text
 from mutator.outcomes.ranking import worst
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
-from mutator.report import series as report_series
 from mutator.report.answers import warning
 from mutator.report.scenes import scene_facts
+from mutator.report.series import sample_kept_traces, series_facts
 from mutator.review.groups import Shape, shapes
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -43,37 +43,28 @@ STILLS_BYTES = 4_000_000  # of pictures in the page; more are links
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browse:
-    """What the page's scripts get: `facts` as JSON, the rest in script elements; of how many experiments the
-    series are among them, and how large these are."""
+    """What the page's scripts get: `facts` as JSON, the rest in script elements."""
 
     facts: Markup
     scripts: tuple[Markup, ...]
-    carried: int
-    carried_kb: int
 
 
 def browse_data(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "Workspace | None") -> Browse:
     """Of a run folder and the rows of its results.csv; the page will be in the folder `out`."""
-    names = report_series.chosen(rows)
-    carried = {}
     if workspace:
-        carried = report_series.carried(folder, workspace, names)
-        report_series.keep_traces(folder, workspace, but=names)
-    series = [Markup(embedded(data, f"series-{name}")) for name, data in carried.items()]
+        sample_kept_traces(folder, workspace)
     data = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
     data["table"], data["details"] = tables_of(folder, rows)
     facts = {
         **_of_target(folder, workspace),
-        "series": report_series.kept(out),
+        "series": series_facts(folder),
         "metrics": folder.head.get("metrics", []),
         "severity": folder.head.get("severity"),
         "hazards": folder.head.get("about_hazards", []),
     }
     return Browse(
         facts=Markup(json.dumps(facts).replace("<", "\\u003c")),
-        scripts=(*(Markup(embedded(value, name)) for name, value in data.items()), *series),
-        carried=len(series),
-        carried_kb=sum(map(len, series)) // 1000,
+        scripts=tuple(Markup(embedded(value, name)) for name, value in data.items()),
     )
 
 

@@ -23,6 +23,7 @@ SCRIPTS = (  # each uses those before it
     "columns.js",
     "details.js",
     "series.js",
+    "series_file.js",
     "replay_formula.js",
     "replay_data.js",
     "replay_clock.js",

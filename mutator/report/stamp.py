@@ -7,8 +7,10 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.outcomes.reader import Results
+from mutator.report.series import series_facts
 from mutator.review import gate
 from mutator.store import digests
+from mutator.store import series as series_store
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.verification import equivalence
@@ -20,9 +22,10 @@ FILE = "made_from.json"
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     """Digest of all that a report depends on: results, run.json, records, timings, proof, reviews,
-    pictures that it shows, what the library cites, and mutator's own sources."""
+    series and pictures that it shows, what the library cites, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
+    series = [series_facts(folder), _files(run, f"{series_store.FOLDER}/{series_store.INDEX}.js")]
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
     sources = Path(__file__).parents[1]
     own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
@@ -30,7 +33,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
     sealed = [_files(run, name) for name in (gate.FILE, digests.FILE)]
-    return digest([SCHEMA, own, results, engine, plots, references, *sealed])
+    return digest([SCHEMA, own, results, engine, plots, series, references, *sealed])
 
 
 def is_current(out: Path, made_from: str) -> bool:
@@ -48,7 +51,7 @@ def write_stamp(out: Path, made_from: str) -> None:
 
 
 def _written(out: Path) -> dict[str, str]:
-    """Digest of each file of a report, the series that its page loads included; comparisons are no part."""
+    """Digest of each file of a report; comparisons are no part."""
     paths = {path.relative_to(out): path for path in out.rglob("*") if path.is_file()}
     return {
         name.as_posix(): digest(path.read_bytes())

@@ -13,6 +13,8 @@ DIR/
   records/<session>-<worker>.jsonl               one line per finished experiment, appended
   timings/<session>-<worker>.jsonl               CPU and wall time, host: what may differ between runs
   proof/<session>-<worker>.jsonl                 records of the sample run again on the reference engine
+  series/index.js, series/*.js                   channels over time of each experiment, thinned and packed
+  series/<session>-<worker>.blocks               these as they are appended, until they are packed
   traces/<experiment>/                           on request (`rerun --trace`)
   plots/                                         plots, stills and films of experiments (`show`)
   results.csv, results.parquet, propagation.parquet, timings.parquet    derived; can be made again at any time
@@ -41,11 +43,13 @@ from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
 
+SERIES_MB = 500  # of a run, unless it was planned with another number
 _LOOKS = 3  # at a folder whose owner writes while it is looked at
 SCRATCH = "work"
 CONTENT = (  # all that may be in a run folder; * stands for any text, folders included
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *("golden/*/*", "patches/*.patch", "records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
+    *("series/*.js", "series/*.blocks"),
     *("traces/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
@@ -179,6 +183,12 @@ class RunFolder:
         """What makes classes of delta-v; None for a target without contacts, and in older runs."""
         told = self.head.get("severity")
         return Scale.from_plain(told) if told else None
+
+    @property
+    def series_mb(self) -> int:
+        """How many MB of series are kept at most."""
+        chosen = self.head["choices"].get("series_mb")  # not there in earlier runs
+        return SERIES_MB if chosen is None else int(chosen)
 
     @property
     def has_alerts(self) -> bool:

@@ -5,7 +5,8 @@ mutator, Python and packages, of the checks and golden runs, and of each record 
 processors and the git commit are not in it, nor is how the work was cut into sessions, workers and shards.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
@@ -32,13 +33,18 @@ def seal_of(folder: RunFolder) -> str | None:
     head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
     facts = {key: head[key] for key in _HEAD}
     facts |= {
-        "choices": head["choices"] | {"shard": None},  # how the work was cut
+        "choices": _choices(head["choices"]),
         "mutator": head["provenance"]["mutator"],
         "checks": checks["results"],
         "goldens": golden_digests(folder, head["golden_files"]),
         "versions": _versions(folder),
     }
     return digest([SCHEMA, facts, *(_records(folder, kind) for kind in digests.SEGMENTS)])
+
+
+def _choices(given: Mapping[str, Any]) -> dict[str, Any]:
+    """But for how the work was cut, and how much is kept to look at."""
+    return {name: value for name, value in given.items() if name != "series_mb"} | {"shard": None}
 
 
 def seal_or_why_not(folder: RunFolder) -> str:

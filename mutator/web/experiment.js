@@ -176,21 +176,16 @@ class Experiment {
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
-    const [details, media, series] = await Promise.all([Details.read(), Packed.read("media"), Experiment.#series(id)]);
+    const [details, media, series] = await Promise.all([Details.read(), Packed.read("media"), SeriesFile.load(id).catch((error) => error)]);
     if (this.row !== row) return; // another one was opened meanwhile
     this.#change(details.patch(row));
     const spec = details.spec(row);
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
     this.#pictures(id, media && media[id]);
     const place = this.#content("replay");
-    if (series && typeof SeriesFile !== "undefined") Replay.show(place, series, this.facts);
-    else if (series) Series.show(place, series);
-    else this.#noSeries(id, this.facts.onDemand.has(id));
-  }
-
-  /** The series of an experiment; null where there is none. */
-  static #series(id) {
-    return typeof SeriesFile === "undefined" ? Series.inPage(id) : SeriesFile.load(id);
+    if (series instanceof Error) place.replaceChildren(Dom.el("p", { role: "alert" }, series.message));
+    else if (series) Replay.show(place, series, this.facts);
+    else this.#noSeries(id);
   }
 
   /** How far the fault came; `Path` gets the results of this experiment as `text(name)` and `number(name)`. */
@@ -250,23 +245,17 @@ class Experiment {
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
   }
 
-  #noSeries(id, isThere) {
+  #noSeries(id) {
     const { el } = Dom;
     const place = this.#content("replay");
     const said = el("p", { role: "status" });
     const load = async () => {
-      try {
-        const series = await Series.load(id);
-        if (this.text("experiment_id") === id) Series.show(place, series);
-      } catch {
-        said.textContent = `There is no series/${id}.js beside this page yet.`;
-      }
+      const series = await SeriesFile.load(id, { isNew: true }).catch((error) => error);
+      if (this.text("experiment_id") !== id) return;
+      if (!series || series instanceof Error) said.textContent = series ? series.message : "There is no series of it yet.";
+      else Replay.show(place, series, this.facts);
     };
-    if (isThere) {
-      load();
-      return;
-    }
-    place.replaceChildren(el("p", {}, "This page carries the plots of a few experiments only. This command makes those of this one:"),
+    place.replaceChildren(el("p", {}, "The channels of this experiment are not in the run folder: it did not end well, there was no room for them, or it ran with an older version. This command drives it again:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
       el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " once it has run."), said);
   }

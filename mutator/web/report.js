@@ -16,7 +16,7 @@ const Report = (() => {
   async function start() {
     const data = await Packed.read("table");
     const given = JSON.parse(find("facts").textContent);
-    const facts = { ...given, run: runFolder, onDemand: new Set(given.series) };
+    const facts = { ...given, run: runFolder };
     const table = new Rows.Table(data);
     let drawn = null;
     const state = new State(() => update());

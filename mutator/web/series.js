@@ -1,31 +1,22 @@
 "use strict";
 // Golden against faulty on one time axis: a panel for each channel, marks of what happened when, and beneath
-// each panel a strip of how much the two differ. Series are in the page, or in series/<experiment>.js beside it.
+// each panel a strip of how much the two differ.
 
 const Series = (() => {
   const { el, svg } = Dom;
   const LEFT = 62, RIGHT = 10, HEIGHT = 78, STRIP = 7, GAP = 4, LABEL = 12, LETTER = 6.6, AXIS = 24; // px
   const BEYOND = 100; // so many times what a channel usually is: its axis is cut
-  const waiting = new Map(); // experiment -> what to do with its series, once its script has run
 
-  /** The series that the page carries of an experiment; null: none. */
-  const inPage = (id) => Packed.read(`series-${id}`);
-
-  /** Load the file of an experiment's series; rejects where there is none. */
-  function load(id) {
-    return new Promise((resolve, reject) => {
-      const script = el("script", { src: `series/${id}.js` });
-      waiting.set(id, (text) => resolve(Packed.unpack(text)));
-      script.addEventListener("error", () => reject(new Error(`no file series/${id}.js`)));
-      script.addEventListener("load", () => script.remove());
-      document.head.append(script);
-    });
-  }
-
-  /** What such a file calls. */
-  function loaded(id, text) {
-    waiting.get(id)?.(text);
-    waiting.delete(id);
+  /** A channel as it is drawn here: lines of [times, values], null for no value, and a strip of differences. */
+  function lined(channel) {
+    const line = (values) => [[...channel.t], [...values].map((v) => (Number.isFinite(v) ? v : null))];
+    const gap = [...channel.t].map((_, i) => Math.abs(channel.faulty[i] - channel.golden[i]) || 0);
+    const largest = Number(Math.max(0, ...gap.filter(Number.isFinite)).toPrecision(5)), count = Math.min(160, gap.length);
+    const strip = Array.from({ length: count }, (_, k) => {
+      const most = Math.max(0, ...gap.slice(Math.floor((k * gap.length) / count), Math.floor(((k + 1) * gap.length) / count)));
+      return most > 0 ? Math.min(9, Math.max(1, Math.round((9 * most) / largest))) : 0;
+    }).join("");
+    return { ...channel, golden: line(channel.golden), faulty: line(channel.faulty), strip, largest, until: channel.t.at(-1) };
   }
 
   /** Round numbers to label an axis from `low` to `high` with, about `count` of them. */
@@ -102,7 +93,7 @@ const Series = (() => {
     return svg("g", {}, parts);
   }
 
-  const KINDS = ["trigger", "manifest", "alert", "hazard"];
+  const KINDS = ["activation", "manifest", "alert", "hazard"];
 
   /** The marks with their labels, each in the first line above the panels that has room for it. */
   function placed(data, x, width) {
@@ -184,7 +175,8 @@ const Series = (() => {
   }
 
   /** Show a series in `place`: what differs, and behind a fold what does not. */
-  function show(place, data) {
+  function show(place, series) {
+    const data = { ...series, channels: series.channels.map(lined) };
     const differ = data.channels.filter((c) => c.largest), same = data.channels.filter((c) => !c.largest);
     const legend = el("p.legend", {}, el("span.key.golden"), "golden (no fault)", el("span.key.faulty"), "faulty",
       data.active ? [el("span.key.active"), "fault active, first to last"] : null, el("span.key.gap"), "difference");
@@ -197,5 +189,5 @@ const Series = (() => {
     fold.addEventListener("toggle", () => draw(fold.appendChild(el("div.plots")), data, rest), { once: true });
   }
 
-  return { inPage, load, loaded, show };
+  return { show };
 })();

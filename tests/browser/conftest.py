@@ -18,11 +18,13 @@ from mutator.campaigns.plans import freeze, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes import results
-from mutator.report import building, series
+from mutator.outcomes.sampling import Sampler, keep_series
+from mutator.report import building
 from mutator.report.panels import figures
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
-from mutator.store.run_folder import RunFolder
+from mutator.store.series_format import encode
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
 from mutator.workspace import Workspace
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -75,7 +77,8 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A run folder of 24 experiments with its report; the series of the first is in a file of its own."""
+    """A run folder of 24 experiments with its report; the series of the second is packed, that of the third
+    in a file of its own."""
     folder = tmp_path_factory.mktemp("browser")
     workspace = copy_toycar(folder)
     plan = make_plan(workspace, "toy")
@@ -94,7 +97,13 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     names = ("gas", "brake", "wheel_turn", "gap", "speed")
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}
     faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
-    series.keep(RunFolder.open(out.path), manifest, golden, faulty, record(plan.experiments[1], 7, b""))
+    packed, kept = (record(experiment, 7, b"") for experiment in plan.experiments[1:3])
+    sampler, writer = Sampler(manifest, golden), SeriesWriter(out.path, "0001-main")
+    data = encode(sampler.series(faulty, packed), sampler.golden)
+    writer.append(packed.experiment_id, EncodedSeries(key="A", golden=sampler.encoded, faulty=data))
+    writer.close()
+    pack(out.path, plan.digest, {packed.experiment_id: 0}, 1)
+    keep_series(out.path, manifest, golden, faulty, kept)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures, "drawings", lambda frame: ())
         building.write(out.path, None)

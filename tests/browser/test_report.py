@@ -13,11 +13,18 @@ import pytest
 from mutator.report import building
 from mutator.report.panels import figures
 from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder
 
 if TYPE_CHECKING:
     from .conftest import Page
 
 COUNT = 24
+LOADED = """async (id) => {
+    const series = await SeriesFile.load(id), words = (values) => [...new Uint32Array(values.buffer)];
+    const channels = series.channels.map((channel) => (
+        { ...channel, t: [...channel.t], golden: words(channel.golden), faulty: words(channel.faulty) }));
+    return { ...series, channels };
+}"""  # values as their bits
 
 
 @pytest.fixture(scope="module")
@@ -139,19 +146,33 @@ def test_two_keys_lead_to_the_list(page: "Page") -> None:
     assert page.page.evaluate("document.activeElement.dataset.at") == "0"
 
 
-def test_series_are_loaded_from_their_file(page: "Page", run: Path) -> None:
-    """An experiment whose series is a file shows its plots, marks and strip; one without says the command."""
-    [file] = (run / "report" / "series").glob("*.js")
-    page.open(f"e={file.stem}")
-    page.page.wait_for_selector("#experiment .plot")
-    text = page.page.inner_text("#experiment .replay")
-    assert "largest difference 0.3" in text
-    assert "4 channels without a difference" in text
-    assert page.page.locator("#experiment .plot .mark.hazard").count() == 1
-    assert page.page.locator("#experiment .plot .gap").count() > 10
-    page.page.hover("#experiment .plot")
-    assert "→" in page.page.inner_text("#experiment .readout")
-    page.page.keyboard.press("j")
+def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
+    """An experiment whose series is packed, or in a file of its own, has its replay, with the numbers that
+    Python reads; one without says the command."""
+    series = SeriesFolder(run)
+    assert series.index is not None
+    names = {*series.index.entries, *series.kept_ids()}
+    assert len(names) == 2
+    for name in names:
+        page.open(f"e={name}")
+        page.page.wait_for_selector("#experiment .replay-player")
+        assert "H3" in page.page.inner_text("#experiment .replay")
+        found, read = page.page.evaluate(LOADED, name), series.read(name)
+        assert read is not None
+        golden, faulty = read
+        assert [channel["name"] for channel in found["channels"]] == [
+            "gas",
+            "brake",
+            "wheel_turn",
+            "gap",
+            "speed",
+        ]
+        for channel, one, other in zip(found["channels"], golden.values, faulty.values, strict=True):
+            assert channel["t"] == golden.t.tolist()
+            assert channel["golden"] == one.view("<u4").tolist()
+            assert channel["faulty"] == other.view("<u4").tolist()
+        assert found["marks"][-1] == ["hazard", pytest.approx(4.7), "H3"]
+    page.open(f"e={next(row['experiment_id'] for row in rows if row['experiment_id'] not in names)}")
     page.page.wait_for_selector("#experiment .replay .command")
     assert "--trace" in page.page.inner_text("#experiment .replay .command")
 
@@ -159,9 +180,8 @@ def test_series_are_loaded_from_their_file(page: "Page", run: Path) -> None:
 def plots(page: "Page", high: float, marks: list[list[object]]) -> list[str]:
     """What is written in the plot of a channel around 2 that goes up to `high` for a moment."""
     script = """([high, marks]) => {
-        const times = [0, 49.8, 49.9, 50], golden = [times, [2, 2, 2, 2]];
-        const faulty = [times, [2, 3, high, 3]], largest = high - 2;
-        const channel = { name: "hwt", unit: "s", golden, faulty, strip: "01", until: 50, largest };
+        const t = new Float64Array([0, 49.8, 49.9, 50]), golden = new Float32Array([2, 2, 2, 2]);
+        const channel = { name: "hwt", unit: "s", t, golden, faulty: new Float32Array([2, 3, high, 3]) };
         const place = document.body.appendChild(document.createElement("div"));
         Series.show(place, { start: 0, end: 50, active: null, marks, channels: [channel] });
         return [...place.querySelectorAll("text")].map((text) => text.textContent);

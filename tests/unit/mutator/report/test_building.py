@@ -159,8 +159,8 @@ def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
     assert not drawn_again(run, None)
     (run / "plots" / ("2" * 16 + ".svg")).touch()
     assert drawn_again(run, None)
-    (run / "report/series").mkdir()
-    (run / "report/series" / ("2" * 16 + ".js")).touch()
+    (run / "series/kept").mkdir(parents=True)
+    (run / "series/kept" / ("2" * 16 + ".js")).touch()
     assert drawn_again(run, None)
     assert not drawn_again(run, None)
     results = run / "results.csv"
@@ -168,13 +168,13 @@ def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
     assert drawn_again(run, HERE)
 
 
-@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "series/2222222222222222.js", "tables/a.csv"])
+@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "figures/a.svg", "tables/a.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
     """Each file of it is compared with what was written; a comparison beside it is none of its files."""
     out = run / "report"
-    for folder in ("series", "tables", "compare-other"):
+    for folder in ("figures", "tables", "compare-other"):
         (out / folder).mkdir(parents=True)
-    for folder, file in (("series", "2222222222222222.js"), ("tables", "a.csv")):
+    for folder, file in (("figures", "a.svg"), ("tables", "a.csv")):
         (out / folder / file).write_text("written")
     building.write(run, None)
     (out / "compare-other" / "index.html").write_text("another command's")

@@ -1,0 +1,174 @@
+"""A run's channels as its series: at most 20 values a second, in single precision, beside those of golden.
+
+A value is the newest one at its time, so what lasts for less than 50 ms may fall between two. Therefore each
+channel that differs keeps more points: the first step that differs, those of the largest difference in the
+drive and in the whole run, and the last step of a run that ended early.
+"""
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mutator.model import Record
+from mutator.outcomes.golden import Trace, on_steps
+from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series_format import Points, Series, encode
+from mutator.targets.channels import Channel
+from mutator.targets.manifest import TargetManifest
+
+RATE = 20.0  # samples a second, at most
+_TINY = 1e-9  # s; times are sums of steps
+
+
+class Sampler:
+    """Makes the series of runs that have one golden run, and its own."""
+
+    def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
+        self._channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden]
+        self._clock = manifest.time_channel
+        self._time = np.asarray(golden[self._clock], dtype=float)
+        self._values = self._on(golden, self._time)
+        self._at = _thinned(self._time)
+        self.golden = Series(
+            t=self._time[self._at],
+            values=_single(self._values[:, self._at]),
+            about={
+                "start": float(self._time[0]),
+                "end": float(self._time[-1]),
+                "channels": [_told(channel, manifest) for channel in self._channels],
+            },
+        )
+
+    @cached_property
+    def encoded(self) -> bytes:
+        """The golden run's series in bytes."""
+        return encode(self.golden)
+
+    def series(self, faulty: Trace, record: Record) -> Series:
+        """Of a run with a fault, and of what its record says."""
+        own = np.asarray(faulty[self._clock], dtype=float)
+        last = own[-1] if len(own) else -np.inf
+        time, golden, values = self._together(faulty, own)
+        known = self.golden.t[self.golden.t <= last + _TINY]
+        late = np.flatnonzero(time > self._time[-1] + _TINY)
+        at = np.concatenate((np.searchsorted(time, known), late[_thinned(time[late])])).astype(int)
+        end = int(np.searchsorted(time, min(last, self._time[-1]), side="right")) - 1
+        return Series(
+            t=time[at],
+            values=_single(values[:, at]),
+            about=_happened(record) | {"end": float(max(self._time[-1], last))},
+            points=_points(time, golden, values, at, end, record.t_end),
+        )
+
+    def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times of the steps of both runs, and the values of each there: NaN after its end."""
+        rows = min(len(own), len(self._time))
+        if np.array_equal(own[:rows], self._time[:rows]):
+            time = max(own, self._time, key=len)
+            return time, _filled(self._values, len(time)), _filled(self._on(faulty, own), len(time))
+        time = np.union1d(own, self._time)
+        return time, self._held(self._values, self._time, time), self._held(self._on(faulty, own), own, time)
+
+    def _on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
+        """A row for each channel, a column for each step; a channel that the run lacks has no values."""
+        rows = np.full((len(self._channels), len(time)), np.nan)
+        for row, channel in zip(rows, self._channels, strict=True):
+            if channel.name in trace:
+                row[:] = on_steps(trace, channel.name, time)
+        return rows
+
+    @staticmethod
+    def _held(values: np.ndarray, own: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Each row's newest value at other times; none before its first and after its last."""
+        place = np.searchsorted(own, time + _TINY, side="right") - 1
+        there = (place >= 0) & (time <= own[-1] + _TINY)
+        return np.where(there, values[:, np.maximum(place, 0)], np.nan)
+
+
+def _thinned(time: np.ndarray) -> np.ndarray:
+    """Which steps are kept: first and last one, and no more than RATE a second between them."""
+    kept: list[int] = []
+    due = -np.inf
+    for place, t in enumerate(time.tolist()):
+        if t >= due:
+            due = t + 1.0 / RATE - _TINY
+            kept.append(place)
+    if kept and kept[-1] != len(time) - 1:
+        kept.append(len(time) - 1)
+    return np.array(kept, dtype=int)
+
+
+def _filled(values: np.ndarray, count: int) -> np.ndarray:
+    missing = count - values.shape[1]
+    if not missing:
+        return values
+    return np.concatenate((values, np.full((len(values), missing), np.nan)), axis=1)
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    with np.errstate(over="ignore"):  # too large for single precision: infinite
+        single = values.astype("<f4")
+    single[np.isnan(single)] = np.nan  # one pattern of bits
+    return single
+
+
+def _points(
+    time: np.ndarray, golden: np.ndarray, faulty: np.ndarray, at: np.ndarray, end: int, t_end: float | None
+) -> Points:
+    """The steps between the sampled ones, `at`, that each channel keeps; `end` is the last that both runs
+    have."""
+    golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
+    drive = end + 1 if t_end is None else int(np.searchsorted(time, t_end + _TINY, side="right"))
+    sampled = np.zeros(len(time), dtype=bool)
+    sampled[at] = True
+    found: list[tuple[int, int]] = []
+    unlike = (golden != faulty) & ~(np.isnan(golden) & np.isnan(faulty))
+    for row in np.flatnonzero(unlike.any(axis=1)).tolist():
+        gap = _gap(golden[row], faulty[row])
+        steps = {int(np.argmax(unlike[row])), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
+        found += [(row, step) for step in sorted(steps) if unlike[row, step] and not sampled[step]]
+    rows, places = np.array(found, dtype=int).reshape(-1, 2).T
+    one, other = _single(golden[rows, places]), _single(faulty[rows, places])
+    shown = one.view("<u4") != other.view("<u4")
+    return Points(channel=rows[shown], t=time[places[shown]], golden=one[shown], faulty=other[shown])
+
+
+def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
+    """How far two runs are apart in each step: 0 where both are the same or have no value, infinite where one
+    has none."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        gap = np.where(golden == faulty, 0.0, np.abs(faulty - golden))
+    gap[np.isnan(gap)] = np.inf
+    gap[np.isnan(golden) & np.isnan(faulty)] = 0.0
+    return gap
+
+
+def _told(channel: Channel, manifest: TargetManifest) -> dict[str, Any]:
+    return {
+        "name": channel.name,
+        "unit": channel.unit,
+        "role": channel.role.value,
+        "component": channel.component,
+        "about": channel.about,
+        "compared": channel in manifest.compared,
+    }
+
+
+def _happened(record: Record) -> dict[str, Any]:
+    active = record.activation
+    return {
+        "active": [active.first, active.last] if active else None,
+        "manifest": record.t_manifest,
+        "alerts": [list(event) for event in record.alerts],
+        "hazards": [list(event) for event in record.hazards],
+        "t_end": record.t_end,
+    }
+
+
+def keep_series(run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> None:
+    """Write the series of one experiment into a file of its own in the run folder `run`."""
+    sampler = Sampler(manifest, golden)
+    data = encode(sampler.series(faulty, record), sampler.golden)
+    write_kept(SeriesFolder(run).kept(record.experiment_id), sampler.encoded, data)

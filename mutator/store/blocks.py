@@ -1,0 +1,140 @@
+"""Files of checksummed blocks of bytes, each appended by one process: patches, and series of a run at work.
+
+A block is a head of 19 bytes, a key (text) and its content. The head is, little-endian: the mark `FIB1`, a
+kind (1 byte), the length of the key (2) and of the content (4), and the first 8 bytes of the SHA-256 of the
+rest of the block. A block that was changed is found, and those after it still count.
+"""
+
+import os
+import struct
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from mutator._common.files import raising_disk_full
+
+_MARK = b"FIB1"
+_HEAD, _CHECK = struct.Struct("<4sBHI"), 8
+_BATCH, _BATCH_S = 32, 2.0  # blocks, and seconds, between two syncs at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """What was appended. `kind` is for the file's owner to choose; `offset` is where its content begins."""
+
+    kind: int
+    key: str
+    data: bytes
+    offset: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blocks:
+    """What is in such a file: the blocks that are as they were written, and whether others are damaged. What
+    a kill cut short at the end is not damage."""
+
+    path: Path
+    blocks: tuple[Block, ...]
+    damaged: bool
+
+
+class BlockWriter:
+    """Appends blocks to a new file of its own, whole ones, synced in batches.
+
+    A block that does not fit on the disk is taken back; DiskFull is raised.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._unsynced, self._synced_at, self._end = 0, time.monotonic(), 0
+        with raising_disk_full(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+
+    def append(self, kind: int, key: str, data: bytes) -> None:
+        """Append one block."""
+        block = as_block(kind, key, data)
+        with raising_disk_full(self.path):
+            try:
+                written = 0
+                while written < len(block):
+                    written += os.write(self._fd, block[written:])
+            except OSError:
+                os.ftruncate(self._fd, self._end)
+                raise
+        self._end += len(block)
+        self._unsynced += 1
+        if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _BATCH_S:
+            self.sync()
+
+    def sync(self) -> None:
+        """Make sure that what was appended survives a power cut."""
+        with raising_disk_full(self.path):
+            os.fsync(self._fd)
+        self._unsynced, self._synced_at = 0, time.monotonic()
+
+    def close(self) -> None:
+        try:
+            self.sync()
+        finally:
+            os.close(self._fd)
+
+
+def as_block(kind: int, key: str, data: bytes) -> bytes:
+    """The bytes of a block."""
+    text = key.encode()
+    head = _HEAD.pack(_MARK, kind, len(text), len(data))
+    check = sha256(b"".join((head, text, data))).digest()[:_CHECK]
+    return b"".join((head, check, text, data))
+
+
+def read_blocks(path: Path) -> Blocks:
+    """Verify the blocks of a file."""
+    data = path.read_bytes()
+    found: list[Block] = []
+    damaged, at = False, 0
+    while at < len(data):
+        block = _block_at(data, at)
+        if block is not None:
+            found.append(block)
+            at = block.offset + len(block.data)
+            continue
+        following = next(_intact(data, at + 1), None)
+        damaged |= following is not None or not _is_cut(data, at)
+        at = len(data) if following is None else following
+    return Blocks(path=path, blocks=tuple(found), damaged=damaged)
+
+
+def _block_at(data: bytes, at: int) -> Block | None:
+    """The block that begins there; None where there is none that is as it was written."""
+    begin = at + _HEAD.size + _CHECK
+    if begin > len(data):
+        return None
+    mark, kind, of_key, of_data = _HEAD.unpack_from(data, at)
+    offset = begin + of_key
+    end = offset + of_data
+    if mark != _MARK or end > len(data):
+        return None
+    check = data[at + _HEAD.size : begin]
+    if sha256(data[at : at + _HEAD.size] + data[begin:end]).digest()[:_CHECK] != check:
+        return None
+    return Block(kind=kind, key=data[begin:offset].decode(), data=data[offset:end], offset=offset)
+
+
+def _intact(data: bytes, at: int) -> Iterator[int]:
+    """Where blocks begin that are as they were written, from `at` on."""
+    while (at := data.find(_MARK, at)) >= 0:
+        if _block_at(data, at) is not None:
+            yield at
+        at += 1
+
+
+def _is_cut(data: bytes, at: int) -> bool:
+    """Whether what is there is the beginning of a block that the file's end cuts off."""
+    rest = data[at:]
+    if len(rest) < _HEAD.size + _CHECK:
+        return _MARK.startswith(rest[: len(_MARK)])
+    mark, _, of_key, of_data = _HEAD.unpack_from(rest)
+    return bool(mark == _MARK and _HEAD.size + _CHECK + of_key + of_data > len(rest))

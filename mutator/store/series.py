@@ -1,0 +1,177 @@
+"""The series of a run folder, `series/1`: where each experiment's is, and reading one."""
+
+import gzip
+import json
+import struct
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+from mutator._common.hashing import canonical
+from mutator.errors import MutatorError
+from mutator.store.series_format import Series, decode
+from mutator.store.series_script import name_of, read_script, write_script
+
+SCHEMA, FOLDER, KEPT = "series/1", "series", "kept"
+INDEX = "index"
+_ID = 16  # hex digits of an experiment's id
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Index:
+    """What `series/index.js` says. `chunks` are (name, number of entries), `sizes` the bytes of each entry
+    in their order; `goldens` and `entries` say which entry is that of a golden run, of an experiment;
+    `golden_of` which golden run an experiment is compared with. `left_out` experiments ended well
+    and have none, for the most part since they did not fit into `budget_mb`."""
+
+    plan: str
+    chunks: tuple[tuple[str, int], ...]
+    sizes: tuple[int, ...]
+    goldens: Mapping[str, int]
+    entries: Mapping[str, int]
+    golden_of: Mapping[str, str]
+    left_out: int
+    budget_mb: int
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON: ids as one text, in the order of their worth; the entry of each as the difference
+        from the one before."""
+        names, numbers = list(self.goldens), [*self.entries.values()]
+        return {
+            "schema": SCHEMA,
+            "plan": self.plan,
+            "budget_mb": self.budget_mb,
+            "left_out": self.left_out,
+            "chunks": [list(chunk) for chunk in self.chunks],
+            "sizes": self.sizes,
+            "goldens": self.goldens,
+            "ids": "".join(self.entries),
+            "entries": [b - a for a, b in zip([0, *numbers], numbers, strict=False)],
+            "golden_of": [names.index(self.golden_of[name]) for name in self.entries],
+        }
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> "Index":
+        """As `plain` has it."""
+        text, names = data["ids"], list(data["goldens"])
+        ids = [text[i : i + _ID] for i in range(0, len(text), _ID)]
+        golden_of = (names[code] for code in data["golden_of"])
+        return cls(
+            plan=data["plan"],
+            chunks=tuple((str(name), int(count)) for name, count in data["chunks"]),
+            sizes=tuple(data["sizes"]),
+            goldens=dict(data["goldens"]),
+            entries=dict(zip(ids, accumulate(data["entries"]), strict=True)),
+            golden_of=dict(zip(ids, golden_of, strict=True)),
+            left_out=data["left_out"],
+            budget_mb=data["budget_mb"],
+        )
+
+    @cached_property
+    def places(self) -> list[tuple[str, int]]:
+        """Of each entry its chunk, and where it begins there."""
+        found, number = [], 0
+        for name, count in self.chunks:
+            sizes = self.sizes[number : number + count]
+            found += [(name, at) for at in accumulate(sizes[:-1], initial=0)]
+            number += count
+        return found
+
+
+class SeriesFolder:
+    """Reads the series of the run folder at `run`."""
+
+    def __init__(self, run: Path) -> None:
+        self.path = run / FOLDER
+        self._chunk: tuple[str, bytes] = ("", b"")
+        self._goldens: dict[str, Series] = {}
+
+    @cached_property
+    def index(self) -> Index | None:
+        """Which series there are; None where none were packed. MutatorError for a damaged index."""
+        return read_index(self.path / f"{INDEX}.js") if self.is_packed else None
+
+    @property
+    def is_packed(self) -> bool:
+        """Whether there is an index."""
+        return (self.path / f"{INDEX}.js").is_file()
+
+    def has(self, experiment_id: str) -> bool:
+        """Whether an experiment's series is there; MutatorError for a damaged index."""
+        index = self.index
+        return (index is not None and experiment_id in index.entries) or self.kept(experiment_id).is_file()
+
+    def kept_ids(self) -> list[str]:
+        """The experiments whose series are in files of their own."""
+        return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
+
+    def read(self, experiment_id: str) -> tuple[Series, Series] | None:
+        """(golden, faulty) of an experiment; None where its series is not there. MutatorError where it is
+        damaged."""
+        index = self.index
+        if index is None or experiment_id not in index.entries:
+            path = self.kept(experiment_id)
+            return read_kept(path) if path.exists() else None
+        key = index.golden_of[experiment_id]
+        if key not in self._goldens:
+            self._goldens[key] = decode(self.entry(index.goldens[key]))
+        golden = self._goldens[key]
+        return golden, decode(self.entry(index.entries[experiment_id]), golden)
+
+    def entry(self, number: int) -> bytes:
+        """The bytes of an entry of the index; MutatorError where its chunk is damaged."""
+        assert self.index is not None
+        name, at = self.index.places[number]
+        if self._chunk[0] != name:
+            path = self.path / f"{name}.js"
+            data = read_script(path)
+            if name_of(data) != name:
+                raise MutatorError("damaged", where=path, expected="the content that its name stands for")
+            self._chunk = (name, data)
+        return self._chunk[1][at : at + self.index.sizes[number]]
+
+    def kept(self, experiment_id: str) -> Path:
+        """Where the series of an experiment is that was driven again for it."""
+        return self.path / KEPT / f"{experiment_id}.js"
+
+
+def read_index(path: Path) -> Index:
+    """An index; MutatorError for a damaged one."""
+    try:
+        data = json.loads(gzip.decompress(read_script(path)))
+        if data["schema"] != SCHEMA:
+            raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA)
+        return Index.of(data)
+    except (ValueError, LookupError, TypeError, OSError, EOFError, zlib.error) as err:
+        raise MutatorError(
+            f"a damaged index ({err})", where=path, remedy="delete the folder `series`"
+        ) from None
+
+
+def write_index(path: Path, index: Index) -> None:
+    """Write an index, the same bytes for the same one."""
+    text = canonical(index.plain()).encode()
+    write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
+
+
+def write_kept(path: Path, golden: bytes, faulty: bytes) -> None:
+    """Write the series of one experiment into a file of its own, with that of its golden run."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_script(path, b"".join((_LENGTH.pack(len(golden)), golden, faulty)))
+
+
+def read_kept(path: Path) -> tuple[Series, Series]:
+    """(golden, faulty) of such a file; MutatorError where it is damaged."""
+    data = read_script(path)
+    try:
+        (length,) = _LENGTH.unpack_from(data)
+    except struct.error:
+        raise MutatorError("damaged", where=path, expected="the series of two runs") from None
+    at = _LENGTH.size
+    golden = decode(data[at : at + length])
+    return golden, decode(data[at + length :], golden)

@@ -1,0 +1,223 @@
+"""Packing: from what workers appended to the chunks of a run's series, under a budget.
+
+The same experiments with the same worth give the same files, whoever ran them in whatever order: what is
+there is packed again with what came since. Kept is what comes first by worth, as far as the budget goes.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import raising_disk_full
+from mutator.errors import MutatorError
+from mutator.store.blocks import BlockWriter, read_blocks
+from mutator.store.series import FOLDER, INDEX, Index, SeriesFolder, write_index
+from mutator.store.series_script import name_of, size_in_script, write_script
+
+SUFFIX = ".blocks"  # of the files that workers append to, in series/
+GOLDEN, EXPERIMENT = 0, 1  # kinds of their blocks
+CHUNK_BYTES = 256_000  # of a chunk's content, but for its last entry: a page loads it in about 30 ms
+_MB = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EncodedSeries:
+    """The bytes of an experiment's series, and those of the golden run `key` that it is made with."""
+
+    key: str
+    golden: bytes
+    faulty: bytes
+
+
+class SeriesWriter:
+    """Appends what a worker made, the series of each golden run once."""
+
+    def __init__(self, run: Path, worker: str) -> None:
+        self._path = run / FOLDER / f"{worker}{SUFFIX}"
+        self._blocks: BlockWriter | None = None  # nothing was appended yet
+        self._known: set[str] = set()
+
+    def append(self, experiment_id: str, one: EncodedSeries) -> None:
+        if self._blocks is None:
+            self._blocks = BlockWriter(self._path)
+        if one.key not in self._known:
+            self._blocks.append(GOLDEN, one.key, one.golden)
+            self._known.add(one.key)
+        self._blocks.append(EXPERIMENT, f"{experiment_id} {one.key}", one.faulty)
+
+    def close(self) -> None:
+        if self._blocks is not None:
+            self._blocks.close()
+
+
+Read = Callable[[], bytes]
+Worth = Mapping[str, Any]  # experiment -> what it is sorted by, best first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Entry:
+    """Bytes that are somewhere: their digest, size in a script, and how to get them."""
+
+    digest: str
+    size: int
+    read: Read
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Everything that is to be packed: entries of golden runs, of experiments with the golden run of each."""
+
+    goldens: dict[str, _Entry]
+    experiments: dict[str, tuple[str, _Entry]]
+
+    def add(self, other: "_Found") -> None:
+        self.goldens.update(other.goldens)
+        self.experiments.update(other.experiments)
+
+
+def segments(run: Path) -> list[Path]:
+    """The files that workers appended to and that are not packed yet."""
+    return sorted((run / FOLDER).glob(f"*{SUFFIX}"))
+
+
+def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
+    """Pack the series of a run folder, and those of the run folders `others`.
+
+    `worth` has every experiment that ended well. Killed at any time, it can be done again.
+    """
+    appended = segments(run)
+    if not appended and not others:
+        return
+    found = _Found({}, {})
+    for folder in (run, *others):
+        found.add(_packed(SeriesFolder(folder)))
+        for path in segments(folder):
+            found.add(_appended(path))
+    with raising_disk_full(run):
+        (run / FOLDER).mkdir(exist_ok=True)
+    index = _written(run / FOLDER, plan, found, worth, budget_mb)
+    known = {name for name, _ in index.chunks} | {INDEX}
+    for path in [*appended, *(path for path in (run / FOLDER).glob("*.js") if path.stem not in known)]:
+        path.unlink()
+
+
+def _packed(folder: SeriesFolder) -> _Found:
+    """What was packed before; a damaged chunk is left out."""
+    found = _Found({}, {})
+    try:
+        index = folder.index
+    except MutatorError:
+        return found
+    if index is None:
+        return found
+    names = {number: name for name, number in index.goldens.items()}
+    users: dict[int, list[str]] = {}
+    for name, number in index.entries.items():
+        users.setdefault(number, []).append(name)
+    for number in range(len(index.sizes)):
+        try:
+            entry = _entry(folder.entry(number), lambda number=number: folder.entry(number))  # type: ignore[misc]
+        except MutatorError:
+            continue
+        if number in names:
+            found.goldens[names[number]] = entry
+        for name in users.get(number, ()):
+            found.experiments[name] = (index.golden_of[name], entry)
+    return found
+
+
+def _appended(path: Path) -> _Found:
+    """What a worker appended; damaged blocks are left out."""
+    found = _Found({}, {})
+    for block in read_blocks(path).blocks:
+        read = _reader(path, block.offset, len(block.data))
+        entry = _entry(block.data, read)
+        if block.kind == GOLDEN:
+            found.goldens[block.key] = entry
+        else:
+            name, _, golden = block.key.partition(" ")
+            found.experiments[name] = (golden, entry)
+    return found
+
+
+def _entry(data: bytes, read: Read) -> _Entry:
+    return _Entry(digest=name_of(data), size=size_in_script(data), read=read)
+
+
+def _reader(path: Path, offset: int, length: int) -> Read:
+    def read() -> bytes:
+        with path.open("rb") as file:
+            file.seek(offset)
+            return file.read(length)
+
+    return read
+
+
+def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: int) -> Index:
+    """Write the chunks, then the index."""
+    kept = _kept(found, worth, budget_mb * _MB)
+    golden_of = {name: found.experiments[name][0] for name in kept}
+    goldens = {name: found.goldens[name] for name in sorted({*golden_of.values()})}
+    first, then = _once(goldens.values()), _once(found.experiments[name][1] for name in kept)
+    chunks = [*_chunks(folder, first.values()), *_chunks(folder, then.values())]
+    numbers = {digest: number for number, digest in enumerate(first)}
+    later = {digest: number for number, digest in enumerate(then, start=len(first))}
+    index = Index(
+        plan=plan,
+        chunks=tuple((name, len(sizes)) for name, sizes in chunks),
+        sizes=tuple(size for _, sizes in chunks for size in sizes),
+        goldens={name: numbers[entry.digest] for name, entry in goldens.items()},
+        entries={name: later[found.experiments[name][1].digest] for name in kept},
+        golden_of=golden_of,
+        left_out=len(worth) - len(kept),
+        budget_mb=budget_mb,
+    )
+    write_index(folder / f"{INDEX}.js", index)
+    return index
+
+
+def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
+    """The experiments whose series fit into so many bytes, with those of their golden runs: the first ones by
+    worth. One that does not fit in one session does not in any later one."""
+    there = [name for name in found.experiments if name in worth]
+    kept: list[str] = []
+    counted: set[str] = set()
+    for name in sorted(there, key=lambda name: (worth[name], name)):
+        golden, entry = found.experiments[name]
+        if golden not in found.goldens:  # its block is damaged
+            continue
+        new = {one.digest: one.size for one in (entry, found.goldens[golden]) if one.digest not in counted}
+        budget -= sum(new.values())
+        if budget < 0:
+            break
+        counted |= {*new}
+        kept.append(name)
+    return kept
+
+
+def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
+    """Entries by their digest, in the order of the first of each."""
+    found: dict[str, _Entry] = {}
+    for entry in entries:
+        found.setdefault(entry.digest, entry)
+    return found
+
+
+def _chunks(folder: Path, entries: Iterable[_Entry]) -> Iterator[tuple[str, list[int]]]:
+    """Write entries into chunks; name and sizes of each chunk."""
+    parts: list[bytes] = []
+    for entry in entries:
+        parts.append(entry.read())
+        if sum(map(len, parts)) >= CHUNK_BYTES:
+            yield _chunk(folder, parts)
+            parts = []
+    if parts:
+        yield _chunk(folder, parts)
+
+
+def _chunk(folder: Path, parts: list[bytes]) -> tuple[str, list[int]]:
+    data = b"".join(parts)
+    path = folder / f"{name_of(data)}.js"
+    write_script(path, data)
+    return path.stem, [len(part) for part in parts]

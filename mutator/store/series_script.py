@@ -1,0 +1,47 @@
+"""Bytes in a script: a file that a page opened from a disk may load, and that is hardly larger than they are.
+
+Such a page can neither fetch a file nor read it, but run it. So the file is a call with a string in it, one
+character a byte; the page loads it as `x-user-defined`, the encoding in which each byte is a character.
+"""
+
+import re
+from pathlib import Path
+
+from mutator._common.files import write_atomic
+from mutator._common.hashing import digest
+from mutator.errors import MutatorError
+
+_ESCAPED = {b"\\": b"\\\\", b'"': b'\\"', b"\r": b"\\r", b"\n": b"\\n"}
+_PLAIN = {escaped: plain for plain, escaped in _ESCAPED.items()}
+_SPECIAL, _ESCAPE = re.compile(rb'[\\"\r\n]'), re.compile(rb'\\[\\"rn]')
+_CALL = re.compile(rb'SeriesFile\.loaded\("([0-9a-z]+)","')
+_END = b'");\n'
+NAME_LENGTH = 16  # hex digits of the SHA-256 of what is in a file that is named by its content
+
+
+def name_of(data: bytes) -> str:
+    """The name of what is called by its content."""
+    return digest(data)[:NAME_LENGTH]
+
+
+def size_in_script(data: bytes) -> int:
+    """How many bytes of a script `data` takes."""
+    return len(data) + sum(map(data.count, _ESCAPED))
+
+
+def write_script(path: Path, data: bytes) -> None:
+    """Write a script that hands `data` to the page, under the name of its file."""
+    text = _SPECIAL.sub(lambda found: _ESCAPED[found[0]], data)
+    write_atomic(path, b"".join((f'SeriesFile.loaded("{path.stem}","'.encode(), text, _END)))
+
+
+def read_script(path: Path) -> bytes:
+    """What a script hands to the page; MutatorError for one that is missing or no such script."""
+    try:
+        text = path.read_bytes()
+    except OSError as err:
+        raise MutatorError(f"cannot be read ({err.strerror})", where=path) from None
+    call = _CALL.match(text)
+    if call is None or call[1].decode() != path.stem or not text.endswith(_END):
+        raise MutatorError("damaged", where=path, expected="a file of series, as it was written")
+    return _ESCAPE.sub(lambda found: _PLAIN[found[0]], text[call.end() : -len(_END)])

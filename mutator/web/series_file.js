@@ -1,0 +1,174 @@
+"use strict";
+// The series of experiments, format series/1: channels over time, golden and faulty. They lie in chunks beside the
+// report, in the folder series/ of the run, as scripts, since a page opened from a disk may load nothing else.
+
+const SeriesFile = (() => {
+  const FOLDER = "../series/", CHUNKS = 6; // as many chunks are remembered
+  const waiting = new Map(); // name of a file -> what to do with its text
+  const chunks = new Map(); // name -> promise of its bytes, the last used one last
+  const goldens = new Map(); // entry -> promise of a golden run
+  let index = null; // promise of it
+  const SIGN = 0x7fffffff, NONE = 0x7fc00000; // the bits of no value
+
+  /** What the files call, each with its own name. */
+  function loaded(name, text) {
+    waiting.get(name)?.(text);
+  }
+
+  /** The bytes that a file hands over; null where there is no such file, an error where it is damaged. */
+  function read(path, name) {
+    return new Promise((resolve, reject) => {
+      const script = document.createElement("script");
+      script.charset = "x-user-defined"; // a character for each byte
+      script.src = `${FOLDER}${path}.js`;
+      const done = (what, value) => {
+        waiting.delete(name);
+        script.remove();
+        what(value);
+      };
+      waiting.set(name, (text) => {
+        const bytes = new Uint8Array(text.length);
+        for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+        done(resolve, bytes);
+      });
+      script.addEventListener("error", () => done(resolve, null));
+      script.addEventListener("load", () => waiting.has(name) && done(reject, damaged(`series/${path}.js`)));
+      document.head.append(script);
+    });
+  }
+
+  const damaged = (what) => new Error(`${what} is damaged`);
+
+  async function inflated(bytes) {
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Response(stream).arrayBuffer(); // which also compares the checksum
+  }
+
+  /** Which entry is whose, and where each begins; null: nothing was packed. */
+  async function readIndex() {
+    const bytes = await read("index", "index");
+    if (!bytes) return null;
+    const data = JSON.parse(new TextDecoder().decode(await inflated(bytes)));
+    if (data.schema !== "series/1") throw new Error(`series of the unknown schema ${data.schema}`);
+    const places = [], of = new Map(), keys = Object.keys(data.goldens);
+    for (const [name, count] of data.chunks) {
+      for (let at = 0, i = 0; i < count; i++) {
+        const size = data.sizes[places.length];
+        places.push({ name, at, size });
+        at += size;
+      }
+    }
+    let entry = 0;
+    data.entries.forEach((more, i) => {
+      entry += more;
+      of.set(data.ids.slice(16 * i, 16 * i + 16), [entry, data.goldens[keys[data.golden_of[i]]]]);
+    });
+    return { places, of };
+  }
+
+  async function bytesOf({ name, at, size }) {
+    const known = chunks.get(name) || read(name, name);
+    chunks.delete(name);
+    chunks.set(name, known);
+    if (chunks.size > CHUNKS) chunks.delete(chunks.keys().next().value);
+    const bytes = await known;
+    if (!bytes) throw new Error(`series/${name}.js is missing`);
+    return bytes.subarray(at, at + size);
+  }
+
+  const ordered = (word) => word ^ ((word >> 31) & SIGN);
+
+  /** A run, as store/series_format.py writes it: { about, t, rows, points }; `rows` are of the channels of golden. */
+  async function decoded(bytes, golden) {
+    const raw = await inflated(bytes), view = new DataView(raw);
+    const text = 4 + view.getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, text - 4)));
+    const { known, more, changed, points } = about, own = new Float64Array(raw.slice(text, text + 8 * (more + points.length)));
+    const planes = new Uint8Array(raw, text + own.byteLength), count = planes.length / 4, length = known + more;
+    if (count !== changed.length * length + 2 * points.length) throw new Error("another number of values");
+    const words = new Int32Array(count);
+    for (let i = 0; i < count; i++) words[i] = planes[i] | (planes[count + i] << 8) | (planes[2 * count + i] << 16) | (planes[3 * count + i] << 24);
+    const t = new Float64Array(length);
+    if (golden) t.set(golden.t.subarray(0, known));
+    t.set(own.subarray(0, more), known);
+    const rows = (golden ? golden.rows : changed).map((row) => {
+      const values = new Float32Array(new Int32Array(length).fill(NONE).buffer);
+      if (golden) values.set(row.subarray(0, known));
+      return values;
+    });
+    changed.forEach((channel, k) => {
+      const numbers = new Int32Array(rows[channel].buffer);
+      for (let i = 0, apart = 0; i < length; i++) {
+        const word = words[k * length + i];
+        apart = (apart + ((word >>> 1) ^ -(word & 1))) | 0;
+        numbers[i] = ordered((ordered(numbers[i]) + apart) | 0);
+      }
+    });
+    const exact = new Float32Array(words.buffer, 4 * changed.length * length);
+    return { about, t, rows, points: points.map((channel, i) => ({ channel, t: own[more + i], golden: exact[i], faulty: exact[points.length + i] })) };
+  }
+
+  /** Golden and faulty on the same times, with the points between them. */
+  function together(golden, run, channel) {
+    const t = run.t.length > golden.t.length ? run.t : golden.t;
+    const between = run.points.filter((p) => p.channel === channel), length = t.length + between.length;
+    const made = { t: new Float64Array(length), golden: new Float32Array(length), faulty: new Float32Array(length) };
+    const put = (k, time, one, other) => {
+      made.t[k] = time;
+      made.golden[k] = one;
+      made.faulty[k] = other;
+    };
+    let k = 0, next = 0;
+    for (let i = 0; i < t.length; i++) {
+      for (; next < between.length && between[next].t < t[i]; next++) put(k++, between[next].t, between[next].golden, between[next].faulty);
+      put(k++, t[i], i < golden.t.length ? golden.rows[channel][i] : NaN, i < run.t.length ? run.rows[channel][i] : NaN);
+    }
+    for (; next < between.length; next++) put(k++, between[next].t, between[next].golden, between[next].faulty);
+    return made;
+  }
+
+  function marks({ active, manifest, alerts, hazards }) {
+    const made = [...alerts.map(([name, t]) => ["alert", t, name]), ...hazards.map(([name, t]) => ["hazard", t, name])];
+    if (active) made.push(["activation", active[0], "activated"]);
+    if (manifest !== null) made.push(["manifest", manifest, "manifested"]);
+    return made.sort((a, b) => a[1] - b[1]);
+  }
+
+  function shown(id, golden, run) {
+    const { about } = run;
+    return {
+      id, start: golden.about.start, end: about.end, tEnd: about.t_end, active: about.active, marks: marks(about),
+      channels: golden.about.channels.map((channel, i) => ({ ...channel, ...together(golden, run, i) })),
+    };
+  }
+
+  /** The two runs of a file of one experiment, which was driven again for it. */
+  async function readKept(id) {
+    const bytes = await read(`kept/${id}`, id);
+    if (!bytes) return null;
+    const length = new DataView(bytes.buffer).getUint32(0, true), golden = await decoded(bytes.subarray(4, 4 + length), null);
+    return shown(id, golden, await decoded(bytes.subarray(4 + length), golden));
+  }
+
+  async function found(id, isNew) {
+    const there = JSON.parse(document.getElementById("facts").textContent).series; // what is not there is not asked for
+    if (there.packed) index ??= readIndex();
+    const place = (await index)?.of.get(id);
+    if (!place) return isNew || there.kept.includes(id) ? readKept(id) : null;
+    const { places } = await index, [entry, reference] = place;
+    if (!goldens.has(reference)) goldens.set(reference, bytesOf(places[reference]).then((bytes) => decoded(bytes, null)));
+    const golden = await goldens.get(reference);
+    return shown(id, golden, await decoded(await bytesOf(places[entry]), golden));
+  }
+
+  /** The series of an experiment; null where there is none. Rejects, with what to say, where it is damaged.
+   *  `isNew`: it may have been made since this page was written. */
+  async function load(id, { isNew = false } = {}) {
+    try {
+      return await found(id, isNew);
+    } catch (error) {
+      throw new Error(`The series of ${id} cannot be read: ${error.message}`);
+    }
+  }
+
+  return { load, loaded };
+})();

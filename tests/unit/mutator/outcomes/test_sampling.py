@@ -1,0 +1,126 @@
+"""A run's channels as its series: 20 values a second, and the steps between them that must not be lost."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mutator.model import Record
+from mutator.outcomes.golden import Trace
+from mutator.outcomes.sampling import Sampler, keep_series
+from mutator.store.series import SeriesFolder
+from mutator.store.series_format import Series, decode, encode
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+T = np.arange(500) / 100  # s
+GAS, SPEED = 0, 4  # places of the toy's channels
+
+
+@pytest.fixture
+def manifest(toycar: Workspace) -> TargetManifest:
+    return toycar.manifest("toycar")
+
+
+def trace(time: np.ndarray = T, **channels: np.ndarray) -> Trace:
+    names = ("gas", "brake", "wheel_turn", "gap", "speed")
+    return {"time": time, **{name: np.zeros(len(time)) for name in names}, **channels}
+
+
+def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Series]:
+    """Golden and faulty as they come out of their bytes."""
+    golden = decode(sampler.encoded)
+    return golden, decode(encode(sampler.series(faulty, record), sampler.golden), golden)
+
+
+def test_a_channel_has_twenty_values_a_second_and_the_last(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """Of 500 steps in 5 s: each fifth, at its time, and the last one, in single precision; the manifest says
+    which channels."""
+    one = Sampler(manifest, trace(speed=np.sin(T)))
+    golden, faulty = stored(one, trace(speed=np.cos(T)), record())
+    assert golden.t.tolist() == [*T[::5], 4.99]
+    assert faulty.t.tolist() == golden.t.tolist()
+    assert golden.values[SPEED].tolist() == np.sin(golden.t).astype("f4").tolist()
+    assert faulty.values[SPEED].tolist() == np.cos(golden.t).astype("f4").tolist()
+    assert [channel["name"] for channel in golden.about["channels"]][:2] == ["gas", "brake"]
+
+
+def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
+    """The first step that differs and the largest differences, in the drive and in the whole run, are kept as
+    points, however short they are; of channels that do not differ nothing is."""
+    gas = np.zeros(500)
+    gas[[202, 303, 304, 404]] = 0.1, -7.0, 2.0, 9.0
+    one = Sampler(manifest, trace())
+    points = stored(one, trace(gas=gas), record(t_end=3.5))[1].points
+    assert points.t.tolist() == [2.02, 3.03, 4.04]
+    assert points.faulty.tolist() == np.array([0.1, -7.0, 9.0], dtype="f4").tolist()
+    assert set(points.channel.tolist()) == {GAS}
+    assert len(stored(one, trace(), record())[1].points.t) == 0
+
+
+def test_a_run_that_ends_early_has_no_values_afterwards_and_keeps_its_last_step(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """What it was like when it ended may be an impact."""
+    one = Sampler(manifest, trace(speed=T))
+    faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
+    assert faulty.t[-1] == 3.0
+    assert faulty.about["end"] == 4.99
+    assert (faulty.points.t[-1], faulty.points.faulty[-1]) == (3.02, np.float32(3.02**2))
+
+
+def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Callable[..., Record]) -> None:
+    """A target may end at once."""
+    faulty = stored(Sampler(manifest, trace()), trace(np.zeros(0)), record())[1]
+    assert (len(faulty.t), len(faulty.points.t)) == (0, 0)
+
+
+def test_a_run_that_lasts_longer_has_more_times(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """Those after the end of golden are its own."""
+    time = np.arange(700) / 100
+    faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
+    assert faulty.t[-1] == 6.99
+    assert np.diff(faulty.t).max() < 0.06
+    assert faulty.values[SPEED].tolist() == faulty.t.astype("f4").tolist()
+
+
+def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """A target whose steps depend on what happens has two runs on one time axis all the same."""
+    time = np.arange(0.0, 5.0, 0.03)
+    faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
+    place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1
+    assert faulty.values[SPEED].tolist() == time[place].astype("f4").tolist()
+
+
+def test_a_channel_with_its_own_times_has_its_newest_value(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """None before its first."""
+    own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
+    golden = stored(Sampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
+    gap = dict(zip(golden.t.tolist(), golden.values[3], strict=True))
+    assert np.isnan(gap[0.95])
+    assert (gap[1.0], gap[2.95], gap[3.0]) == (1.0, 1.0, 2.0)
+
+
+def test_a_series_of_its_own_file_is_read_back(
+    tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """With golden, and with what happened; the file is the same each time."""
+    one = record(alerts=(("brake_hard", 2.5),))
+    keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
+    path = SeriesFolder(tmp_path).kept(one.experiment_id)
+    before = path.read_bytes()
+    keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
+    assert path.read_bytes() == before
+    found = SeriesFolder(tmp_path).read(one.experiment_id)
+    assert found is not None
+    assert (found[0].values[SPEED] == 0).all()
+    assert found[1].about["alerts"] == [["brake_hard", 2.5]]

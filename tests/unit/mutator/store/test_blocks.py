@@ -1,0 +1,59 @@
+"""Files of checksummed blocks."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.store.blocks import BlockWriter, as_block, read_blocks
+
+CONTENT = {"one": b"1" * 50, "two": b"FIB1" * 9, "three": b""}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "some.blocks"
+    writer = BlockWriter(path)
+    for kind, (key, data) in enumerate(CONTENT.items()):
+        writer.append(kind, key, data)
+    writer.close()
+    return path
+
+
+def keys(path: Path) -> list[str]:
+    return [block.key for block in read_blocks(path).blocks]
+
+
+def test_blocks_come_back_in_order(file: Path) -> None:
+    """With their kinds, and where their content begins."""
+    found = read_blocks(file)
+    assert [(one.kind, one.key, one.data) for one in found.blocks] == [
+        (kind, key, data) for kind, (key, data) in enumerate(CONTENT.items())
+    ]
+    data = file.read_bytes()
+    assert all(data[one.offset : one.offset + len(one.data)] == one.data for one in found.blocks)
+    assert not found.damaged
+
+
+def test_a_block_cut_short_is_no_damage(file: Path) -> None:
+    """However far it had come."""
+    whole = file.read_bytes()
+    for length in range(len(whole) - len(as_block(2, "three", b"")), len(whole)):
+        file.write_bytes(whole[:length])
+        assert keys(file) == ["one", "two"]
+        assert not read_blocks(file).damaged
+
+
+def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
+    """Wherever it is: in a head, a key or the content."""
+    whole = file.read_bytes()
+    second = len(as_block(0, "one", CONTENT["one"]))
+    for place in range(second, second + len(as_block(1, "two", CONTENT["two"]))):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 0x55]) + whole[place + 1 :])
+        assert keys(file) == ["one", "three"]
+        assert read_blocks(file).damaged
+
+
+def test_no_file_is_written_to_twice(file: Path) -> None:
+    """Each has one process."""
+    with pytest.raises(FileExistsError):
+        BlockWriter(file)

@@ -1,0 +1,58 @@
+"""The bytes of a series."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mutator.errors import MutatorError
+from mutator.store.series_format import Points, Series, decode, encode
+
+T = np.arange(6) / 20
+WORDS = arrays("<u4", (3, 6), elements=st.integers(0, 2**32 - 1))
+
+
+def series(values: np.ndarray, points: Points | None = None) -> Series:
+    return Series(t=T[: values.shape[1]], values=values, about={"end": 1.0}, points=points or Points())
+
+
+@given(WORDS, WORDS, st.integers(1, 6))
+def test_all_values_come_back_bit_by_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
+    """Infinite and tiny ones, both zeros and every NaN; with any golden run, which may be longer."""
+    golden = series(one.view("<f4"))
+    faulty = series(np.ascontiguousarray(other[:, :count]).view("<f4"))
+    back = decode(encode(golden))
+    assert back.values.view("<u4").tolist() == one.tolist()
+    found = decode(encode(faulty, golden), back)
+    assert found.values.view("<u4").tolist() == other[:, :count].tolist()
+    assert found.t.tolist() == T[:count].tolist()
+    assert found.about == {"end": 1.0}
+
+
+def test_what_equals_golden_takes_no_room() -> None:
+    """A run of 20 channels that is golden takes no more than its head, however long it is."""
+    values = np.random.default_rng(1).random((20, 600)).astype("<f4")
+    golden = Series(t=np.arange(600) / 20, values=values, about={})
+    assert len(encode(golden, golden)) < 100
+
+
+def test_points_come_back() -> None:
+    """Between the times, of both runs."""
+    single = np.array([np.inf], dtype="<f4")
+    points = Points(channel=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
+    golden = series(np.zeros((3, 6), dtype="<f4"))
+    found = decode(encode(series(golden.values, points), golden), golden).points
+    assert (found.channel.tolist(), found.t.tolist()) == ([2], [0.013])
+    assert (found.golden.tolist(), found.faulty.tolist()) == ([np.inf], [-np.inf])
+
+
+@pytest.mark.parametrize("place", [0, 15, -12, -1])
+def test_damage_is_found(place: int) -> None:
+    """A changed byte is an error, never other values."""
+    data = bytearray(encode(series(np.ones((3, 6), dtype="<f4"))))
+    data[place] ^= 0xFF
+    with pytest.raises(MutatorError, match="damaged"):
+        decode(bytes(data))
+    with pytest.raises(MutatorError, match="damaged"):
+        decode(bytes(data[:-20]))

@@ -1,0 +1,131 @@
+"""Packing of series: the same files whatever came in which order, and no more than the budget."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.store.series import SeriesFolder
+from mutator.store.series_format import Series, encode
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack, segments
+
+IDS = [f"{number:016x}" for number in range(150)]
+DRAW = np.random.default_rng(1)
+VALUES = DRAW.random((151, 4, 600)).astype("<f4")
+GOLDEN = Series(t=np.arange(600) / 20, values=VALUES[150], about={"channels": []})
+MADE = {
+    name: EncodedSeries(
+        key="A" if number % 2 else "B+alone",
+        golden=encode(GOLDEN),
+        faulty=encode(Series(t=GOLDEN.t, values=VALUES[number], about={"n": number}), GOLDEN),
+    )
+    for number, name in enumerate(IDS)
+}
+WORTH = {name: -number for number, name in enumerate(IDS)}  # the last is the best
+
+
+def append(run: Path, worker: str, names: list[str]) -> None:
+    writer = SeriesWriter(run, worker)
+    for name in names:
+        writer.append(name, MADE[name])
+    writer.close()
+
+
+def files(run: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in (run / "series").iterdir()}
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    run = tmp_path_factory.mktemp("packed")
+    append(run, "0001-main", IDS)
+    pack(run, "p", WORTH, 500)
+    return run
+
+
+def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
+    """Best first, golden runs that are the same once; what workers appended is gone."""
+    folder = SeriesFolder(packed)
+    index = folder.index
+    assert index is not None
+    assert [*index.entries] == IDS[::-1]
+    assert len(index.sizes) == 151
+    assert len(index.chunks) > 3
+    for number, name in enumerate(IDS):
+        found = folder.read(name)
+        assert found is not None
+        assert found[1].about == {"n": number}
+        assert (found[1].values == VALUES[number]).all()
+    assert folder.read("f" * 16) is None
+    assert segments(packed) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
+    tmp_path: Path, packed: Path, seed: int
+) -> None:
+    """Packed once or several times, by one or two workers, with one that ran twice: the same bytes."""
+    draw = random.Random(seed)
+    order = draw.sample(IDS, len(IDS))
+    cuts = sorted(draw.sample(range(1, len(IDS)), 2))
+    for session, part in enumerate((order[: cuts[0]], order[: cuts[1]][cuts[0] - 1 :], order[cuts[1] :])):
+        append(tmp_path, f"{session}-gw0", part[::2])
+        append(tmp_path, f"{session}-gw1", part[1::2])
+        pack(tmp_path, "p", WORTH, 500)
+    assert files(tmp_path) == files(packed)
+
+
+def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) -> None:
+    """What does not fit is left out and counted; packed in two sessions, the same is kept."""
+    runs = [tmp_path / "once", tmp_path / "twice"]
+    append(runs[0], "0001-main", IDS)
+    pack(runs[0], "p", WORTH, 1)
+    for session, part in enumerate((IDS[::2], IDS[1::2])):
+        append(runs[1], f"{session}-main", part)
+        pack(runs[1], "p", WORTH, 1)
+    assert sum(map(len, files(runs[0]).values())) < 1_010_000
+    index = SeriesFolder(runs[0]).index
+    assert index is not None
+    assert [*index.entries] == IDS[::-1][: len(index.entries)]
+    assert index.left_out == len(IDS) - len(index.entries) > 0
+    assert files(runs[0]) == files(runs[1])
+
+
+def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) -> None:
+    """Some packed, some not."""
+    shards = [tmp_path / name for name in "ab"]
+    for shard, part in zip(shards, (IDS[:25], IDS[25:]), strict=True):
+        append(shard, "0001-main", part)
+    pack(shards[0], "p", WORTH, 500)
+    (tmp_path / "whole").mkdir()
+    pack(tmp_path / "whole", "p", WORTH, 500, others=tuple(shards))
+    assert files(tmp_path / "whole") == files(packed)
+
+
+def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
+    """A kill in the middle of a block."""
+    append(tmp_path, "0001-main", IDS[:3])
+    [segment] = segments(tmp_path)
+    segment.write_bytes(segment.read_bytes()[:-100])
+    pack(tmp_path, "p", WORTH, 500)
+    index = SeriesFolder(tmp_path).index
+    assert index is not None
+    assert [*index.entries] == IDS[1::-1]
+
+
+def test_a_damaged_chunk_is_said_to_be_and_never_shown(tmp_path: Path) -> None:
+    """Its experiments are read from no other place; the index likewise."""
+    append(tmp_path, "0001-main", IDS[:3])
+    pack(tmp_path, "p", WORTH, 500)
+    index = SeriesFolder(tmp_path).index
+    assert index is not None
+    chunk = tmp_path / "series" / f"{index.chunks[-1][0]}.js"
+    data = chunk.read_bytes()
+    chunk.write_bytes(data[:300] + bytes([data[300] ^ 1]) + data[301:])
+    with pytest.raises(MutatorError, match="damaged"):
+        SeriesFolder(tmp_path).read(IDS[0])
+    (tmp_path / "series" / "index.js").write_bytes(data)
+    with pytest.raises(MutatorError, match="damaged"):
+        SeriesFolder(tmp_path).read(IDS[0])
