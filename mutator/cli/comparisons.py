@@ -91,6 +91,9 @@ def _gates(texts: list[str]) -> "list[mutator.Gate]":
 
 def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
     found = compared.comparison
+    if found.parts_remark:
+        terminal.say(found.parts_remark, style="bold")
+        terminal.say()
     differing = [(f.name, f.a, f.b) for f in found.facts if f.differs]
     if differing:
         terminal.table(["what differs", found.names.a, found.names.b], differing)
@@ -105,7 +108,8 @@ def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
         terminal.say()
     terminal.say(compared.summary)
     for remark in found.remarks:
-        terminal.say(remark)
+        if remark != found.parts_remark:
+            terminal.say(remark)
 
 
 def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") -> dict[str, object]:

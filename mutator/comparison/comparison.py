@@ -6,7 +6,15 @@ from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
-from mutator.comparison.differences import Fact, Files, facts, files, remarks, severity_remarks
+from mutator.comparison.differences import (
+    Fact,
+    Files,
+    facts,
+    files,
+    parts_remark,
+    remarks,
+    severity_remarks,
+)
 from mutator.comparison.metric_sheets import metrics_sheets, severity_sheet
 from mutator.comparison.pairs import Change, Matching, Pair, match, time_to_hazard
 from mutator.comparison.sheets import (
@@ -94,7 +102,13 @@ class Comparison:
         """What to know before believing the tables."""
         noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
         own = tuple(f"{name}: {note}" for name, note in noted if note)
-        return remarks(self.a, self.b, self.matching) + severity_remarks(self.a, self.b) + own
+        first = (self.parts_remark,) if self.parts_remark else ()
+        return first + remarks(self.a, self.b, self.matching) + severity_remarks(self.a, self.b) + own
+
+    @cached_property
+    def parts_remark(self) -> str:
+        """That the runs are unlike parts of a campaign; empty where they are not."""
+        return parts_remark(self.a, self.b)
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:

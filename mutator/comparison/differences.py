@@ -16,6 +16,7 @@ from mutator.verification.seal import not_verifiable
 
 _SHORT = 12  # digits of a digest that are shown
 _HEAD = ("campaign", "target", "seed", "reading")
+_PARTS = ("limit", "shard", "only", "exclude")  # choices that leave experiments out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +97,22 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
         *(f"The content of {side.name} is {not_verifiable(side.folder)}." for side in old),
         *(f"{n} of {len(matching.pairs)} pairs {what}." for n, what in counts if n),
     )
+
+
+def parts_remark(a: Side, b: Side) -> str:
+    """That the runs are unlike parts of their campaign, which makes the tables about few of them; empty where
+    the same part was chosen."""
+    of_a, of_b = (
+        {name: value for name in _PARTS if (value := side.folder.head["choices"].get(name)) is not None}
+        for side in (a, b)
+    )
+    if of_a == of_b:
+        return ""
+    told = [
+        f"{side.name} has {', '.join(f'--{name} {value}' for name, value in chosen.items()) or 'all of it'}"
+        for side, chosen in ((a, of_a), (b, of_b))
+    ]
+    return f"The runs are unlike parts of a campaign: {', '.join(told)}. Only what both have is compared."
 
 
 def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:

@@ -57,14 +57,17 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
         for group in review.in_turn(refused)
     ]
     many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
-    ids = " ".join(group.id for group in refused) if len(refused) <= _MOST_IDS else "GROUP..."
     wanted = f"--campaign {_campaign(workspace, plan)}"
     wanted += f" --reading {plan.reading}" if plan.choices.reading else ""
+    at_once = ""
+    if len(refused) <= _MOST_IDS:
+        ids = " ".join(group.id for group in refused)
+        at_once = f"; or approve all of them: `mutator review approve {ids} {wanted} --by NAME`"
     return CheckFailed(
         "\n".join([f"{many} not approved:", *lines]),
         where=review.path,
         expected="an approval of each, as it is now",
-        remedy=f"look: `mutator review {wanted}`; approve: `mutator review approve {ids} {wanted} --by NAME`",
+        remedy=f"review what is missing: `mutator review walk {wanted} --by NAME`{at_once}",
     )
 
 

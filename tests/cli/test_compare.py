@@ -38,6 +38,21 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
         assert (Path("after") / "report" / "compare-before" / name).is_file()
 
 
+def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> None:
+    """Before any table it is said that one run has fewer experiments by choice; once, and on the page too."""
+    workspace = Workspace.find(root)
+    runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
+    said = "The runs are unlike parts of a campaign: whole has all of it, part has --limit 6."
+    answer = cli("compare", *runs, "--out", "c")
+    assert answer.code == 0, answer.err
+    assert answer.out.startswith(said)
+    assert answer.out.count("unlike parts") == 1
+    written = (Path("c") / "COMPARISON.md").read_text()
+    assert written.index(said) < written.index("What differs")
+    assert cli("compare", *runs, "--json", "--out", "c").json["remarks"][0].startswith(said)
+    assert "unlike parts" not in cli("compare", runs[1], runs[1], "--out", "d").out
+
+
 def test_alerts_of_fault_free_runs_are_named(
     cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -50,7 +50,7 @@ def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
     for group in refused:
         assert f"{group.id}  {review.state(group)}, {group.runs} experiment" in caught.value.got
     assert caught.value.got.startswith(f"{len(refused)} groups" if len(refused) > 1 else "a group")
-    assert "`mutator review --campaign small --reading as_coded`" in str(caught.value.remedy)
+    assert "`mutator review walk --campaign small --reading as_coded --by NAME`" in str(caught.value.remedy)
     assert caught.value.exit_code == 1
 
 
