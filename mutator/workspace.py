@@ -9,6 +9,7 @@ from pathlib import Path
 from mutator._common.arguments import check_whole
 from mutator._common.files import check_is_text
 from mutator._common.places import environment_path, library_files, library_folder, templates_folder
+from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
@@ -89,16 +90,17 @@ class Workspace:
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> Scale | None:
-        """What makes classes of severity of the target's contacts; None where it tells of none. MutatorError
-        at the manifest for a scale that the library does not have."""
+        """What makes classes of severity of the target's contacts: the library's, or one that ships with the
+        harness; None where it tells of none. MutatorError at the manifest for an unknown one."""
         if manifest.contact is None:
             return None
-        known = self._files("severity")
+        shipped = (shipped_folder() / "fault_library" / "severity").glob("*.yaml")
+        known = {path.stem: path for path in sorted(shipped)} | self._files("severity")
         if manifest.contact.scale not in known:
             raise manifest.source.error(
                 ("severity", "scale"),
                 f"'{manifest.contact.scale}'",
-                expected=f"a scale in {self.library / 'severity'}: {', '.join(known) or 'there is none'}",
+                expected=f"one of {', '.join(known)}, or a file in {self.library / 'severity'}",
                 remedy="correct the name, or write the scale",
             )
         return load_scale(known[manifest.contact.scale])

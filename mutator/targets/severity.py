@@ -71,7 +71,9 @@ class SeverityModel(StrictModel, title="Severity"):
     )
     mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the own car.")
     other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the other vehicle.")
-    scale: str = Field(description="A file of the library's `severity/`, without `.yaml`.")
+    scale: str = Field(
+        description="A file of the library's `severity/`, without `.yaml`; or `collision`, which ships."
+    )
 
 
 class _ClassModel(StrictModel, title="A class"):

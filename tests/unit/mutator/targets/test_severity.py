@@ -67,7 +67,7 @@ def test_mistakes_in_a_scale(tmp_path: Path, old: str, new: str, message: str) -
     [
         ("contact: H1", "contact: H3", "'H3'; expected a hazard with `terminal`: H1"),
         ("contact_speed: contact_speed", "contact_speed: smallest_gap", "unit m/s: contact_speed"),
-        ("scale: collision", "scale: colision", "'colision'; expected a scale in "),
+        ("scale: collision", "scale: colision", "'colision'; expected one of collision, or a file in "),
         ("mass_kg: 1461.6", "mass_kg: 0", "0"),
     ],
 )

@@ -24,8 +24,11 @@ class Drive(Run):
         gap = car.lane_distance_to(ahead) - car.LENGTH if ahead else 500.0
         if ahead and self.t >= self.slows_at_s:
             ahead.target_speed = 8.0
+        met = next((other for other in self.road.vehicles[1:] if other.crashed), ahead)
+        closing = car.speed - met.speed if met else 0.0
         self.road.act()
-        self.record(gap=gap, speed=car.speed, crashed=car.crashed, on_road=car.on_road, **car.action)
+        seen = {"gap": gap, "speed": car.speed, "closing": closing, "crashed": car.crashed}
+        self.record(**seen, on_road=car.on_road, **car.action)
         self.road.step(self.step_s)
 
 
