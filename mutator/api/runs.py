@@ -1,5 +1,6 @@
 """A run folder: its results as a pandas frame; its experiments, golden runs and faults when asked."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +20,7 @@ from mutator.api.trials import Trial, trial_of
 from mutator.campaigns.plans import Plan, load_plan
 from mutator.errors import MutatorError
 from mutator.execution.merging import merge
-from mutator.execution.session import Summary
+from mutator.execution.session import Notify, Summary
 from mutator.execution.single_run import rerun
 from mutator.execution.traces import Traces
 from mutator.exports import Format
@@ -33,7 +34,9 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.sampling import keep_series
 from mutator.report import building
 from mutator.report.film import Shot, film_experiment
+from mutator.report.stills import BUDGET_S, stills_due
 from mutator.store import cleaning, plan_file
+from mutator.store.progress import Pace
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.store.series import SeriesFolder
 from mutator.store.stretches import Stretch
@@ -229,6 +232,28 @@ class Run:
             return building.ensure(self.path, workspace)
         results_table.build(self.path)
         return building.write(self.path, workspace)
+
+    def take_stills(self, progress: Notify | None = None) -> str:
+        """Drive the worst few experiments that see pictures again, and keep what the camera saw at the
+        activation, the first alert and the first hazard: the report shows it. At most ten experiments, one
+        of 20 that are planned, and none is begun after two minutes.
+
+        Returns why the first one that has no pictures has none; empty if there is no such.
+        """
+        due, problem = stills_due(self.folder, self._bench.manifest), ""
+        pace, began = Pace("pictures", len(due)), time.monotonic()
+        for i, (name, shots) in enumerate(due.items()):
+            if time.monotonic() - began > BUDGET_S:
+                break
+            if progress:
+                progress(pace.at(i))
+            try:
+                same = self.experiment(name).film(shots)
+                wrong = "" if same else "driven again it is not what the campaign found"
+            except MutatorError as error:
+                wrong = str(error)
+            problem = problem or (f"{name}: {wrong}" if wrong else "")
+        return problem
 
     def export(
         self, format: Format | str, out: str | Path | None = None, *, failures: Sequence[str] = ()

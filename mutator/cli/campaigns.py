@@ -168,6 +168,13 @@ def run(
         typer.Option("--require-reviewed", help="Run nothing that `mutator review` has no approval of."),
     ] = False,
     accept_versions: AcceptVersions = False,
+    stills: Annotated[
+        bool,
+        typer.Option(
+            help="Drive the worst experiments that see pictures again, for stills in the report: one of 20, "
+            "at most ten, and about two minutes."
+        ),
+    ] = True,
     as_json: Json = False,
     *,
     place: Place,
@@ -193,6 +200,8 @@ def run(
                 progress=notify,
                 workspace=workspace,
             )
+            if stills and made.summary and made.summary.exit_code == 0:
+                _take_stills(terminal, made, notify)
             written = _report(out, made, notify)
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
@@ -200,6 +209,12 @@ def run(
     _print_end(terminal, out, made, made.summary, written)
     if made.summary.exit_code:
         raise typer.Exit(made.summary.exit_code)
+
+
+def _take_stills(terminal: Terminal, run: "Run", notify: "Notify") -> None:
+    """Pictures for the report; a run is no worse for lack of them."""
+    if problem := run.take_stills(notify):
+        terminal.note(f"no pictures of {problem}")
 
 
 def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":

@@ -17,6 +17,7 @@ STAGES = {
     "experiments": "experiments",
     "proof": "proof",
     "tables": "tables",
+    "pictures": "pictures",
     "report": "report",
 }
 

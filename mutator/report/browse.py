@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns
-STILLS_BYTES = 4_000_000  # of pictures in the page; more are links
+STILLS_BYTES = 1_000_000  # of pictures in the page; more are links
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,8 @@ from mutator.model import Status
 class Progress:
     """How far a run is. `outcomes` counts outcomes of ok experiments and the other statuses by name.
 
-    The stages: `plan`, `checks`, `golden` (golden runs), `experiments`, `proof`, `tables`, `report`, in turn.
+    The stages: `plan`, `checks`, `golden` (golden runs), `experiments`, `proof`, `tables`, `pictures`,
+    `report`, in turn.
     Rate and remaining time are those of the stage; `total` is 0 where there is nothing to count.
     """
 

@@ -39,6 +39,7 @@ class Film:
     module: str  # run as `python -m`
     args: tuple[str, ...]  # with {golden}, {faulty} (films), {events}, {out}
     still_args: tuple[str, ...]  # more of them for a still picture, with {t}
+    pictures: tuple[str, ...]  # changes with which the controller sees the camera's pictures
 
 
 @dataclass(frozen=True, kw_only=True)

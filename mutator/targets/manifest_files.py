@@ -67,6 +67,11 @@ class _FilmModel(StrictModel, title="Films"):
     module: str = Field(description="Run as `python -m` to show two films.")
     args: list[str] = Field(description="Its arguments.")
     still: list[str] = Field(description="More of them for a still picture.")
+    pictures: list[str] = Field(
+        default_factory=list,
+        description="Changes with which the controller sees the camera's pictures: when a run is done, the "
+        "worst of its experiments with one of these get stills by themselves.",
+    )
 
 
 class ManifestModel(StrictModel, title="The file"):
@@ -259,9 +264,21 @@ def _check_placeholders(model: ManifestModel, source: Source) -> None:
         else:
             check_placeholders(change.args, OF_RUNS, source, (*keys, "args"))
     if (film := model.film) is not None:
+        _check_pictures(film.pictures, model.entry.changes, source)
         check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))
         check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
         check_placeholders(film.still, OF_FILMS, source, ("film", "still"))
+
+
+def _check_pictures(pictures: Collection[str], changes: Collection[str], source: Source) -> None:
+    for i, name in enumerate(pictures):
+        if name not in changes:
+            raise source.error(
+                ("film", "pictures", i),
+                f"'{name}'",
+                expected=f"one of the entry's changes: {', '.join(changes) or 'none'}",
+                remedy="correct the name",
+            )
 
 
 def _check_recorded(source: Source, hidden: Collection[str]) -> None:
@@ -304,4 +321,5 @@ def _film(model: _FilmModel | None) -> Film | None:
         module=model.module,
         args=tuple(model.args),
         still_args=tuple(model.still),
+        pictures=tuple(model.pictures),
     )

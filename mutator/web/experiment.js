@@ -238,11 +238,18 @@ class Experiment {
     const t = Number.isNaN(hazard) ? (Number.isNaN(begin) ? 10 : begin + 2) : hazard;
     const run = this.facts.run(), separator = run.includes("\\") ? "\\" : "/";
     place.replaceChildren(
-      ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden beside faulty at ${time} s`, loading: "lazy" }), el("figcaption", {}, `${time} s`))),
+      ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden beside faulty at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
       ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden beside faulty", loading: "lazy" })
         : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden beside faulty" })),
       el("p", {}, kept ? "More pictures, or a film:" : "Pictures and films are made on request, and are here once the report is written again:"),
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
+  }
+
+  /** What happened at the time of a picture, as its name has it. */
+  #moment(time) {
+    const moments = { t_activation: "fault first active", t_alert: "first alert", t_hazard: "first hazard" };
+    const what = Object.keys(moments).filter((name) => this.table.number(this.row, name).toFixed(2) === time).map((name) => moments[name]);
+    return [`${time} s`, ...what].join(", ");
   }
 
   #noSeries(id) {

@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
+from mutator.api.runs import load_run
 from mutator.cli.app import main
+from mutator.report import stills
 from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
@@ -78,6 +80,28 @@ def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
     assert time == "1.50"
     kept = Path("runs/a/plots") / f"{name}-1.50s.jpg"
     assert base64.b64decode(picture.partition(",")[2]) == kept.read_bytes()
+
+
+def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the experiments with a change that shows pictures, at activation and hazard, one of so many
+    that are planned; another run of the command takes none again, and `--no-stills` none at all."""
+    manifest = root / "fault_library/targets/toycar.yaml"
+    manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
+    monkeypatch.setattr(stills, "ONE_IN", 2)
+    words = ("run", "toy", "--only", "fault_type == 'distance'", "-n", "0", "--out")
+    assert cli(*words, "runs/without", "--no-stills").code == 0
+    assert not Path("runs/without/plots").exists()
+    assert "pictures 0/" in cli(*words, "runs/a").err
+    taken = {path.name: path.stat().st_mtime_ns for path in Path("runs/a/plots").iterdir()}
+    run = load_run("runs/a")
+    seen = [e for e in run.experiments.values() if "alone" in e.changes and run.records[e.id].t_manifest]
+    [*chosen] = {name.partition("-")[0] for name in taken}
+    assert 0 < len(chosen) <= run.folder.planned // 2
+    assert set(chosen) <= {e.id for e in seen}
+    record = run.records[chosen[0]]
+    assert f"{chosen[0]}-{record.activation.first:.2f}s.jpg" in taken
+    assert "pictures" not in cli(*words, "runs/a").err
+    assert {path.name: path.stat().st_mtime_ns for path in Path("runs/a/plots").iterdir()} == taken
 
 
 def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
