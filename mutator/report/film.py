@@ -77,6 +77,7 @@ def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, o
         "active": [activation.first, activation.last] if activation else None,
         "marks": [{"kind": mark.kind.value, "t": mark.t, "label": mark.label} for mark in marks_of(record)],
         "names": names,
+        "end": record.t_end,
     }
 
 

@@ -22,7 +22,7 @@ class Mark:
 class Events:
     """What the harness knows of the faulty run. Times in s; `active` spans its activations, if there were.
 
-    `names` are short words on hazards, by their id.
+    `names` are short words on hazards, by their id. `end` is when the drive was over, though the run went on.
     """
 
     title: str
@@ -30,6 +30,7 @@ class Events:
     active: tuple[float, float] | None
     marks: tuple[Mark, ...]
     names: dict[str, str]
+    end: float | None = None
 
 
 def read_events(path: Path) -> Events:
@@ -44,6 +45,7 @@ def read_events(path: Path) -> Events:
             active=tuple(data["active"]) if data["active"] else None,
             marks=tuple(Mark(**mark) for mark in data["marks"]),
             names=data["names"],
+            end=data.get("end"),
         )
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(

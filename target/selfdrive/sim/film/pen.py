@@ -37,6 +37,12 @@ def line_colour(prob: float) -> Colour:
     return SEEN if prob >= DOUBTFUL else DOUBTED
 
 
+def grey(canvas: np.ndarray) -> None:
+    """Take the colour out of a picture, and some of its light: it shows what no longer counts."""
+    if canvas.size:
+        canvas[:] = (0.7 * cv2.cvtColor(canvas, cv2.COLOR_BGR2GRAY)).astype(np.uint8)[..., None]
+
+
 def write(
     canvas: np.ndarray,
     text: str,

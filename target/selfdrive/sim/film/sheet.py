@@ -84,7 +84,10 @@ class _Side:
         self._draw_warnings(pane, frame)
         caption = np.full((CAPTION, PANE[0], 3), pen.PAPER, np.uint8)
         self._draw_caption(caption, frame)
-        return np.concatenate([pane, caption, self._strip.draw(frame)])
+        block = np.concatenate([pane, caption, self._strip.draw(frame)])
+        if self._events.end is not None and frame.t > self._events.end:
+            pen.grey(block)
+        return block
 
     def _draw_chips(self, pane: np.ndarray, frame: Frame) -> None:
         pen.chip(pane, self._name, (8, 8), self._colour)

@@ -36,11 +36,13 @@ class Timeline:
         self._draw_seconds()
         rows = (height - FOOT - HEAD - GAP) // 2
         reels = ((golden, pen.GOLDEN, 2), (faulty, pen.FAULTY, 1))
+        self._driven = self._end if events.end is None else events.end
         self._plot("offset [m]", HEAD, rows, _offset, reels, LANE_OFFSET)
         self._plot("lead [m]", HEAD + rows + GAP, rows, _distance, reels, None)
         if events.active:
             self._shade(*events.active)
         self._draw_marks(events.marks)
+        pen.grey(self._canvas[:, round(self._x(self._driven)) + 2 :])
 
     def draw(self, t: float) -> np.ndarray:
         """The timeline with its hand at `t` (s)."""
@@ -77,7 +79,8 @@ class Timeline:
         """One plot of both runs; `limit` is drawn on either side of zero where a value comes near it."""
         cv2.rectangle(self._canvas, (GUTTER, top), (self._size[0] - 10, top + rows), pen.PANEL, cv2.FILLED)
         series = [(np.array([value(frame) for frame in reel.frames]), reel) for reel, _, _ in reels]
-        low, high = _span(np.concatenate([values for values, _ in series]), symmetric=limit is not None)
+        driven = [values[[f.t <= self._driven for f in reel.frames]] for values, reel in series]
+        low, high = _span(np.concatenate(driven), symmetric=limit is not None)
 
         def y(values: np.ndarray) -> np.ndarray:
             return top + 3 + (rows - 6) * (high - np.clip(values, low, high)) / (high - low)

@@ -124,6 +124,20 @@ def test_marks_stand_at_their_times(reel):
     assert abs(columns.min() - middle) <= 2
 
 
+def test_what_comes_after_the_end_of_the_drive_is_grey(reel):
+    """Sides and timeline lose their colours after the end, and no plot is made for values beyond it."""
+    frames = [{"d_rel": 20.0}] * 21 + [{"d_rel": 500.0}] * 20
+    ended, whole = (Sheet(reel(*frames), reel(*frames), replace(EVENTS, end=end)) for end in (1.0, None))
+    assert (ended.draw(20)[:580] == whole.draw(20)[:580]).all()
+    later = ended.draw(21)
+    for side in ("golden", "faulty"):
+        pane = pane_of(later, side)
+        assert (pane.max(axis=-1) == pane.min(axis=-1)).all()
+    right = later[600:, WIDTH - 200 :]
+    assert (right.max(axis=-1) == right.min(axis=-1)).all()
+    assert (later[600:, :600] != whole.draw(21)[600:, :600]).any()  # another scale
+
+
 def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
     """A wide camera's picture fills the pane's width and leaves room above."""
     cv2.imwrite(str(tmp_path / "a.jpg"), np.full((720, 1280), 128, np.uint8))
