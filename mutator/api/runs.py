@@ -24,7 +24,8 @@ from mutator.execution.session import Notify, Summary
 from mutator.execution.single_run import rerun
 from mutator.execution.traces import Traces
 from mutator.exports import Format
-from mutator.exports.write import export
+from mutator.exports import Table as ExportedTable
+from mutator.exports.write import Parts, export
 from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes import results as results_table
 from mutator.outcomes import rows as tables
@@ -256,18 +257,29 @@ class Run:
         return problem
 
     def export(
-        self, format: Format | str, out: str | Path | None = None, *, failures: Sequence[str] = ()
+        self,
+        format: Format | str,
+        out: str | Path | None = None,
+        *,
+        failures: Sequence[str] = (),
+        only: str | None = None,
+        table: ExportedTable | str = ExportedTable.RESULTS,
     ) -> Path:
         """Write the run for other tools; default: a file in exports/ of the run folder, which is returned.
 
-        `failures` are the endings that JUnit shows as failures.
+        `failures` are the endings that JUnit shows as failures, `only` is a filter over the columns of the
+        results for MCAP, which is a folder of files, `table` what CSV and Parquet are of.
         """
-        if format not in (known := [f.value for f in Format]):
-            raise MutatorError(f"'{format}'", argument="format", expected=f"one of {', '.join(known)}")
+        for name, value, kind in (("format", format, Format), ("table", table, ExportedTable)):
+            if value not in (known := [one.value for one in kind]):
+                raise MutatorError(f"'{value}'", argument=name, expected=f"one of {', '.join(known)}")
         wanted = Format(format)
         workspace = self.workspace if wanted is Format.MUTATION_ELEMENTS else None
+        if wanted is Format.MCAP:
+            workspace = self._workspace_if_any()
         place = None if out is None else Path(out)
-        return export(self.path, wanted, place, workspace=workspace, failures=failures)
+        parts = Parts(failures=failures, only=only, table=ExportedTable(table))
+        return export(self.path, wanted, place, workspace=workspace, parts=parts)
 
     def check_equivalence(self) -> None:
         """CheckFailed when a sample that was run again on the reference engine gave another result."""

@@ -9,7 +9,8 @@ import mutator
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place
-from mutator.exports import Format
+from mutator.cli.run_folders import library_if_any
+from mutator.exports import Format, Table
 
 
 def register(app: typer.Typer) -> None:
@@ -23,6 +24,8 @@ Examples:
   mutator export runs/first --format junit --out junit.xml
   mutator export runs/first --format junit --failures hazard,crashed
   mutator export runs/first --format parquet --out first.parquet
+  mutator export runs/first --format csv --table propagation
+  mutator export runs/first --format mcap --only 'outcome == "hazard"'
 """
 
 
@@ -31,7 +34,8 @@ def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=completion.runs)],
     format: Annotated[Format, typer.Option(help="What to write.")],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Where to; default: a file in RUN/exports/.")
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Where to; default: a file or folder in RUN/exports/."),
     ] = None,
     failures: Annotated[
         str | None,
@@ -41,16 +45,32 @@ def export(
             "for a hazard is data.",
         ),
     ] = None,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            metavar="EXPR",
+            help="MCAP: only experiments for which this holds, over the columns of the results, "
+            "e.g. 'outcome == \"hazard\"'.",
+        ),
+    ] = None,
+    table: Annotated[Table, typer.Option(help="CSV and Parquet: the table.")] = Table.RESULTS,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Write a run for other tools: mutation report, JUnit, CSV, Parquet."""
+    """Write a run for other tools: mutation report, JUnit, CSV, Parquet, MCAP.
+
+    MCAP is a file for each experiment: golden and faulty run as two sets of topics, with units, and events.
+    """
     terminal = Terminal(as_json)
     workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None
+    if format is Format.MCAP:
+        workspace = library_if_any(place)
     endings = [name.strip() for name in failures.split(",")] if failures else []
     with terminal.wait("writing"):
-        written = mutator.load_run(run, workspace=workspace).export(format, out, failures=endings)
+        written = mutator.load_run(run, workspace=workspace).export(
+            format, out, failures=endings, only=only, table=table
+        )
     if as_json:
         terminal.emit({"format": format.value, "file": str(written)})
     terminal.say(f"{format.value}: {short_path(written)}")

@@ -13,3 +13,12 @@ class Format(StrEnum):
     JUNIT = "junit"
     CSV = "csv"
     PARQUET = "parquet"
+    MCAP = "mcap"
+
+
+class Table(StrEnum):
+    """The tables of a run folder."""
+
+    RESULTS = "results"
+    PROPAGATION = "propagation"
+    TIMINGS = "timings"

@@ -1,24 +1,29 @@
 """Writes a run in the format that is asked for."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import make_folder, write_atomic
-from mutator.exports import Format, elements, junit
-from mutator.outcomes import results
+from mutator.errors import MutatorError
+from mutator.exports import Format, Table, elements, junit, mcap_export
 from mutator.outcomes.reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 FOLDER = "exports"
 
+FILES = {Format.MUTATION_ELEMENTS: "mutation-elements.json", Format.JUNIT: "junit.xml", Format.MCAP: "mcap"}
 
-FILES = {
-    Format.MUTATION_ELEMENTS: "mutation-elements.json",
-    Format.JUNIT: "junit.xml",
-    Format.CSV: results.CSV,
-    Format.PARQUET: results.PARQUET,
-}
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """Which part of a run is written, and how: `failures` are the endings that JUnit is told as failures,
+    `only` is a filter over the columns of the results for MCAP, `table` what CSV and Parquet are of."""
+
+    failures: Sequence[str] = ()
+    only: str | None = None
+    table: Table = Table.RESULTS
 
 
 def export(
@@ -27,27 +32,49 @@ def export(
     out: Path | None = None,
     *,
     workspace: Workspace | None = None,
-    failures: Sequence[str] = (),
+    parts: Parts = Parts(),
 ) -> Path:
-    """Write the run folder `run` as `format` to `out` (default: RUN/exports/); returns the file.
+    """Write the run folder `run` as `format` to `out` (default: RUN/exports/); returns the file, or the
+    folder of several.
 
-    A mutation report shows sources, so it needs the `workspace` with the target that was run; `failures` are
-    the endings that JUnit is told as failures. MutatorError for a target that has changed since.
+    A mutation report shows sources, so it needs the `workspace` with the target that was run; with one, MCAP
+    has the exact traces that are kept. MutatorError for a target that has changed since.
     """
     folder = RunFolder.open(run)
-    place = out or folder.path / FOLDER / FILES[format]
+    if parts.only is not None and format is not Format.MCAP:
+        raise MutatorError(f"only, for {format.value}", argument="only", remedy="leave `only` out")
+    place = out or folder.path / FOLDER / FILES.get(format, f"{parts.table.value}.{format.value}")
+    if format is Format.MCAP:
+        return mcap_export.write_experiments(folder, place, workspace, parts.only)
     make_folder(place.parent)
-    write_atomic(place, _content(folder, format, workspace, failures))
+    write_atomic(place, _content(folder, format, workspace, parts))
     return place
 
 
-def _content(
-    folder: RunFolder, format: Format, workspace: Workspace | None, failures: Sequence[str]
-) -> bytes:
+def _content(folder: RunFolder, format: Format, workspace: Workspace | None, parts: Parts) -> bytes:
     if format is Format.MUTATION_ELEMENTS:
         assert workspace is not None
         return elements.content(folder, workspace)
     if format is Format.JUNIT:
-        return junit.content(folder, failures)
+        return junit.content(folder, parts.failures)
     table = Results.up_to_date(folder.path)
-    return table.csv() if format is Format.CSV else table.parquet()
+    if parts.table is Table.RESULTS:
+        return table.csv() if format is Format.CSV else table.parquet()
+    return _table(folder.path / f"{parts.table.value}.parquet", format)
+
+
+def _table(path: Path, format: Format) -> bytes:
+    """A table that a run folder has as Parquet alone."""
+    if not path.is_file():
+        raise MutatorError(
+            f"no {path.name}",
+            where=path.parent,
+            argument="table",
+            expected="a run of a target whose table that is",
+            remedy="export another table",
+        )
+    if format is Format.PARQUET:
+        return path.read_bytes()
+    import pandas as pd
+
+    return pd.read_parquet(path).to_csv(index=False, lineterminator="\n").encode()

@@ -9,7 +9,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.exports import Format
-from mutator.exports.write import export
+from mutator.exports.write import Parts, export
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 
@@ -76,7 +76,7 @@ def test_a_hazard_is_data(run: Path) -> None:
 
 def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
     """Who wants to see hazards as failures says so; they then name hazard and time."""
-    found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", failures=["hazard"]))
+    found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", parts=Parts(failures=["hazard"])))
     assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
     assert not any(list(c.iter("failure")) for c in found["distance"])
 
@@ -84,7 +84,7 @@ def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
 def test_an_error_cannot_be_a_failure(run: Path) -> None:
     """A harness error says nothing about the controller, so it is no failure of its."""
     with pytest.raises(MutatorError, match="harness_error"):
-        export(run, Format.JUNIT, failures=["harness_error"])
+        export(run, Format.JUNIT, parts=Parts(failures=["harness_error"]))
 
 
 def test_tables_are_those_of_the_run(run: Path, tmp_path: Path) -> None:

@@ -1,0 +1,255 @@
+"""Experiments as MCAP files: golden and faulty run as two sets of topics, and what happened as messages.
+
+A file for each experiment: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each value that is
+kept, `/events` with one for each thing that happened. Messages are JSON and have schemas; log times are
+simulated time in ns. What a run folder has is written: nothing is driven.
+"""
+
+import io
+import json
+import math
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mutator._common.files import make_folder, write_atomic
+from mutator._common.text import counted
+from mutator.campaigns.filters import compile_filter
+from mutator.errors import MutatorError, MutatorWarning
+from mutator.execution.traces import Traces
+from mutator.model import Experiment, Record
+from mutator.outcomes.golden import Trace
+from mutator.outcomes.reader import Results
+from mutator.outcomes.trace_files import own_times
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+EVENTS = "/events"
+KINDS = ("activation", "last_active", "manifested", "alert", "hazard", "end_of_drive")
+_VALUE: dict[str, Any] = {"type": ["number", "null"]}  # null: no value, or one that is not finite
+
+Values = list[tuple[float, float]]  # time (s) and value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Topic:
+    """A channel of one run: what is known of it, and its values."""
+
+    name: str
+    about: Mapping[str, str]  # unit, role, component, about
+    values: Values
+
+
+def write_experiments(
+    folder: RunFolder, out: Path, workspace: Workspace | None, only: str | None = None
+) -> Path:
+    """Write `<id>.mcap` into `out` for each experiment that has a series or a kept trace, or for those of
+    them for which the filter `only` over the columns of the results holds.
+
+    MutatorError where the package mcap is missing, and where none has one; MutatorWarning of those without.
+    """
+    content = Content(folder, workspace)
+    wanted = _chosen(folder, only)
+    found = [name for name in wanted if content.has(name)]
+    remedy = f"drive one again: `mutator rerun {(wanted or ['ID'])[0]} --run {folder.path} --trace`"
+    if not found:
+        raise MutatorError(
+            f"{counted(len(wanted), 'experiment')}, and none with a series",
+            where=folder.path,
+            argument="only",
+            expected="experiments whose series are kept",
+            remedy=remedy if wanted else "widen `only`",
+        )
+    if len(found) < len(wanted):
+        missing = next(name for name in wanted if name not in found)
+        warnings.warn(
+            f"{len(wanted) - len(found)} of {counted(len(wanted), 'experiment')} have no series and are left "
+            f"out, {missing} first: {remedy.replace(wanted[0], missing)}",
+            MutatorWarning,
+            stacklevel=2,
+        )
+    make_folder(out)
+    for name in found:
+        write_atomic(out / f"{name}.mcap", content.of(name))
+    return out
+
+
+class Content:
+    """Makes the files of a run folder's experiments, the same bytes each time."""
+
+    def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
+        self._folder = folder
+        self._series = SeriesFolder(folder.path)
+        self._traces = None if workspace is None else Traces(workspace, folder)
+        self._records = folder.records()
+
+    @cached_property
+    def _experiments(self) -> Mapping[str, Experiment]:
+        return {experiment.id: experiment for experiment in plan_file.read_all(self._folder.path)}
+
+    def has(self, experiment_id: str) -> bool:
+        """Whether there is anything to write of an experiment."""
+        return self._series.has(experiment_id) or self._exact(experiment_id) is not None
+
+    def of(self, experiment_id: str) -> bytes:
+        """The file of an experiment: its exact traces where they are kept, else its series."""
+        experiment, record = self._experiments[experiment_id], self._records[experiment_id]
+        if (traces := self._exact(experiment_id)) is not None:
+            assert self._traces is not None
+            manifest = self._traces.manifest
+            golden, faulty = (list(_of_trace(trace, manifest)) for trace in traces)
+        else:
+            golden, faulty = self._of_series(experiment_id)
+        written = _Written()
+        written.metadata("experiment", self._facts(experiment, record))
+        for run, topics in (("golden", golden), ("faulty", faulty)):
+            for topic in topics:
+                written.channel(run, topic)
+        written.events(_events(record))
+        return written.finish()
+
+    def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
+        """The kept traces, where both runs have one; never driven again."""
+        kept = self._folder.path / "traces" / experiment_id
+        if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
+            return None
+        experiment = self._experiments[experiment_id]
+        golden = self._folder.golden(experiment.scenario, experiment.changes)
+        if not (golden.is_dir() or (kept / "golden").is_dir()) or not self._traces.is_kept(experiment_id):
+            return None
+        return self._traces.of(experiment_id)
+
+    def _of_series(self, experiment_id: str) -> tuple[list[Topic], list[Topic]]:
+        found = self._series.read(experiment_id)
+        assert found is not None  # `has` was asked
+        golden, faulty = found
+        points = faulty.points
+        topics: tuple[list[Topic], list[Topic]] = ([], [])
+        for row, about in enumerate(golden.about["channels"]):
+            own = points.channel == row
+            runs = ((golden, points.golden), (faulty, points.faulty))
+            for told, (run, more) in zip(topics, runs, strict=True):
+                pairs = [*_pairs(run.t, run.values[row]), *_pairs(points.t[own], more[own])]
+                told.append(Topic(name=about["name"], about=_described(about), values=sorted(pairs)))
+        return topics
+
+    def _facts(self, experiment: Experiment, record: Record) -> dict[str, str]:
+        head = self._folder.head
+        facts = {
+            "id": experiment.id,
+            "label": experiment.label,
+            "scenario": experiment.scenario,
+            "changes": ", ".join(experiment.changes),
+            "trigger": experiment.trigger.condition,
+            "campaign": head["campaign"],
+            "target": head["target"],
+            "plan": head["plan"],
+            "status": record.status.value,
+            "outcome": record.outcome.value if record.outcome else "",
+        }
+        return facts | {name: f"{value:.9g}" for name, value in record.metrics}
+
+
+class _Written:
+    """A file under way: messages are collected, and written in the order of their times."""
+
+    def __init__(self) -> None:
+        try:
+            from mcap.writer import Writer
+        except ImportError:
+            raise MutatorError(
+                "no package mcap", expected="the package that writes MCAP files", remedy="pip install mcap"
+            ) from None
+        self._data = io.BytesIO()
+        self._writer = Writer(self._data)
+        self._writer.start(profile="", library="mutator")
+        self._messages: list[tuple[int, int, dict[str, Any]]] = []
+
+    def metadata(self, name: str, facts: dict[str, str]) -> None:
+        self._writer.add_metadata(name, facts)
+
+    def channel(self, run: str, topic: Topic) -> None:
+        unit = topic.about["unit"]
+        text = f"{topic.about['about'] or topic.name} [{unit}]"
+        schema = self._schema(f"{topic.name} [{unit}]", {"value": {**_VALUE, "description": text}})
+        number = self._writer.register_channel(
+            topic=f"/{run}/{topic.name}",
+            message_encoding="json",
+            schema_id=schema,
+            metadata=dict(topic.about),
+        )
+        for t, value in topic.values:
+            self._add(number, t, {"value": value if math.isfinite(value) else None})
+
+    def events(self, events: Iterable[tuple[float, str, str]]) -> None:
+        fields = {"kind": {"enum": list(KINDS)}, "name": {"type": "string"}, "t": {"type": "number"}}
+        schema = self._schema("event", fields)
+        number = self._writer.register_channel(topic=EVENTS, message_encoding="json", schema_id=schema)
+        for t, kind, name in events:
+            self._add(number, t, {"kind": kind, "name": name, "t": t})
+
+    def finish(self) -> bytes:
+        for sequence, (time, channel, message) in enumerate(sorted(self._messages, key=lambda m: m[:2])):
+            data = json.dumps(message).encode()
+            self._writer.add_message(channel, time, data, publish_time=time, sequence=sequence)
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        return self._data.getvalue()
+
+    def _schema(self, name: str, fields: dict[str, Any]) -> int:
+        schema = {"title": name, "type": "object", "properties": fields, "required": list(fields)}
+        data = json.dumps(schema).encode()
+        number: int = self._writer.register_schema(name=name, encoding="jsonschema", data=data)
+        return number
+
+    def _add(self, channel: int, t: float, message: dict[str, Any]) -> None:
+        self._messages.append((round(t * 1e9), channel, message))
+
+
+def _chosen(folder: RunFolder, only: str | None) -> list[str]:
+    """The experiments with a result for which `only` holds, in the order of the table."""
+    frame = Results.up_to_date(folder.path).frame().reset_index()
+    if only is None:
+        return list(frame["experiment_id"])
+    accepts = compile_filter(only, tuple(map(str, frame.columns)))
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    return [row["experiment_id"] for row in rows if accepts({str(k): v for k, v in row.items()})]
+
+
+def _of_trace(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
+    """The channels of an exact trace."""
+    for channel in (*manifest.compared, *manifest.plotted):
+        if channel.name in trace:
+            clock = own_times(channel.name)
+            time = trace[clock if clock in trace else manifest.time_channel]
+            about = {"unit": channel.unit, "role": channel.role.value}
+            about |= {"component": channel.component, "about": channel.about}
+            yield Topic(name=channel.name, about=about, values=_pairs(time, trace[channel.name]))
+
+
+def _described(about: Mapping[str, Any]) -> dict[str, str]:
+    return {name: str(about[name]) for name in ("unit", "role", "component", "about")}
+
+
+def _pairs(time: np.ndarray, values: np.ndarray) -> Values:
+    return list(zip(time.tolist(), values.astype(float).tolist(), strict=True))
+
+
+def _events(record: Record) -> Iterator[tuple[float, str, str]]:
+    """Time, kind and name of all that happened."""
+    if record.activation:
+        yield record.activation.first, "activation", ""
+        yield record.activation.last, "last_active", ""
+    if record.t_manifest is not None:
+        yield record.t_manifest, "manifested", ""
+    yield from ((t, "alert", name) for name, t in record.alerts)
+    yield from ((t, "hazard", name) for name, t in record.hazards)
+    if record.t_end is not None:
+        yield record.t_end, "end_of_drive", ""

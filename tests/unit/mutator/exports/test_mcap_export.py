@@ -1,0 +1,166 @@
+"""Experiments as MCAP files, read back with the mcap library."""
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from mcap.reader import make_reader
+
+from mutator.errors import MutatorError, MutatorWarning
+from mutator.exports import Format, Table
+from mutator.exports.write import Parts, export
+from mutator.model import Activation, Experiment, Outcome
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series_format import Points, Series, encode
+from mutator.workspace import Workspace
+
+CHANNELS = [
+    {
+        "name": "gas",
+        "unit": "-",
+        "role": "actuator",
+        "component": "pedal",
+        "about": "gas pedal",
+        "compared": True,
+    },
+    {"name": "gap", "unit": "m", "role": "truth", "component": "", "about": "", "compared": False},
+]
+GOLDEN = Series(
+    t=np.array([0.0, 0.5, 1.0]),
+    values=np.array([[0.0, 0.25, 0.5], [40.0, 30.0, math.inf]], dtype="<f4"),
+    about={"start": 0.0, "end": 1.0, "channels": CHANNELS},
+)
+FAULTY = Series(  # it ended after 0.5 s; between the two times gas was 1 for a step
+    t=np.array([0.0, 0.5]),
+    values=np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4"),
+    about={"end": 1.0},
+    points=Points(
+        channel=np.array([0]),
+        t=np.array([0.35]),
+        golden=np.array([0.125], dtype="<f4"),
+        faulty=np.array([1.0], dtype="<f4"),
+    ),
+)
+
+
+def became(e: Experiment) -> dict[str, Any]:
+    """A hazard with all that can happen, for some."""
+    if e.fault.fault_type != "lane":
+        return {}
+    return {
+        "outcome": Outcome.HAZARD,
+        "activation": Activation(first=0.25, last=0.5, count=6),
+        "t_manifest": 0.35,
+        "alerts": (("brake_hard", 0.4),),
+        "hazards": (("H3", 0.45), ("H1", 0.5)),
+        "t_end": 0.45,
+        "left": (("gas", 0.35, 0.75),),
+    }
+
+
+@pytest.fixture(scope="module")
+def run(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+) -> Path:
+    """Eight experiments, of which those with hazards and no others have a series."""
+    folder = tmp_path_factory.mktemp("mcap")
+    run = write_run(copy_toycar(folder), folder / "run", became, limit=8)
+    golden = encode(GOLDEN)
+    for record in RunFolder.open(run).records().values():
+        if record.hazards:
+            write_kept(SeriesFolder(run).kept(record.experiment_id), golden, encode(FAULTY, GOLDEN))
+    return run
+
+
+def hazardous(run: Path) -> list[str]:
+    return [r.experiment_id for r in RunFolder.open(run).records().values() if r.hazards]
+
+
+def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
+    """Each run's channels are topics with a schema and a unit, each value is a message at its time, and each
+    thing that happened is an event; values that are not finite are null."""
+    only = 'outcome == "hazard" and fault_type == "lane"'
+    out = export(run, Format.MCAP, tmp_path / "out", parts=Parts(only=only))
+    assert sorted(path.stem for path in out.iterdir()) == sorted(hazardous(run))
+    name = hazardous(run)[0]
+    messages: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+    with (out / f"{name}.mcap").open("rb") as file:
+        reader = make_reader(file)
+        for schema, channel, message in reader.iter_messages():
+            assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            told = json.loads(message.data)
+            assert set(json.loads(schema.data)["required"]) == set(told)
+            messages[channel.topic].append((message.log_time, told))
+            if channel.topic == "/faulty/gas":
+                assert schema.name == "gas [-]"
+                about = {"unit": "-", "role": "actuator", "component": "pedal", "about": "gas pedal"}
+                assert channel.metadata == about
+            if channel.topic == "/golden/gap":
+                assert channel.metadata["unit"] == "m"
+        facts = {record.name: record.metadata for record in reader.iter_metadata()}["experiment"]
+    assert (facts["id"], facts["outcome"], facts["target"]) == (name, "hazard", "toycar")
+    values = {topic: [(t, m.get("value")) for t, m in told] for topic, told in messages.items()}
+    ms = 1_000_000
+    assert values["/golden/gas"] == [(0, 0.0), (350 * ms, 0.125), (500 * ms, 0.25), (1000 * ms, 0.5)]
+    assert values["/faulty/gas"] == [(0, 0.0), (350 * ms, 1.0), (500 * ms, 0.75)]
+    assert values["/golden/gap"] == [(0, 40.0), (500 * ms, 30.0), (1000 * ms, None)]
+    assert values["/faulty/gap"] == [(0, 40.0), (500 * ms, None)]
+    assert [(t / ms, m["kind"], m["name"]) for t, m in messages["/events"]] == [
+        (250, "activation", ""),
+        (350, "manifested", ""),
+        (400, "alert", "brake_hard"),
+        (450, "hazard", "H3"),
+        (450, "end_of_drive", ""),
+        (500, "last_active", ""),
+        (500, "hazard", "H1"),
+    ]
+
+
+def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
+    """An export is the same each time."""
+    parts = Parts(only=f'experiment_id == "{hazardous(run)[0]}"')
+    first, again = (next(export(run, Format.MCAP, tmp_path / x, parts=parts).iterdir()) for x in "ab")
+    assert first.read_bytes() == again.read_bytes()
+
+
+def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> None:
+    """What is left out is counted, with the command that drives it again; nothing at all is an error."""
+    left = 8 - len(hazardous(run))
+    with pytest.warns(
+        MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"
+    ):
+        out = export(run, Format.MCAP, tmp_path / "out")
+    assert len(list(out.iterdir())) == len(hazardous(run))
+    with pytest.raises(MutatorError, match=r"none with a series.*mutator rerun"):
+        export(run, Format.MCAP, tmp_path / "none", parts=Parts(only='outcome == "masked"'))
+    with pytest.raises(MutatorError, match=r"0 experiments.*widen `only`"):
+        export(run, Format.MCAP, tmp_path / "none", parts=Parts(only='scenario == "Z"'))
+    assert not (tmp_path / "none").exists()
+
+
+def test_other_formats_take_no_filter(run: Path, tmp_path: Path) -> None:
+    """A filter that would have no effect is refused."""
+    with pytest.raises(MutatorError, match="leave `only` out"):
+        export(run, Format.CSV, tmp_path / "x.csv", parts=Parts(only='scenario == "A"'))
+
+
+def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
+    """What a run folder has as Parquet alone is written as CSV, too, with the same cells."""
+    parts = Parts(table=Table.PROPAGATION)
+    written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
+    rows = pd.read_csv(written)
+    assert list(rows["experiment_id"]) == sorted(hazardous(run))
+    assert rows[["channel", "t_first", "max_dev"]].values.tolist() == [["gas", 0.35, 0.75]] * len(rows)
+    assert export(run, Format.PARQUET, None, parts=parts).name == "propagation.parquet"
+    kept = (run / "exports" / "propagation.parquet").read_bytes()
+    assert kept == (run / "propagation.parquet").read_bytes()
+    assert export(run, Format.CSV, None, parts=Parts(table=Table.TIMINGS)).name == "timings.csv"
