@@ -66,7 +66,7 @@ class Table:
             for row in self.rows
         ]
         return Markup(
-            '<div class="scroll" tabindex="0" role="region" aria-label="Table"><table class="{}">\n'
+            '<div class="scroll" tabindex="0" role="group" aria-label="Table"><table class="{}">\n'
             "{}<tbody>\n{}</tbody></table></div>"
         ).format(style, self._html_head(), Markup("").join(rows))
 
@@ -75,13 +75,13 @@ class Table:
 
         if not any(self.heads):
             return Markup("")
-        heads = Markup("").join(
-            Markup('<th scope="col"{}>{}</th>').format(
-                Markup(' class="number"' if i in self.right else ""), head
-            )
+        tags = ("<td>{1}</td>", '<th scope="col"{0}>{1}</th>')  # a head says something
+        numbers = Markup(' class="number"')
+        heads = [
+            Markup(tags[bool(head)]).format(numbers if i in self.right else "", head)
             for i, head in enumerate(self.heads)
-        )
-        return Markup("<thead><tr>{}</tr></thead>\n").format(heads)
+        ]
+        return Markup("<thead><tr>{}</tr></thead>\n").format(Markup("").join(heads))
 
 
 def markdown_line(text: str) -> str:

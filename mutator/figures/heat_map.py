@@ -48,8 +48,15 @@ def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[
             ha="center",
             va="center",
             fontsize=style.SMALL,
-            color="white" if rates[place] < DARK_BELOW else "black",
+            color=_text_colour(rates[place]),
         )
     axis.set_xticks(range(len(scenarios)), scenarios)
     axis.spines[:].set_visible(False)
     return axis.imshow(rates, cmap=COLOURS, vmin=0, vmax=100, aspect="auto")
+
+
+def _text_colour(rate: float) -> str:
+    """Seen on a cell of that colour (NaN: on none, where it is as all other text)."""
+    if rate != rate:
+        return "black"
+    return "white" if rate < DARK_BELOW else "#010101"  # not black, which follows a page's theme

@@ -1,6 +1,7 @@
 """How the figures of a report look alike: colours, sizes, the empty page they are drawn on.
 
-Colours are those of Okabe and Ito, told apart by colour-blind readers; methods differ in their markers, too.
+A page shows them in its light or dark theme (`themed`). Colours are those of Okabe and Ito, told apart by
+colour-blind readers; methods differ in their markers, too.
 """
 
 from typing import TYPE_CHECKING
@@ -36,3 +37,26 @@ def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tu
         axis.tick_params(labelsize=TEXT, length=0)
         axis.spines[["top", "right"]].set_visible(False)
     return figure, axes
+
+
+_DARK = """<style>
+svg { color: #1b2027; --several: #444444; --hazard: #b00020 } text { fill: currentColor }
+@media screen and (prefers-color-scheme: dark) {
+  svg { color: #e4e8ec; --several: #a5afba; --hazard: #ff9a90 }
+}
+</style>"""
+_THEMED = {  # what is drawn in black or nearly so follows the theme; a white ground lets the page show
+    'style="fill: #ffffff"': 'style="fill: none"',
+    "#000000": "currentColor",
+    INK: "currentColor",
+    "#555555": "currentColor",
+    SEVERAL_COLOUR: "var(--several)",
+    "#b00020": "var(--hazard)",
+}
+
+
+def themed(svg: str) -> str:
+    """A figure's SVG as a page shows it: without a ground, its ink light where the page is dark."""
+    for colour, shown in _THEMED.items():
+        svg = svg.replace(colour, shown)
+    return svg.replace("<defs>", f"{_DARK}<defs>", 1)

@@ -137,7 +137,7 @@ class Experiment {
 
   command(text) {
     const { el } = Dom;
-    return el("div.command", {}, el("code", {}, text), Dom.copyButton(() => text));
+    return el("div.command", {}, el("code", { tabindex: 0 }, text), Dom.copyButton(() => text));
   }
 
   #commands() {
@@ -216,14 +216,14 @@ class Experiment {
     renderDiff(shown, patch, { mode: this.mode });
     const lines = Diff.injected(patch);
     snippet.replaceChildren(...lines.map(({ path, lines: code }) => el("div", {}, el("p.quiet", {}, path),
-      el("pre", {}, el("code", {}, dedented(code).map((line) => [...Diff.coloured(line), "\n"]))))));
+      el("pre", { tabindex: 0 }, el("code", {}, dedented(code).map((line) => [...Diff.coloured(line), "\n"]))))));
   }
 
   #spec(spec, setting) {
     const { el } = Dom;
     const rows = [["condition", this.text("condition")], ["how long", setting.hold + (setting.hold_s === null ? "" : ` ${setting.hold_s} s`)],
       ["not before", `${setting.armed_after_s} s`], ["changes of the scenario", setting.changes.join(", ") || "none"], ["seed", this.text("seed")]];
-    return el("div", {}, el("pre", {}, el("code", {}, spec)),
+    return el("div", {}, el("pre", { tabindex: 0 }, el("code", {}, spec)),
       el("table", {}, el("tbody", {}, rows.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value))))));
   }
 

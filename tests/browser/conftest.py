@@ -158,6 +158,28 @@ class Page:
         self.page.keyboard.press("Escape")
 
 
+SERIOUS = """async () => {
+    const found = await axe.run(document, { resultTypes: ["violations"] });
+    const bad = found.violations.filter((v) => ["serious", "critical"].includes(v.impact));
+    return bad.flatMap((v) => v.nodes.map((node) => `${v.id}: ${node.target} ${node.any[0]?.message || ""}`));
+}"""
+
+
+@pytest.fixture(scope="session")
+def serious_faults() -> Callable[[Any], list[str]]:
+    """What axe-core finds of serious faults in a playwright page as it is, for people who see, hear or move
+    otherwise."""
+    package = pytest.importorskip("axe_playwright_python", reason="extra `test` is not installed")
+    source = (Path(package.__path__[0]) / "axe.min.js").read_text(encoding="utf-8")
+
+    def found(page: Any) -> list[str]:
+        if not page.evaluate("typeof axe === 'object'"):
+            page.evaluate(source)
+        return list(page.evaluate(SERIOUS))
+
+    return found
+
+
 @pytest.fixture
 def page(browser: Any, run: Path) -> Iterator[Page]:
     """The report on a wide screen."""

@@ -29,8 +29,11 @@ def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> 
     )
 
 
-def test_thousands_of_changes(browser: Any, found: Comparison, tmp_path: Path) -> None:
-    """No more rows than the limit are laid out, new hazards first; filters search all of them."""
+def test_thousands_of_changes(
+    browser: Any, found: Comparison, tmp_path: Path, serious_faults: Callable[[Any], list[str]]
+) -> None:
+    """No more rows than the limit are laid out, new hazards first; filters search all of them, and axe-core
+    finds no serious fault."""
     page = browser.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
@@ -48,5 +51,7 @@ def test_thousands_of_changes(browser: Any, found: Comparison, tmp_path: Path) -
     page.click("[data-change=new-hazard]")
     hazards = sum(pair.b.fault.fault_type == "silence" for pair in found.pairs)
     assert page.inner_text("#shown").startswith(f"{hazards} of {total}")
+    page.emulate_media(color_scheme="dark", reduced_motion="reduce")
+    assert serious_faults(page) == []
     page.close()
     assert errors == []

@@ -3,7 +3,7 @@
 import csv
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -350,6 +350,21 @@ def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path
     page.eval_on_selector("#experiment .events td:last-child", "td => (td.textContent = 'alert'.repeat(20))")
     assert page.evaluate("document.querySelector('#experiment').scrollWidth") == 400
     context.close()
+
+
+@pytest.mark.parametrize("width", [1440, 400])
+def test_axe_finds_no_serious_fault(
+    page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
+) -> None:
+    """Wide and narrow, light and dark, with the list alone and with an experiment opened."""
+    page.page.set_viewport_size({"width": width, "height": 900})
+    for scheme in ("light", "dark"):
+        page.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+        assert serious_faults(page.page) == []
+        page.page.evaluate("document.querySelector('#grid tr[data-at]').click()")
+        page.page.wait_for_selector("#experiment .diff")
+        assert serious_faults(page.page) == []
+        page.page.keyboard.press("Escape")
 
 
 def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:

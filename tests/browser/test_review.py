@@ -95,3 +95,12 @@ def test_a_narrow_screen_needs_no_scrolling_sideways(open_page: Callable[..., An
     """What is wide scrolls in its own box."""
     page = open_page(viewport={"width": 400, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") == 400
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_serious_fault(
+    open_page: Callable[..., Any], serious_faults: Callable[[Any], list[str]], scheme: str
+) -> None:
+    """The list of groups and an opened one can be read by everyone."""
+    page = open_page(color_scheme=scheme, reduced_motion="reduce")
+    assert serious_faults(page) == []

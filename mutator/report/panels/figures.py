@@ -4,6 +4,7 @@ import base64
 from pathlib import Path
 
 from mutator.figures.figures import Drawing, drawings, write_drawings
+from mutator.figures.style import themed
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
@@ -48,4 +49,5 @@ def _panel(made: tuple[Drawing, ...], run: ReportedRun) -> Panel | None:
 
 def _embedded(path: Path) -> str:
     """The figure itself as an address, so that the page needs no file beside it."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(path.read_bytes()).decode()}"
+    svg = themed(path.read_text(encoding="utf-8"))
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
