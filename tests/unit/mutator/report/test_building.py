@@ -12,6 +12,7 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.errors import MutatorError
+from mutator.figures.style import themed
 from mutator.report import building
 from mutator.report.panels import failed
 from mutator.review import gate
@@ -129,9 +130,8 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
     written = building.write(run, None)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
-    assert sorted(base64.b64decode(link.partition(",")[2]) for link in shown) == sorted(
-        f.read_bytes() for f in files
-    )
+    embedded = [base64.b64decode(link.partition(",")[2]).decode() for link in shown]
+    assert sorted(embedded) == sorted(themed(file.read_text()) for file in files)
     assert len(shown) == 3
     assert written.markdown.read_text().count("](figures/") == 3
 
