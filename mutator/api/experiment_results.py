@@ -1,6 +1,7 @@
 """One experiment to look at: what was injected, what became of it, golden against faulty."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -118,6 +119,17 @@ class ExperimentResult(ABC):
         """The source diff for reading: without the probe, which every mutant gets."""
         return readable(self.patch)[0]
 
+    def propagation(self) -> "pd.DataFrame":
+        """The channels that left golden, by name, the earliest first: component, role, unit, when first
+        (`t_first`, s) and by how much up to the end of the drive (`max_dev`). Empty before it was run."""
+        import pandas as pd
+
+        facts = {name: (component, role, unit) for name, unit, role, component, _ in self._channels()}
+        left = sorted(self.record.left if self.record else (), key=lambda departure: departure[1])
+        rows = [(name, *facts.get(name, ("", "", "")), first, largest) for name, first, largest in left]
+        heads = ["channel", "component", "role", "unit", "t_first", "max_dev"]
+        return pd.DataFrame(rows, columns=heads).set_index("channel")
+
     def plot(self) -> "Figure":
         """Golden against faulty, a panel for each channel of the manifest, with marks for what happened."""
         golden, faulty = self._load_traces()
@@ -126,6 +138,9 @@ class ExperimentResult(ABC):
         marks = marks_of(self.record) if self.record else ()
         end = self.record.t_end if self.record else None
         return draw_run(golden, faulty, self._target(), title=title, marks=marks, end=end)
+
+    @abstractmethod
+    def _channels(self) -> Sequence[Sequence[str]]: ...
 
     @abstractmethod
     def _target(self) -> TargetManifest: ...

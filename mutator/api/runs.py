@@ -31,6 +31,8 @@ from mutator.outcomes import results as results_table
 from mutator.outcomes import rows as tables
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs, own_alerts
 from mutator.outcomes.golden import Trace, load_trace
+from mutator.outcomes.paths import Path as FaultPath
+from mutator.outcomes.paths import Ways, ways_of
 from mutator.outcomes.reader import Results
 from mutator.outcomes.sampling import keep_series
 from mutator.report import building
@@ -160,6 +162,13 @@ class Run:
         As `mutator.outcomes.reader.Results.frame` makes it; the table is brought up to date first.
         """
         return Results.up_to_date(self.path).frame()
+
+    def propagation(self) -> "pd.DataFrame":
+        """A row for each channel of an experiment that left golden: the columns of propagation.parquet.
+
+        The table is brought up to date first. MutatorError for a run of a version that recorded none.
+        """
+        return Results.up_to_date(self.path).propagation()
 
     @property
     def endings(self) -> dict[str, int]:
@@ -310,6 +319,10 @@ class Run:
         return Results.up_to_date(self.path).rows()
 
     @cached_property
+    def _ways(self) -> Ways | None:
+        return ways_of(self.folder.head)
+
+    @cached_property
     def _traces(self) -> Traces:
         """Traces that are kept in the run folder, and those that are driven when needed."""
         return Traces(self.workspace, self.folder)
@@ -416,6 +429,17 @@ class RunExperiment(ExperimentResult):
             where=self.run.path,
             remedy=f"run it: `mutator run {campaign} --out {out}`",
         )
+
+    @property
+    def fault_path(self) -> FaultPath | None:
+        """How far its fault got along the control structure; None where that is not known, and for a fault
+        that was never active or a run without an outcome."""
+        ways = self.run._ways
+        return ways.path(self.experiment, self.record) if ways and self.record else None
+
+    def _channels(self) -> Sequence[Sequence[str]]:
+        channels: Sequence[Sequence[str]] = self.run.folder.head.get("channels", ())
+        return channels
 
     def _target(self) -> TargetManifest:
         return self.run._bench.manifest

@@ -13,6 +13,7 @@ from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.judging import load_judged
+from mutator.outcomes.propagation import channel_facts
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
 
@@ -72,6 +73,9 @@ class Trial(ExperimentResult):
             return None
         save(self.plot(), [path])
         return path
+
+    def _channels(self) -> list[list[str]]:
+        return channel_facts(self.manifest)
 
     def _target(self) -> TargetManifest:
         return self.manifest

@@ -106,6 +106,17 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
         terminal.say(f"metrics: {metrics}")
 
 
+def print_path(terminal: Terminal, found: "RunExperiment") -> None:
+    """How far the fault got, in two lines."""
+    if (path := found.fault_path) is None:
+        return
+    times = [f" {stage.t_first:.2f} s" if stage.t_first is not None else "" for stage in path.stages]
+    told = [f"{s.component} {s.state.value}{time}" for s, time in zip(path.stages, times, strict=True)]
+    terminal.say(f"path: {' > '.join(told)}")
+    stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
+    terminal.say(f"reached: {path.reached or 'nothing that is recorded'}{stopped}")
+
+
 def _events(record: "Record") -> list[tuple[float, str]]:
     events: list[tuple[float, str]] = []
     if record.activation:

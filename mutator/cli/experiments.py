@@ -1,6 +1,7 @@
 """`show` and `rerun`: one experiment of a run."""
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,6 +90,7 @@ def show(
         facts = {**describe(found.experiment), **found.verdict, "patch": patch}
         facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
         facts |= {"run_with": stretch, "verifiable": found.run.verifiable}
+        facts |= {"path": asdict(found.fault_path) if found.fault_path else None}
         terminal.emit(facts | {"films": filmed})
         return
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -96,6 +98,7 @@ def show(
         terminal.say(str(found.not_run()))
     else:
         experiment_view.print_verdict(terminal, found)
+        experiment_view.print_path(terminal, found)
     if stretch:
         terminal.say(f"run with: {stretch}")
     if not found.run.verifiable:

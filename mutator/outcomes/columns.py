@@ -91,7 +91,7 @@ TIMINGS = (
 )
 PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim", "condition")
 # Columns that readers of the table add to it; no hazard may take their names.
-_DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards", "warning")
+_DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards", "warning", "through")
 DERIVED = (*_DERIVED_TEXTS, "rank", "hazard", "t_hazard")
 _PLAIN = (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *OF_PATHS, *EXTRA)
 _TEXTS = {column.name for column in _PLAIN if column.type == "text"}

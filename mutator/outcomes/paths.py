@@ -1,9 +1,9 @@
 """The path of a fault: from the components that it was injected into, along the control structure, to the
 controlled process.
 
-What feeds back (the vehicle is seen by its sensors) is no part of the path, so links out of the process and
-those of people are left out. A component of the path that left golden only after the process had is taken for
-one that the feedback changed, unless the path alone leads to it.
+Feedback is no part of the path, so links out of the process and those of people are left out. A component of
+the path that left golden only after the process had is taken for one that the feedback changed, where
+feedback can have come to it before.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 from itertools import pairwise
+from math import inf
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record
@@ -25,6 +26,7 @@ class State(StrEnum):
 
     INJECTED = "injected"
     REACHED = "reached"  # a channel of it left golden
+    PASSED = "passed"  # it has channels, and none left golden, but what it alone feeds did
     FEEDBACK = "feedback"  # a channel of it left golden, but only after the process had
     HELD = "held"  # it has channels, and none left golden
     UNSEEN = "unseen"  # nothing of it is recorded
@@ -53,6 +55,16 @@ class Stage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Crossing:
+    """A link of a path, the components at its ends, and whether the fault got through."""
+
+    link: str
+    tail: str
+    tip: str
+    passage: Passage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
     """The stages of a path in causal order, and how the fault fared at each of its links.
 
@@ -61,7 +73,7 @@ class Path:
     """
 
     stages: tuple[Stage, ...]
-    links: tuple[tuple[str, Passage], ...]
+    crossings: tuple[Crossing, ...]
     reached: str
     stopped_at: tuple[str, ...]
 
@@ -74,7 +86,7 @@ class Way:
     links: Mapping[str, tuple[str, str]]
     sources: frozenset[str]  # where the fault comes in
     injected: bool  # whether these are known to be where
-    fed: frozenset[str]  # components that something off the way leads to, too
+    fed: Mapping[str, frozenset[str]]  # what else leads to a component, from off the way
     steps: Mapping[str, int]  # links that are left to the process
 
     def feeders(self, component: str) -> set[str]:
@@ -94,6 +106,9 @@ class Ways:
         self.component_of = {name: component for name, _, _, component, _ in channels}
         self._roles = {component: role for _, _, role, component, _ in channels if component}
         self.structure = structure
+        self._links = _links_of(structure) if structure else {}
+        # from what is not recorded back to what leads to it
+        self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
         self._way = lru_cache(maxsize=None)(self._structured if structure else self._chain)
 
     @property
@@ -128,7 +143,10 @@ class Ways:
         changed = [s.component for s in stages if s.channels and s.state in (State.INJECTED, State.REACHED)]
         return Path(
             stages=tuple(stages),
-            links=tuple((name, _passage(*ends, states, arrived)) for name, ends in way.links.items()),
+            crossings=tuple(
+                Crossing(link=name, tail=tail, tip=tip, passage=_passage(tail, tip, states, arrived))
+                for name, (tail, tip) in way.links.items()
+            ),
             reached=min(reversed(changed), key=way.steps.__getitem__, default=""),
             stopped_at=_holding(way, states, arrived) if record.outcome is Outcome.MASKED else (),
         )
@@ -136,25 +154,43 @@ class Ways:
     def _states(self, way: Way, left: Mapping[str, float]) -> tuple[dict[str, State], set[str]]:
         """The state of each component of a way, by the times (s) when components first left golden; and
         which of them the fault came to, as far as is known: an unseen one if it came to what feeds it."""
-        seen = {component for component in self.component_of.values() if component}
-        fed_back = min((left[name] for name in self.processes if name in left), default=float("inf"))
+        moved = min((left[name] for name in self.processes if name in left), default=inf)
+        passed = self._passed(way, left, moved)
         states: dict[str, State] = {}
         arrived: set[str] = set()
         for name in way.components:
             came = name in way.sources or bool(way.feeders(name) & arrived)
             if way.injected and name in way.sources:
                 states[name] = State.INJECTED
-            elif name not in seen:
+            elif name not in self._roles:
                 states[name] = State.UNSEEN
             elif name not in left:
-                states[name] = State.HELD
-            elif left[name] > fed_back and (name in way.fed or not came):
-                states[name] = State.FEEDBACK
-            else:
+                states[name] = State.PASSED if name in passed else State.HELD
+            elif name in passed or left[name] <= moved:
                 states[name] = State.REACHED
-            if states[name] in (State.INJECTED, State.REACHED) or (states[name] is State.UNSEEN and came):
+            else:
+                by_loop = not came or self._fed_back(way.fed.get(name, ()), left) < left[name]
+                states[name] = State.FEEDBACK if by_loop else State.REACHED
+            if states[name] in _CAME or (states[name] is State.UNSEEN and came):
                 arrived.add(name)
         return states, arrived
+
+    def _passed(self, way: Way, left: Mapping[str, float], moved: float) -> set[str]:
+        """The components that must have passed the fault on: what they alone lead to left golden before
+        feedback can have come there. Unknown where it is not known where the fault was injected."""
+        found: set[str] = set()
+        for name in reversed(way.components if way.injected else ()):
+            only = way.feeders(name) | way.fed.get(name, frozenset())
+            got = name in found or (name in left and left[name] <= moved)
+            if got and len(only) == 1 and name not in way.sources:
+                found |= only
+        return found
+
+    def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
+        """When (s) feedback can first have come through one of these components: when it left golden, or what
+        leads to it did where it is not recorded; infinite: it cannot."""
+        unseen = _steps([name for name in names if name not in self._roles], self._back).keys()
+        return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
 
     def _chain(self, _: frozenset[str]) -> Way:
         order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
@@ -166,29 +202,26 @@ class Ways:
             links=links,
             sources=frozenset(chain[:1]),
             injected=False,
-            fed=frozenset(chain[:1]),
+            fed=dict.fromkeys(chain[:1], self.processes),
             steps={name: len(chain) - place for place, name in enumerate(chain)},
         )
 
     def _structured(self, injected: frozenset[str]) -> Way:
         assert self.structure is not None
-        people = {n for n, c in self.structure.components.items() if c.kind is Kind.HUMAN}
-        ends = {name: (link.from_, link.to) for name, link in self.structure.links.items()}
-        forward = {
-            name: (tail, tip)
-            for name, (tail, tip) in ends.items()
-            if tail not in self.processes and not {tail, tip} & people
-        }
+        forward = {name: ends for name, ends in self._links.items() if ends[0] not in self.processes}
         steps = _steps(self.processes, [(tip, tail) for tail, tip in forward.values()])
         on_way = (_steps(injected, forward.values()).keys() & steps.keys()) | injected
         links = {name: pair for name, pair in forward.items() if on_way.issuperset(pair)}
-        fed = {tip for tail, tip in ends.values() if tail not in on_way and tail not in people}
+        fed = {
+            name: frozenset(tail for tail, tip in self._links.values() if tip == name and tail not in on_way)
+            for name in on_way
+        }
         return Way(
             components=_in_causal_order([n for n in self.structure.components if n in on_way], links, steps),
             links=links,
             sources=injected,
             injected=True,
-            fed=frozenset(fed & on_way),
+            fed=fed,
             steps={name: steps.get(name, len(on_way)) for name in on_way},
         )
 
@@ -203,6 +236,16 @@ def ways_of(head: Head) -> Ways | None:
     except ValueError:
         raise MutatorError("damaged at 'structure'", where=head.path, remedy=REMEDY) from None
     return Ways(head["channels"], structure)
+
+
+_CAME = (State.INJECTED, State.REACHED, State.PASSED)
+
+
+def _links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
+    """The ends of each link that is not from or to people."""
+    people = {name for name, one in structure.components.items() if one.kind is Kind.HUMAN}
+    ends = ((name, (link.from_, link.to)) for name, link in structure.links.items())
+    return {name: pair for name, pair in ends if not people.intersection(pair)}
 
 
 def _steps(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
@@ -233,7 +276,7 @@ def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collecti
         return Passage.NONE
     if states[tip] is State.UNSEEN:
         return Passage.UNKNOWN
-    return Passage.THROUGH if states[tip] is State.REACHED else Passage.STOPPED
+    return Passage.THROUGH if states[tip] in _CAME else Passage.STOPPED
 
 
 def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:

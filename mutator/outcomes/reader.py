@@ -137,6 +137,20 @@ class Results:
         frame.attrs["units"] = _units(frame)
         return frame
 
+    def propagation(self) -> "pd.DataFrame":
+        """A frame of propagation.parquet: a row for each channel of an experiment that left golden."""
+        import pandas as pd
+
+        path = self.path.with_name(results.PROPAGATION)
+        if not path.exists():
+            raise MutatorError(
+                "no propagation was recorded",
+                where=self.path.parent,
+                expected=f"{results.PROPAGATION}, as runs of this version have it",
+                remedy="run the campaign again, into another folder",
+            )
+        return pd.read_parquet(io.BytesIO(self._read(path)))
+
     def _check_header(self, columns: "Sequence[str] | pd.Index[str]") -> None:
         known = set(columns)
         if missing := [name for name in _NEEDED if name not in known]:

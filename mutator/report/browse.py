@@ -25,6 +25,7 @@ from mutator.outcomes.ranking import worst
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report.answers import warning
+from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
 from mutator.report.series import sample_kept_traces, series_facts
 from mutator.review.groups import Shape, shapes
@@ -49,12 +50,20 @@ class Browse:
     scripts: tuple[Markup, ...]
 
 
-def browse_data(folder: RunFolder, rows: Sequence[Row], out: Path, workspace: "Workspace | None") -> Browse:
+def browse_data(
+    folder: RunFolder,
+    rows: Sequence[Row],
+    out: Path,
+    workspace: "Workspace | None",
+    paths: FoundPaths | None = None,
+) -> Browse:
     """Of a run folder and the rows of its results.csv; the page will be in the folder `out`."""
     if workspace:
         sample_kept_traces(folder, workspace)
-    data = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
-    data["table"], data["details"] = tables_of(folder, rows)
+    data: dict[str, Any] = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
+    data["table"], data["details"] = tables_of(folder, rows, paths)
+    if paths:
+        data["paths"] = paths.data([row.experiment_id for row in sorted(rows, key=reading_order)])
     facts = {
         **_of_target(folder, workspace),
         "series": series_facts(folder),
@@ -79,14 +88,16 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
     return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
 
 
-def tables_of(folder: RunFolder, rows: Sequence[Row]) -> tuple[dict[str, Any], dict[str, Any]]:
+def tables_of(
+    folder: RunFolder, rows: Sequence[Row], paths: FoundPaths | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """The table and the details of a run folder with these rows in its results.csv."""
     lines = list(Results.of_run(folder.path).lines())
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
     rows, lines = [rows[i] for i in order], [lines[i] for i in order]
     experiments = {e.id: e for e in plan_file.read_all(folder.path)}
     planned = [experiments.get(row.experiment_id) for row in rows]
-    made = table(rows, lines, alerts=folder.has_alerts)
+    made = table(rows, lines, paths, alerts=folder.has_alerts)
     return made, details(planned, shapes(_patches(folder, rows)), rows)
 
 
@@ -94,9 +105,16 @@ def reading_order(row: Row) -> tuple[str, ...]:
     return (row.module, row.fault_type, row.scenario, row.method, row.trigger, row.experiment_id)
 
 
-def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bool = True) -> dict[str, Any]:
+def table(
+    rows: Sequence[Row],
+    lines: Sequence[Mapping[str, str]],
+    paths: FoundPaths | None = None,
+    *,
+    alerts: bool = True,
+) -> dict[str, Any]:
     """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
-    `warning`, `rank` (1: the worst), `t_hazard`. Those of alerts only for a target that has `alerts`."""
+    `warning`, `rank` (1: the worst), `t_hazard`, `through`. Those of alerts only for a target that has
+    `alerts`."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -110,6 +128,8 @@ def table(rows: Sequence[Row], lines: Sequence[Mapping[str, str]], *, alerts: bo
     place = {row.experiment_id: i for i, row in enumerate(worst(rows), 1)}
     columns["rank"] = [str(place[r.experiment_id]) for r in rows]
     columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
+    if paths:
+        columns["through"] = [paths.through(r.experiment_id) for r in rows]
     checked = sorted({name for r in rows for name in r.checked})
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]
     return {"schema": SCHEMA, "count": len(rows), "checked": checked, "columns": made}

@@ -10,7 +10,7 @@ from mutator.report.browse import Browse
 from mutator.report.panel import Panel, rendered
 from mutator.web import asset, plainly_embedded
 
-STYLES = ("base.css", "report.css", "replay.css")
+STYLES = ("base.css", "report.css", "replay.css", "path.css")
 SCRIPTS = (  # each uses those before it
     "packed.js",
     "dom.js",
@@ -35,8 +35,10 @@ SCRIPTS = (  # each uses those before it
     "replay_plot.js",
     "replay_plots.js",
     "replay.js",
+    "path.js",
     "experiment.js",
     "report.js",
+    "ways.js",
 )
 
 

@@ -15,6 +15,7 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import FOLDER, Panel
+from mutator.report.paths import FoundPaths
 from mutator.statistics.frame import load
 from mutator.statistics.published import Published
 from mutator.store.run_folder import RunFolder
@@ -40,6 +41,7 @@ class ReportedRun:
     engines: EngineSummary | None
     study: "Study | None"
     compared: bool = False
+    paths: FoundPaths | None = None
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
@@ -51,6 +53,7 @@ class ReportedRun:
             frame=load(folder.path / "results.csv"),
             engines=engine_summary(folder),
             study=_study(folder) if workspace else None,
+            paths=FoundPaths.of(folder),
         )
 
     @property

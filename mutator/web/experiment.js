@@ -192,7 +192,7 @@ class Experiment {
   #path() {
     if (typeof Path === "undefined") return;
     const { table, row } = this;
-    const results = { text: (name) => table.text(row, name), number: (name) => table.number(row, name) };
+    const results = { row, text: (name) => table.text(row, name), number: (name) => table.number(row, name) };
     Path.strip(this.#content("path"), results, this.facts);
   }
 

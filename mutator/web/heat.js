@@ -6,7 +6,7 @@ class HeatMap {
   static ROW = "kind";
   static COLUMN = "scenario";
   /** Facets whose filters do not change the map: its own two, and results, which it counts itself. */
-  static FREE = ["kind", "scenario", "outcome", "status", "severity", "hazards", "alerts", "warning", "reached", "stopped_at"];
+  static FREE = ["kind", "scenario", "outcome", "status", "severity", "hazards", "alerts", "warning", "reached", "stopped_at", "through"];
 
   constructor(place, picker, table, state, metrics = []) {
     this.place = place;

@@ -15,8 +15,9 @@ const Rows = (() => {
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
     { name: "warning", title: "Warning", none: "no hazard" },
-    { name: "reached", title: "Reached", none: "not active" },
-    { name: "stopped_at", title: "Stopped at", none: "not stopped" },
+    { name: "reached", title: "Reached", none: "nothing" },
+    { name: "stopped_at", title: "Stopped at", between: ";", none: "not stopped" },
+    { name: "through", title: "Got through", between: ";", none: "no link" },
   ];
   const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
     "ending", "hazards", "alerts", "detail"];

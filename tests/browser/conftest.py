@@ -181,11 +181,22 @@ def serious_faults() -> Callable[[Any], list[str]]:
 
 
 @pytest.fixture
-def page(browser: Any, run: Path) -> Iterator[Page]:
-    """The report on a wide screen."""
+def open_report(browser: Any) -> Iterator[Callable[[Path], Page]]:
+    """Opens the report of a run folder on a wide screen."""
     context = browser.new_context(viewport={"width": 1400, "height": 900}, reduced_motion="reduce")
     context.set_default_timeout(20_000)
-    made = Page(context.new_page(), (run / "report" / "index.html").as_uri())
-    yield made.open()
+    pages: list[Page] = []
+
+    def open_it(run: Path) -> Page:
+        pages.append(Page(context.new_page(), (run / "report" / "index.html").as_uri()))
+        return pages[-1].open()
+
+    yield open_it
     context.close()
-    assert made.errors == []
+    assert [page.errors for page in pages] == [[]] * len(pages)
+
+
+@pytest.fixture
+def page(open_report: Callable[[Path], Page], run: Path) -> Page:
+    """The report on a wide screen."""
+    return open_report(run)

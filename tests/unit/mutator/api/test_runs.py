@@ -16,6 +16,7 @@ from mutator.api.runs import Run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.model import Experiment, Outcome, Status
+from mutator.outcomes.reader import Results
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
@@ -23,6 +24,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 LANE = 'fault_type == "lane" and method == "random"'
+LEFT = (("gap", 2.5, 3.0), ("gas", 2.0, 0.5))
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-in-a-notebook.md"
 
 
@@ -31,7 +33,7 @@ def became(e: Experiment) -> dict[str, Any]:
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0), ("H1", 4.5))}
-    return hazard if e.fault.fault_type == "lane" else {}
+    return hazard | {"left": LEFT} if e.fault.fault_type == "lane" else {}
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,22 @@ def run(
     folder = tmp_path_factory.mktemp("load")
     toycar = copy_toycar(folder)
     return mutator.load_run(write_run(toycar, folder / "first", became), workspace=toycar)
+
+
+def test_propagation_as_frames(run: Run) -> None:
+    """Of the run a row for each channel that left golden, of an experiment its channels by time; a run of
+    before there was any says so."""
+    frame = run.propagation()
+    lanes = run.results.index[run.results["fault_type"] == "lane"]
+    assert list(frame["experiment_id"].unique()) == sorted(lanes)
+    assert frame.groupby("channel")["max_dev"].first().to_dict() == {"gap": 3.0, "gas": 0.5}
+    one = run.experiment(lanes[0])
+    assert one.propagation()["t_first"].to_dict() == {"gas": 2.0, "gap": 2.5}
+    assert list(one.propagation()["unit"]) == ["-", "m"] and list(one.propagation().index) == ["gas", "gap"]
+    assert one.fault_path is None  # no channel of the toy names a component
+    old = Path(__file__).parents[3] / "fixtures" / "run-2" / "small"
+    with pytest.raises(MutatorError, match="no propagation was recorded"):
+        Results(old / "results.csv").propagation()
 
 
 def test_the_frame_is_typed(run: Run) -> None:

@@ -119,6 +119,10 @@ def states(found: Path) -> dict[str, State]:
     return {stage.component: stage.state for stage in found.stages}
 
 
+def passages(found: Path) -> dict[str, Passage]:
+    return {crossing.link: crossing.passage for crossing in found.crossings}
+
+
 def test_a_fault_that_an_estimator_held() -> None:
     """It was injected where nothing is recorded; neither the estimator nor what follows it changed."""
     found = path("eyes", outcome=Outcome.MASKED)
@@ -130,7 +134,7 @@ def test_a_fault_that_an_estimator_held() -> None:
         ("car", State.HELD),
     ]
     assert (found.reached, found.stopped_at) == ("", ("finder",))
-    assert dict(found.links) == {
+    assert passages(found) == {
         "picture": Passage.STOPPED,
         "lead": Passage.NONE,
         "gas": Passage.NONE,
@@ -142,8 +146,8 @@ def test_a_fault_that_a_controller_held() -> None:
     """It reached the estimator and no further: the controller after it is what stopped it."""
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
-    assert dict(found.links)["picture"] is Passage.THROUGH
-    assert dict(found.links)["lead"] is Passage.STOPPED
+    assert passages(found)["picture"] is Passage.THROUGH
+    assert passages(found)["lead"] is Passage.STOPPED
 
 
 def test_a_fault_that_reached_the_car() -> None:
@@ -155,7 +159,7 @@ def test_a_fault_that_reached_the_car() -> None:
         ("pedals", 1.3),
         ("car", 1.4),
     ]
-    assert {passage for _, passage in found.links} == {Passage.THROUGH}
+    assert {*passages(found).values()} == {Passage.THROUGH}
     assert (found.reached, found.stopped_at) == ("car", ())
 
 
@@ -178,8 +182,26 @@ def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
         "pedals": State.FEEDBACK,
         "car": State.REACHED,
     }
-    assert dict(found.links)["lead"] is Passage.STOPPED
-    assert dict(found.links)["gas"] is Passage.NONE
+    assert passages(found)["lead"] is Passage.STOPPED
+    assert passages(found)["gas"] is Passage.NONE
+
+
+def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
+    """The rack left golden before the car, so the fault came through the wheel control, although nothing that
+    is recorded of that changed, or only later."""
+    found = path("gauge", torque=1.0, place=1.1)
+    assert states(found)["wheel"] is State.PASSED
+    assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
+    assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
+
+
+@pytest.mark.parametrize(("pace", "state"), [(1.5, State.REACHED), (1.4, State.FEEDBACK)])
+def test_feedback_cannot_come_before_its_sensor(pace: float, state: State) -> None:
+    """What leads to the speed control from off the path left golden no earlier than it: so it was the fault,
+    although the car had moved already."""
+    ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
+    found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, pace=pace)
+    assert states(found)["speed"] is state
 
 
 def test_a_late_departure_that_the_path_alone_explains() -> None:
@@ -194,8 +216,8 @@ def test_what_is_not_recorded_is_passed_through() -> None:
     ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
     found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is State.UNSEEN
-    assert dict(found.links)["picture"] is Passage.UNKNOWN
-    assert dict(found.links)["lead"] is Passage.THROUGH
+    assert passages(found)["picture"] is Passage.UNKNOWN
+    assert passages(found)["lead"] is Passage.THROUGH
     held = path("eyes", ways=ways, outcome=Outcome.MASKED)
     assert held.stopped_at == ("speed",)
 

@@ -1,0 +1,116 @@
+"""The control structure of a run as a drawing whose links and boxes say how many faults came through.
+
+It has the colours of the page, light or dark; ways.js changes the numbers when another fault type is chosen.
+"""
+
+from collections.abc import Iterator, Mapping
+from html import escape
+from urllib.parse import quote
+
+from mutator.report.paths import PathCounts, link_text
+from mutator.stpa.analysis import LinkModel, StructureModel
+from mutator.stpa.layout import Arrow, Box, lay_out
+
+_LINE = 14  # px, from a label to the count below it
+_WIDEST = 7.0  # px, of the line of a link that all faults got through
+_THIN = 1.8
+
+
+def draw_ways(structure: StructureModel, counts: PathCounts, links: Mapping[str, LinkModel]) -> str:
+    """The SVG of a control structure; `links` are those that some fault may take."""
+    plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
+    layout = lay_out(structure.model_copy(update={"components": plain}))
+    size = f"{layout.width:.0f} {layout.height:.0f}"
+    lines = [
+        f'<svg class="ways-figure" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" '
+        f'width="{layout.width:.0f}" height="{layout.height:.0f}" role="group" '
+        'aria-label="Control structure with the share of faults that got through each link">',
+        "<defs>",
+        *(_tip(name) for name in ("quiet", "through", "stopped")),
+        "</defs>",
+    ]
+    for name, link in structure.links.items():
+        if name not in links:
+            lines += _idle(layout.arrows[name], link)
+    for name, link in links.items():
+        lines += _way(name, layout.arrows[name], link, counts)
+    for name, component in plain.items():
+        lines += _box(name, layout.boxes[name], component.label, component.about, counts)
+    return "\n".join((*lines, "</svg>"))
+
+
+def share_text(through: int, came: int, *, short: bool = False) -> str:
+    """What stands at a link: `12 of 40, 30 %`, or its end alone; empty where no fault came."""
+    percent = f"{100 * through / came:.0f} %" if came else ""
+    return percent if short or not came else f"{through} of {came}, {percent}"
+
+
+def _tip(name: str) -> str:
+    return (
+        f'<marker id="ways-{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="14" '
+        'markerHeight="14" markerUnits="userSpaceOnUse" orient="auto">'
+        f'<path class="tip {name}" d="M0,0 L10,5 L0,10 z"/></marker>'
+    )
+
+
+def _line(arrow: Arrow) -> str:
+    return "M" + " L".join(f"{x:.1f},{y:.1f}" for x, y in arrow.points)
+
+
+def _place(arrow: Arrow, line: int = 0) -> str:
+    """Where the label of an arrow stands, or the count on the line below it: both above a level part, beside
+    an upright one."""
+    x, y = arrow.label
+    upward = len(arrow.points) == 2 and arrow.points[0][1] > arrow.points[1][1]
+    return (
+        f'x="{x:.1f}" y="{y + _LINE * (line if upward else line - 1) - 2:.1f}" text-anchor="{arrow.anchor}"'
+    )
+
+
+def _is_short(arrow: Arrow) -> bool:
+    """Whether there is room for a percentage alone: between boxes side by side."""
+    return arrow.points[0][1] == arrow.points[-1][1]
+
+
+def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
+    """A link that is on no path."""
+    yield (
+        f'<g class="idle"><path d="{_line(arrow)}" stroke-dasharray="3 4" marker-end="url(#ways-quiet)"/>'
+        f'<text class="label" {_place(arrow)}>{escape(link.label)}</text></g>'
+    )
+
+
+def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
+    through, came = counts.through[name], counts.came[name]
+    kind = "through" if through else "stopped" if came else "quiet"
+    share = share_text(through, came, short=_is_short(arrow))
+    width = _THIN + (_WIDEST - _THIN) * (through / came if came else 0.0)
+    yield (
+        f'<a class="way is-{kind}" data-link="{escape(name)}"{" data-short" if _is_short(arrow) else ""} '
+        f'href="#through={quote(link_text(link.from_, link.to))}">'
+        f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
+        f'<path class="hit" d="{_line(arrow)}"/><path class="line" d="{_line(arrow)}" '
+        f'style="stroke-width: {width:.1f}px" marker-end="url(#ways-{kind})"/>'
+        f'<text class="label" {_place(arrow)}>{escape(link.label)}</text>'
+        f'<text class="count" {_place(arrow, 1)}>{share}</text></a>'
+    )
+
+
+def box_text(injected: int, stopped: int) -> str:
+    """What stands in a box below its name."""
+    told = ((injected, "injected"), (stopped, "stopped"))
+    return ", ".join(f"{n} {what}" for n, what in told if n)
+
+
+def _box(name: str, box: Box, label: str, about: str, counts: PathCounts) -> Iterator[str]:
+    injected, stopped = counts.injected[name], counts.stopped[name]
+    has = f"{' has-injected' if injected else ''}{' has-stopped' if stopped else ''}"
+    middle, top = box.x + box.width / 2, box.y + box.height / 2
+    yield (
+        f'<a class="box{has}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
+        f"<title>{escape(about)}</title>"
+        f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" height="{box.height:.1f}" rx="7"/>'
+        f'<text class="name" x="{middle:.1f}" y="{top - 3:.1f}" text-anchor="middle">{escape(label)}</text>'
+        f'<text class="count" x="{middle:.1f}" y="{top + 14:.1f}" text-anchor="middle">'
+        f"{box_text(injected, stopped)}</text></a>"
+    )

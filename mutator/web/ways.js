@@ -1,0 +1,43 @@
+"use strict";
+// The control structure in the report: the numbers of the fault type that is chosen (report/path_drawing.py draws it).
+
+const Ways = (() => {
+  const ALL = "all fault types", THIN = 1.8, WIDEST = 7;
+  const share = ([through, came]) => (came ? `${through} of ${came}, ${Math.round((100 * through) / came)} %` : "");
+  const boxText = ([injected, , stopped]) => [injected && `${injected} injected`, stopped && `${stopped} stopped`].filter(Boolean).join(", ");
+
+  function start() {
+    const place = document.getElementById("ways"), data = document.getElementById("ways-data");
+    if (!place || !data) return;
+    const counts = JSON.parse(data.textContent), picker = document.getElementById("ways-kind");
+    picker.disabled = false;
+    picker.addEventListener("change", () => show(place, picker.value, counts[picker.value]));
+  }
+
+  function show(place, kind, { active, links, components }) {
+    const only = kind === ALL ? "" : `&kind=${encodeURIComponent(kind)}`;
+    const filter = (element) => element.setAttribute("href", element.getAttribute("href").split("&")[0] + only);
+    document.getElementById("ways-active").textContent = `${active} active`;
+    for (const way of place.querySelectorAll("[data-link]")) {
+      const numbers = links[way.dataset.link] || [0, 0], [through, came] = numbers;
+      const state = through ? "through" : came ? "stopped" : "quiet", line = way.querySelector(".line");
+      way.setAttribute("class", `way is-${state}`);
+      line.setAttribute("marker-end", `url(#ways-${state})`);
+      line.style.strokeWidth = `${THIN + (came ? ((WIDEST - THIN) * through) / came : 0)}px`;
+      const text = share(numbers);
+      way.querySelector(".count").textContent = "short" in way.dataset ? text.split(", ").at(-1) : text;
+      document.querySelector(`#ways-table [data-link="${CSS.escape(way.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none came";
+      filter(way);
+    }
+    for (const box of place.querySelectorAll("[data-component]")) {
+      const numbers = components[box.dataset.component] || [0, 0, 0];
+      box.setAttribute("class", `box${numbers[0] ? " has-injected" : ""}${numbers[2] ? " has-stopped" : ""}`);
+      box.querySelector(".count").textContent = boxText(numbers);
+      filter(box);
+    }
+  }
+
+  return { start };
+})();
+
+Ways.start();

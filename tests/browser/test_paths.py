@@ -1,0 +1,133 @@
+"""Paths of faults in the report's page: the strip of an experiment, and the campaign's control structure."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from mutator.model import Activation, Experiment, Outcome
+from mutator.outcomes import results
+from mutator.report import building
+from mutator.report.panels import figures
+from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    from .conftest import Page
+
+STRUCTURE = """\
+schema: control_structure/1
+about: A toy.
+components:
+  sensing: {kind: sensor, label: Sensing, about: sees, modules: [toycar/sensing.py], drawn: [1, 1, 1]}
+  control: {kind: controller, label: Control, about: drives, modules: [toycar/driver.py], drawn: [0, 0, 2]}
+  pedals: {kind: actuator, label: Pedals, about: push, drawn: [1, 0, 1]}
+  world: {kind: process, label: World, about: moves, drawn: [2, 0, 2]}
+control_actions: {}
+links:
+  readings: {from: sensing, to: control, label: readings}
+  commands: {from: control, to: pedals, label: commands}
+  force: {from: pedals, to: world, label: force}
+  echo: {from: world, to: sensing, label: echo}
+"""
+COMPONENTS = {"gas": "pedals", "brake": "pedals", "gap": "world", "speed": "world"}
+ACTIVE = {"activation": Activation(first=1.5, last=5.0, count=9)}
+CHANGED = {
+    **ACTIVE,
+    "outcome": Outcome.SDC,
+    "t_manifest": 1.6,
+    "left": (("gas", 1.6, 0.25), ("gap", 1.7, 3.0)),
+}
+MASKED = {**ACTIVE, "outcome": Outcome.MASKED}
+QUIET = {"activation": None, "outcome": Outcome.NOT_ACTIVATED}
+
+
+def became(experiment: Experiment) -> dict[str, Any]:
+    """Faults of the lane change the gap, those of the distance are held, silence was never active."""
+    return {"lane": CHANGED, "distance": MASKED}.get(experiment.fault.fault_type, QUIET)
+
+
+@pytest.fixture(scope="module")
+def report(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+) -> Path:
+    """The report of made-up records of the toy with a control structure."""
+    folder = tmp_path_factory.mktemp("paths")
+    workspace = copy_toycar(folder)
+    manifest = workspace.library / "targets" / "toycar.yaml"
+    text = manifest.read_text()
+    for channel, component in COMPONENTS.items():
+        text = text.replace(f"  {channel}: {{unit: ", f"  {channel}: {{component: {component}, unit: ")
+    manifest.write_text(text)
+    (workspace.library / "stpa" / "control_structure.yaml").write_text(STRUCTURE)
+    run = write_run(workspace, folder / "run", became)
+    results.build(run)
+    with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
+        patch.setattr(figures, "drawings", lambda frame: ())
+        building.write(run, None)
+    return run
+
+
+@pytest.fixture
+def opened(open_report: "Callable[[Path], Page]", report: Path) -> "Page":
+    """That report on a wide screen."""
+    return open_report(report)
+
+
+def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
+    """Boxes in causal order, each with its state as a word and the time of its first channel; a replay lights
+    up what the fault has come to."""
+    opened.choose("kind", "sensor/lane")
+    opened.page.click("#grid tr[data-at] >> nth=0")
+    opened.page.wait_for_selector(".path-strip")
+    boxes = opened.page.locator(".path-strip .path-box")
+    assert [text.split("\n") for text in boxes.all_inner_texts()] == [
+        ["Sensing", "⚡ injected"],
+        ["Control", "? not recorded"],
+        ["Pedals", "● reached", "1.60 s +0.10 s"],
+        ["World", "● reached", "1.70 s +0.20 s"],
+    ]
+    assert "gas: first at 1.60 s, largest difference 0.25" in boxes.nth(2).get_attribute("title")
+    opened.page.evaluate(
+        "document.querySelector('section.replay').dispatchEvent("
+        "new CustomEvent('replay-time', {bubbles: true, detail: {t: 1.65}}))"
+    )
+    assert opened.texts(".path-box.is-lit strong") == ["Sensing", "Pedals"]
+    assert opened.texts(".path-box.is-ahead strong") == ["World"]
+
+
+def test_a_held_fault_says_where(opened: "Page") -> None:
+    """A masked fault names the component that stopped it, one that was never active says so."""
+    opened.choose("kind", "sensor/distance")
+    opened.page.click("#grid tr[data-at] >> nth=0")
+    opened.page.wait_for_selector(".path-box.is-held")
+    assert "It was stopped at Pedals." in opened.page.inner_text("section.path")
+    opened.open("kind=sensor%2Fsilence")
+    opened.page.click("#grid tr[data-at] >> nth=0")
+    opened.page.wait_for_selector("section.path p:has-text('never active')")
+
+
+def test_the_control_structure_counts_and_filters(opened: "Page") -> None:
+    """A link has the share that got through, of all faults or of the chosen type; it leads to the experiments
+    that got through, a box to those that it stopped; a table has the same numbers."""
+    count = "#ways [data-link='commands'] .count"
+    opened.choose("kind", "sensor/lane")
+    lanes = int(opened.found.split()[0])
+    opened.open("kind=sensor%2Fdistance")
+    held = int(opened.found.split()[0])
+    opened.open()
+    share = f"{lanes} of {lanes + held}, {100 * lanes / (lanes + held):.0f} %"
+    assert opened.page.text_content(count) == share
+    assert opened.page.text_content("#ways [data-component='pedals'] .count") == f"{held} stopped"
+    assert opened.page.text_content("#ways-table [data-link='commands'] td:last-child") == share
+    opened.page.select_option("#ways-kind", "sensor/distance")
+    assert opened.page.text_content(count) == f"0 of {held}, 0 %"
+    opened.page.click("#ways [data-component='pedals']")
+    assert opened.fragment == "stopped_at=pedals&kind=sensor%2Fdistance"
+    assert opened.found.startswith(f"{held} of ")
+    opened.page.select_option("#ways-kind", "all fault types")
+    opened.page.click("#ways [data-link='force'] .count")
+    assert opened.fragment == "through=pedals%E2%86%92world"
+    assert opened.found.startswith(f"{lanes} of ")

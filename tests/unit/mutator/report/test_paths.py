@@ -1,0 +1,58 @@
+"""What a report has of paths: shapes and columns for the page, counts by fault type."""
+
+from collections.abc import Callable
+from math import inf
+
+from mutator.model import Record
+from mutator.outcomes.paths import Crossing, Passage, Path, Stage, State, Ways
+from mutator.report.paths import FoundPaths, PathCounts
+
+CHANNELS = [
+    ["seen", "m", "internal", "eyes", "what is seen"],
+    ["gas", "-", "actuator", "pedals", ""],
+    ["gap", "m", "truth", "car", ""],
+]
+
+
+def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
+    """Through eyes, pedals and car."""
+    names = ("eyes", "pedals", "car")
+    stages = tuple(Stage(component=n, state=s, channels=()) for n, s in zip(names, states, strict=True))
+    through = {State.REACHED: Passage.THROUGH, State.HELD: Passage.STOPPED, State.UNSEEN: Passage.UNKNOWN}
+    crossings = tuple(
+        Crossing(link=f"{tail}-{tip}", tail=tail, tip=tip, passage=through[state])
+        for tail, tip, state in zip(names, names[1:], states[1:], strict=False)
+    )
+    return Path(stages=stages, crossings=crossings, reached="", stopped_at=stopped_at)
+
+
+def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
+    """Equal paths are one shape; without a path there is none; deviations have three digits, or a name,
+    and columns of channels are empty where nothing left golden."""
+    far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
+    records = {
+        "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
+        "b": record("b"),
+        "c": record("c", left=(("seen", 1.0, 2.0),)),
+    }
+    by_id = {"a": far, "c": held, "d": far}
+    found = FoundPaths(ways=Ways(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records)
+    data = found.data(["a", "b", "c", "d"])
+    assert data["shape"] == [0, -1, 1, 0]
+    assert data["shapes"][0] == [["eyes", "reached", 0], ["pedals", "reached", 1], ["car", "reached", 2]]
+    assert data["first"] == [[1.2346, None, 1.0, None], [None] * 4, [2.0, None, None, None]]
+    assert data["largest"] == [[0.123, None, 2.0, None], [None] * 4, ["Infinity", None, None, None]]
+    assert found.through("a") == "eyes→pedals;pedals→car"
+    assert found.through("b") == found.through("c")[:0] == ""
+
+
+def test_counts_of_links_and_components() -> None:
+    """A link counts those that came to its start, unless what is behind it is not recorded."""
+    counts = PathCounts()
+    counts.add(path(State.INJECTED, State.REACHED, State.REACHED))
+    counts.add(path(State.INJECTED, State.HELD, State.HELD, stopped_at=("pedals",)))
+    counts.add(path(State.INJECTED, State.UNSEEN, State.REACHED))
+    plain = counts.plain()
+    assert plain["active"] == 3
+    assert plain["links"] == {"eyes-pedals": [1, 2], "pedals-car": [2, 3]}
+    assert plain["components"] == {"eyes": [3, 0, 0], "pedals": [0, 1, 1], "car": [0, 2, 0]}
