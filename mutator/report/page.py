@@ -22,7 +22,6 @@ SCRIPTS = (  # each uses those before it
     "grid.js",
     "columns.js",
     "details.js",
-    "series.js",
     "series_file.js",
     "replay_formula.js",
     "replay_data.js",

@@ -39,12 +39,13 @@ const ReplayData = (() => {
   }
 
   /** The axis of a channel, of what it is up to the end of the drive; `cut`: from where to where its values really
-   *  go, if that is too far to show. A headway time near standstill goes to any height, and nothing else would be seen. */
+   *  go, if that is too far to show; `isWhole`: they are all whole numbers. A headway time near standstill goes to any height, and nothing else would be seen. */
   function range(channel, end) {
     const values = [];
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) values.push(channel.golden[i], channel.faulty[i]);
     const sorted = values.filter(Number.isFinite).sort((a, b) => a - b);
-    if (!sorted.length) return { low: 0, high: 1, cut: null };
+    if (!sorted.length) return { low: 0, high: 1, cut: null, isWhole: true };
+    const isWhole = sorted.every(Number.isInteger);
     let low = sorted[0], high = sorted[sorted.length - 1], cut = null;
     const sizes = sorted.map(Math.abs).sort((a, b) => a - b), usual = Math.max(1, sizes[Math.floor(0.98 * (sizes.length - 1))]);
     if (Math.max(-low, high) > BEYOND * usual) {
@@ -53,7 +54,7 @@ const ReplayData = (() => {
     }
     // a narrower range would show rounding as something
     const margin = Math.max((high - low) * 0.06, 1e-6, Math.abs(high) * 1e-3);
-    return { low: low - margin, high: high + margin, cut };
+    return { low: low - margin, high: high + margin, cut, isWhole };
   }
 
   /** Round numbers to label an axis from `low` to `high` with, about `count` of them. */
@@ -65,7 +66,8 @@ const ReplayData = (() => {
   }
 
   /** How many digits behind the point a channel with this axis is written with. */
-  function digits({ low, high }) {
+  function digits({ low, high, isWhole }) {
+    if (isWhole) return 0;
     const size = Math.max(Math.abs(low), Math.abs(high), 1e-9);
     return Math.min(4, Math.max(0, (size < 1 ? 3 : 4) - Math.ceil(Math.log10(size))));
   }

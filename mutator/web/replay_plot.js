@@ -35,8 +35,8 @@ class ReplayPlot {
   }
 
   #note() {
-    const { cut } = this.axis;
-    return cut ? Dom.el("p.note", {}, `axis cut: values go from ${this.#text(cut[0])} to ${this.#text(cut[1])}`) : null;
+    const [low, high] = (this.axis.cut ?? []).map((value) => String(Number(value.toPrecision(4))).replace("-", "−"));
+    return low ? Dom.el("p.note", {}, `axis cut: values go from ${low} to ${high}`) : null;
   }
 
   /** Where a time is, in px of the canvas. */
@@ -63,16 +63,9 @@ class ReplayPlot {
     context.rect(LEFT, 0, width - LEFT - RIGHT, HEIGHT);
     context.clip();
     this.#happened(context, x, width, colours);
-    const [first, last] = this.#seen(view);
-    this.#between(context, x, y, first, last, colours.between);
-    this.#lines(context, x, y, first, last, colours);
+    this.#between(context, x, y, view, colours.between);
+    this.#lines(context, x, y, view, colours);
     context.restore();
-  }
-
-  /** The samples that are in a view, and one more at both ends. */
-  #seen({ from, to }) {
-    const { t } = this.channel;
-    return [Math.max(0, ReplayData.index(t, from)), Math.min(t.length - 1, ReplayData.index(t, to) + 1)];
   }
 
   #scale(context, y, width, colours) {
@@ -109,42 +102,46 @@ class ReplayPlot {
     context.fillRect(x(this.series.tEnd), 0, width, HEIGHT);
   }
 
-  /** What lies between both runs, never of a time before the activation. */
-  #between(context, x, y, first, last, colour) {
-    const { t, golden, faulty } = this.channel, begin = this.series.active?.[0] ?? -Infinity;
+  /** Until when a value holds: to the next one, at last to the end. */
+  #holds = (i) => this.channel.t[i + 1] ?? this.series.end;
+
+  /** What lies between both runs in the drive, never of a time before the activation. */
+  #between(context, x, y, view, colour) {
+    const { t, golden, faulty } = this.channel, begin = Math.max(view.from, this.series.active?.[0] ?? -Infinity), end = Math.min(view.to, this.end);
     context.fillStyle = colour;
     context.beginPath();
-    for (let i = first; i < last; i++) {
-      const values = [golden[i], golden[i + 1], faulty[i + 1], faulty[i]];
-      if (t[i] < begin - ReplayData.TINY || t[i + 1] > this.end + ReplayData.TINY || !values.every(Number.isFinite)) continue;
-      if (values[0] === values[3] && values[1] === values[2]) continue;
-      context.moveTo(x(t[i]), y(values[0]));
-      context.lineTo(x(t[i + 1]), y(values[1]));
-      context.lineTo(x(t[i + 1]), y(values[2]));
-      context.lineTo(x(t[i]), y(values[3]));
+    for (let i = ReplayData.index(t, begin); i < t.length && t[i] < end; i++) {
+      const from = Math.max(t[i], begin), to = Math.min(this.#holds(i), end);
+      if (golden[i] === faulty[i] || !Number.isFinite(golden[i]) || !Number.isFinite(faulty[i])) continue;
+      context.rect(x(from), y(golden[i]), x(to) - x(from), y(faulty[i]) - y(golden[i]));
     }
     context.fill();
   }
 
-  #lines(context, x, y, first, last, colours) {
-    const { channel } = this, end = Math.min(last, Math.max(first, ReplayData.index(channel.t, this.end)));
+  #lines(context, x, y, { from, to }, colours) {
     context.lineJoin = "round";
     for (const [run, width, alpha] of [["golden", 3.4, 0.6], ["faulty", 1.6, 1]]) {
-      context.lineWidth = width;
-      context.globalAlpha = alpha;
-      for (const [from, to, colour] of [[end, last, colours.late], [first, end, colours[run]]]) {
+      Object.assign(context, { lineWidth: width, globalAlpha: alpha });
+      for (const [begin, end, colour] of [[Math.max(from, this.end), to, colours.late], [from, Math.min(to, this.end), colours[run]]]) {
         context.strokeStyle = colour;
-        context.beginPath();
-        let isDown = false;
-        for (let i = from; i <= to; i++) {
-          const value = channel[run][i];
-          if (Number.isFinite(value)) context[isDown ? "lineTo" : "moveTo"](x(channel.t[i]), y(Math.max(-1e9, Math.min(1e9, value))));
-          isDown = Number.isFinite(value);
-        }
-        context.stroke();
+        this.#line(context, x, y, this.channel[run], begin, end);
       }
-      context.globalAlpha = 1;
     }
+    context.globalAlpha = 1;
+  }
+
+  /** A line from one time to another, each value held until the next one comes. */
+  #line(context, x, y, values, from, to) {
+    const { t } = this.channel;
+    let isDown = false;
+    context.beginPath();
+    for (let i = ReplayData.index(t, from); i < t.length && t[i] < to; i++) {
+      const isThere = Number.isFinite(values[i]), height = y(Math.max(-1e9, Math.min(1e9, values[i])));
+      if (isThere) context[isDown ? "lineTo" : "moveTo"](x(Math.max(t[i], from)), height);
+      if (isThere) context.lineTo(x(Math.min(this.#holds(i), to)), height);
+      isDown = isThere;
+    }
+    context.stroke();
   }
 
   /** A difference with its sign, in so many digits that it is none of 0. */

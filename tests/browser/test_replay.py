@@ -77,8 +77,8 @@ class Replayed:
     def __init__(self, page: Any) -> None:
         self.page = page
 
-    def show(self, facts: dict[str, Any]) -> None:
-        self.page.evaluate(SHOW, [SERIES, facts])
+    def show(self, facts: dict[str, Any], series: dict[str, Any] = SERIES) -> None:
+        self.page.evaluate(SHOW, [series, facts])
         self.page.wait_for_function(f"{T} >= 0")
 
     @property
@@ -99,6 +99,10 @@ class Replayed:
     def text(self, selector: str) -> str:
         self.settle()
         return str(self.page.inner_text(selector))
+
+    def texts(self, selector: str) -> list[str]:
+        """The texts of all elements that are selected."""
+        return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def pixels(self, selector: str) -> set[tuple[int, ...]]:
         """The opaque colours of a canvas."""
@@ -199,6 +203,32 @@ def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
     assert replayed.text(f"{head}.golden") in {f"{GAP['golden'][i]:.2f}" for i in (index - 1, index)}
     assert replayed.t == 3.0
     replayed.page.mouse.move(5, 5)
+
+
+@pytest.mark.parametrize(("high", "note"), [(30000, "axis cut: values go from 2 to 30000"), (150, None)])
+def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
+    replayed: Replayed, high: float, note: str | None
+) -> None:
+    """The axis is cut, which is said; it is not for values a hundred times the usual ones."""
+    values = {"golden": [2.0] * STEPS, "faulty": [3.0 if t > BEGIN else 2.0 for t in TIMES]}
+    values["faulty"][50] = high
+    channel = SERIES["channels"][0] | {"name": "hwt"} | values
+    replayed.show(FACTS | {"scene": None}, SERIES | {"channels": [channel]})
+    low, top = replayed.page.evaluate("[player.axes[0].low, player.axes[0].high]")
+    assert (top < 7) == (note is not None)
+    assert -10 < low < 2
+    assert replayed.texts(".plot-of .note") == ([note] if note else [])
+    label = replayed.page.get_attribute(".plot-of canvas", "aria-label")
+    assert f"largest difference {high - 2}" in label.replace(".0", "")
+
+
+def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
+    """However many come at one time, no button lies on another."""
+    marks = [["alert", 2.5 + i / 1000, f"alert_{i}"] for i in range(6)]
+    replayed.show(FACTS, SERIES | {"marks": marks})
+    script = "all => all.map((e) => { const { x, y } = e.getBoundingClientRect(); return `${x} ${y}`; })"
+    assert len(set(replayed.page.eval_on_selector_all(".jump", script))) == 6
+    replayed.show(FACTS)
 
 
 def test_plots_are_chosen_and_zoomed(replayed: Replayed) -> None:

@@ -177,36 +177,6 @@ def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: l
     assert "--trace" in page.page.inner_text("#experiment .replay .command")
 
 
-def plots(page: "Page", high: float, marks: list[list[object]]) -> list[str]:
-    """What is written in the plot of a channel around 2 that goes up to `high` for a moment."""
-    script = """([high, marks]) => {
-        const t = new Float64Array([0, 49.8, 49.9, 50]), golden = new Float32Array([2, 2, 2, 2]);
-        const channel = { name: "hwt", unit: "s", t, golden, faulty: new Float32Array([2, 3, high, 3]) };
-        const place = document.body.appendChild(document.createElement("div"));
-        Series.show(place, { start: 0, end: 50, active: null, marks, channels: [channel] });
-        return [...place.querySelectorAll("text")].map((text) => text.textContent);
-    }"""
-    return list(page.page.evaluate(script, [high, marks]))
-
-
-def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(page: "Page") -> None:
-    """The axis is cut, which is said; it is not for values a hundred times the usual ones."""
-    cut = plots(page, 30000, [])
-    assert "axis cut, values 2 to 30000; largest difference 29998" in cut
-    assert "20000" not in cut
-    assert "4" in cut
-    whole = plots(page, 150, [])
-    assert "largest difference 148" in whole
-    assert "100" in whole
-
-
-def test_labels_of_marks_are_never_one_on_another(page: "Page") -> None:
-    """Marks at one time have each its line, however many they are."""
-    plots(page, 3, [["alert", 10.0 + i / 100, f"alert_{i}"] for i in range(6)])
-    heights = "all => all.map((text) => text.getAttribute('y'))"
-    assert len(set(page.page.eval_on_selector_all(".mark.alert text", heights))) == 6
-
-
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
     """Its text is the counts, which no filter for results changes; pressed again it lets go."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
