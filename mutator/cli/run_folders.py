@@ -14,6 +14,7 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import AcceptVersions, Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
+from mutator.report.history import is_folder_of_runs, write_history
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
@@ -72,22 +73,31 @@ REPORT_EXAMPLES = """\b
 Examples:
   mutator report runs/first
   mutator report /data/night --root ~/openpilot-faults
+  mutator report runs                            the history of the runs in a folder
 """
 
 
 @with_place
 def report(
-    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="A run folder, or a folder of runs.", autocompletion=completion.runs
+        ),
+    ],
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Write the report of a run and print its path.
+    """Write the report of a run, or the history of a folder of runs, and print its path.
 
     An unfinished run gets a report of what it has so far. What was published stands beside the results if
     a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
     """
     terminal = Terminal(as_json)
+    if is_folder_of_runs(run):
+        _history(terminal, run)
+        return
     loaded = mutator.load_run(run, workspace=library_if_any(place))
     with terminal.wait("writing the report"):  # it may drive a few experiments again
         written = loaded.report(anew=True)
@@ -96,6 +106,17 @@ def report(
     show_counts(terminal, loaded)
     terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
     loaded.check_equivalence()
+
+
+def _history(terminal: Terminal, folder: Path) -> None:
+    written = write_history(folder)
+    paths = {"markdown": str(written.markdown), "page": str(written.page)}
+    if terminal.as_json:
+        terminal.emit({**paths, "runs": written.runs, "left_out": list(written.left_out)})
+    for why in written.left_out:
+        terminal.say(f"left out: {why}")
+    files = f"{short_path(written.markdown)} and {short_path(written.page)}"
+    terminal.say(f"history of {counted(written.runs, 'run')}: {files}")
 
 
 def library_if_any(place: Place) -> "Workspace | None":

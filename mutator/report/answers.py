@@ -11,6 +11,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from mutator._common.text import counted
+from mutator.execution.phases import duration
 from mutator.outcomes.ranking import worst
 from mutator.outcomes.rows import Row
 from mutator.report.studies import ReportedRun
@@ -277,10 +278,3 @@ def time_spent(frame: pd.DataFrame, timings: Mapping[str, Mapping[str, object]])
         says=says,
         listings=(Listing(heads=("fault type", "CPU time"), lines=lines),),
     )
-
-
-def duration(seconds: float) -> str:
-    """`45 s`, `12 min`, `3.4 h`."""
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

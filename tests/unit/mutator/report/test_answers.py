@@ -114,11 +114,11 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
     """The costliest fault type is first; an experiment that was not driven costs nothing."""
     answer = said["time"]
     assert answer.says == (
-        "2 min of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven; the others needed no run of "
-        "their own. Median 8.00 s, longest 64.00 s."
+        "2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven; the others needed no "
+        "run of their own. Median 8.00 s, longest 64.00 s."
     )
     [first, *_] = answer.listings[0].lines
-    assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "64 s (50 %)"))
+    assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "1 min 04 s (50 %)"))
 
 
 def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:

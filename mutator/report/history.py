@@ -1,0 +1,203 @@
+"""The history of a folder of runs: what each of them found, and what changed from one to the next.
+
+Written as HISTORY.md and history.html into that folder; nothing in the run folders is written.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from urllib.parse import quote
+
+from mutator._common.files import write_atomic
+from mutator._common.tables import Table
+from mutator._common.text import counted
+from mutator.errors import MutatorError
+from mutator.execution.phases import duration
+from mutator.model import Outcome
+from mutator.outcomes.reader import Results
+from mutator.outcomes.rows import Row
+from mutator.report.panel import FOLDER, rendered
+from mutator.store.run_folder import RunFolder
+from mutator.web import asset
+
+FILES = ("HISTORY.md", "history.html")
+_HEADS = ("run", "date", "commit", "experiments", "hazards", "by severity", "without a warning", "CPU time")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PastRun:
+    """One run of the folder. `date`: when its last record was written, as the file system has it; `commit` of
+    the target; `rows` by experiment."""
+
+    folder: RunFolder
+    date: datetime
+    commit: str
+    rows: Mapping[str, Row]
+    cpu_s: float
+
+    @property
+    def name(self) -> str:
+        return self.folder.path.name
+
+    @property
+    def hazards(self) -> list[Row]:
+        return [row for row in self.rows.values() if row.outcome is Outcome.HAZARD]
+
+    @property
+    def activated(self) -> int:
+        return sum(row.usable and row.t_activation is not None for row in self.rows.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """Where it was written, how many runs it has, and why folders with a run.json are not among them."""
+
+    markdown: Path
+    page: Path
+    runs: int
+    left_out: tuple[str, ...]
+
+
+def is_folder_of_runs(folder: Path) -> bool:
+    """Whether it is no run folder itself and some lie in it."""
+    return not RunFolder.exists(folder) and bool(_run_folders(folder))
+
+
+def _run_folders(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.glob("*") if RunFolder.exists(path))
+
+
+def write_history(folder: Path) -> History:
+    """Write the history of the runs in a folder; MutatorError where there is none with results."""
+    runs, left_out = [], []
+    for path in _run_folders(folder):
+        try:
+            runs.append(_past_run(path))
+        except MutatorError as err:
+            left_out.append(f"{path.name}: {err.got}")
+    if not runs:
+        raise MutatorError(
+            f"no run with results ({'; '.join(left_out)})" if left_out else "no run folder, and none in it",
+            where=folder,
+            expected="a run folder, or a folder of run folders",
+            remedy="check the path",
+        )
+    runs.sort(key=lambda run: (run.date, run.name))
+    text, page = (folder / name for name in FILES)
+    write_atomic(text, _markdown(runs, left_out).encode())
+    write_atomic(page, _page(folder, runs, left_out).encode())
+    return History(markdown=text, page=page, runs=len(runs), left_out=tuple(left_out))
+
+
+def _past_run(path: Path) -> PastRun:
+    folder = RunFolder.unverified(path)
+    rows = {row.experiment_id: row for row in Results.of_run(path).rows()}
+    files = [*(path / "records").glob("*.jsonl"), path / "results.csv"]
+    last = max(file.stat().st_mtime for file in files if file.exists())
+    git = folder.stretches[-1].git or {}
+    state = git.get("target")
+    commit = f"{state['commit'][:8]}{' with changes' if state['changed'] else ''}" if state else "-"
+    cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
+    date = datetime.fromtimestamp(last, UTC)
+    return PastRun(folder=folder, date=date, commit=commit, rows=rows, cpu_s=cpu_s)
+
+
+def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
+    """The runs by campaign and plan; those of the last run first."""
+    found: dict[str, list[PastRun]] = {}
+    for run in runs:
+        found.setdefault(f"{run.folder.head['campaign']}, plan {run.folder.head['plan'][:8]}", []).append(run)
+    return dict(sorted(found.items(), key=lambda item: item[1][-1].date, reverse=True))
+
+
+def _cells(run: PastRun) -> list[str]:
+    hazards = run.hazards
+    classes = Counter(row.severity or "no contact" for row in hazards)
+    order = sorted((name for name in classes if name != "no contact"), reverse=True)
+    told = ", ".join(f"{name} {classes[name]}" for name in (*order, "no contact") if classes[name])
+    silent = sum(row.reaction_time is None for row in hazards)
+    return [
+        f"{run.date:%Y-%m-%d %H:%M}",
+        run.commit,
+        f"{len(run.rows)} of {run.folder.planned}",
+        f"{len(hazards)} of {run.activated} activated",
+        told if run.folder.scale and hazards else "-",
+        f"{silent} of {len(hazards)}" if run.folder.has_alerts else "-",
+        duration(run.cpu_s),
+    ]
+
+
+def _changes(before: PastRun, after: PastRun) -> str:
+    """What became of the experiments that both have."""
+    shared = before.rows.keys() & after.rows.keys()
+    pairs = [(before.rows[name], after.rows[name]) for name in shared]
+    new = sum(b.outcome is Outcome.HAZARD is not a.outcome for a, b in pairs)
+    gone = sum(a.outcome is Outcome.HAZARD is not b.outcome for a, b in pairs)
+    other = sum(a.ending != b.ending for a, b in pairs) - new - gone
+    if not new + gone + other:
+        return f"all {counted(len(shared), 'shared experiment')} ended the same"
+    return f"{counted(new, 'new hazard')}, {gone} gone, {other} ended otherwise, of {len(shared):,} shared"
+
+
+def _steps(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
+    """Neighbours of one plan, the newest first."""
+    return zip(runs[-2::-1], runs[:0:-1], strict=True)
+
+
+def _command(before: PastRun, after: PastRun) -> str:
+    return f"mutator compare {before.folder.path} {after.folder.path}"
+
+
+def _markdown(runs: Sequence[PastRun], left_out: Sequence[str]) -> str:
+    parts = ["# Runs"]
+    for title, group in _plans(runs).items():
+        rows = [[run.name, *_cells(run)] for run in reversed(group)]
+        parts += [f"## {title}", Table(heads=_HEADS, rows=rows).as_markdown()]
+        parts += [f"{a.name} to {b.name}: {_changes(a, b)}. `{_command(a, b)}`" for a, b in _steps(group)]
+    if left_out:
+        parts += ["## Left out", *(f"* {why}" for why in left_out)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str:
+    from markupsafe import Markup
+
+    plans = [
+        (title, _linked(group), [(a, b, _changes(a, b), _comparison(folder, a, b)) for a, b in _steps(group)])
+        for title, group in _plans(runs).items()
+    ]
+    styles = [Markup(asset(name)) for name in ("base.css", "report.css")]
+    page = rendered(
+        asset("history.html"),
+        name=folder.resolve().name,
+        count=counted(len(runs), "run"),
+        plans=plans,
+        left_out=left_out,
+        styles=styles,
+        command=_command,
+    )
+    return str(page)
+
+
+def _linked(group: Sequence[PastRun]) -> Table:
+    """The runs, the newest first, each with a link to its report and a bar for its hazards."""
+    from markupsafe import Markup
+
+    link = Markup('<a href="{}">{}</a>').format
+    bar = Markup('<span class="meter" style="--share: {:.3f}"></span>{}').format
+    rows = []
+    for run in reversed(group):
+        report = run.folder.path / FOLDER / "index.html"
+        name = link(f"{quote(run.name)}/{FOLDER}/index.html", run.name) if report.exists() else run.name
+        cells = _cells(run)
+        cells[3] = bar(len(run.hazards) / run.activated if run.activated else 0.0, cells[3])
+        rows.append([name, *cells])
+    return Table(heads=_HEADS, rows=rows)
+
+
+def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
+    """The page of a comparison that was made, as seen from the folder; '' where there is none."""
+    page = Path(after.name) / FOLDER / f"compare-{before.name}" / "index.html"
+    return quote(page.as_posix()) if (folder / page).exists() else ""

@@ -1,0 +1,69 @@
+"""The history of a folder of runs."""
+
+import csv
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.report.history import is_folder_of_runs, write_history
+
+from .made_run import COLUMNS, NONE, OK, Page, make_run
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two runs of one plan, the second with another hazard than the first; one damaged folder."""
+    calm = OK | NONE | {"outcome": "masked"}
+    for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
+        (tmp_path / name).mkdir()
+        results = make_run(tmp_path / name) / "results.csv"
+        with results.open("w", newline="") as file:
+            table = csv.DictWriter(file, COLUMNS, restval="")
+            table.writeheader()
+            for i, line in enumerate(lines):
+                table.writerow({"experiment_id": f"{i}" * 16, "fault_id": "f"} | line)
+        os.utime(results, (3600 * hour, 3600 * hour))
+    (tmp_path / "broken").mkdir()
+    shutil.copy(tmp_path / "before" / "run.json", tmp_path / "broken")
+    return tmp_path
+
+
+def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
+    """A hazard that came and one that went are two changes; the command that compares them is there."""
+    written = write_history(folder)
+    text = written.markdown.read_text()
+    assert written.runs == 2
+    assert "before to after: 1 new hazard, 1 gone, 0 ended otherwise, of 3 shared." in text
+    assert f"`mutator compare {folder / 'before'} {folder / 'after'}`" in text
+    assert text.index("| after |") < text.index("| before |"), "the newest run is first"
+    assert "| 1970-01-01 02:00 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
+
+
+def test_a_folder_without_results_is_named(folder: Path) -> None:
+    """It is no reason to show nothing, and it is not passed over."""
+    written = write_history(folder)
+    [why] = written.left_out
+    assert why.startswith("broken: ")
+    assert why in written.markdown.read_text()
+    assert why in " ".join(Page(written.page.read_text()).texts)
+
+
+def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) -> None:
+    """Of a run with a report, and of neighbours that were compared; nothing else is a link."""
+    for page in ("after/report/index.html", "after/report/compare-before/index.html"):
+        (folder / page).parent.mkdir(parents=True, exist_ok=True)
+        (folder / page).write_text("")
+    written = write_history(folder)
+    links = Page(written.page.read_text()).links
+    assert sorted(links) == ["after/report/compare-before/index.html", "after/report/index.html", "data:,"]
+
+
+def test_no_run_is_an_error(folder: Path) -> None:
+    """A folder that holds none is named; a run folder is none of runs."""
+    assert is_folder_of_runs(folder)
+    assert not is_folder_of_runs(folder / "before")
+    with pytest.raises(MutatorError, match="no run folder, and none in it"):
+        write_history(folder / "before" / "plots")
