@@ -10,11 +10,11 @@ import typer
 
 import mutator
 from mutator._common.text import counted
+from mutator.api.histories import is_folder_of_runs, write_history
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import AcceptVersions, Json, OutRun, Place, with_place
 from mutator.errors import MutatorError
-from mutator.report.history import is_folder_of_runs, write_history
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
