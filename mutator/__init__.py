@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mutator.api.campaigns import IncompleteRun, plan, run
     from mutator.api.comparisons import RunComparison, compare
     from mutator.api.experiment_results import TraceFrames
+    from mutator.api.histories import write_history
     from mutator.api.libraries import (
         check_hazard_analysis,
         check_library,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from mutator.exports import Format
     from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
     from mutator.report.film import Shot
+    from mutator.report.history import History
     from mutator.store.progress import Progress
     from mutator.workspace import Workspace
 
@@ -48,6 +50,7 @@ _HOMES = {
     "mutator.api.campaigns": ("IncompleteRun", "plan", "run"),
     "mutator.api.comparisons": ("RunComparison", "compare"),
     "mutator.api.experiment_results": ("TraceFrames",),
+    "mutator.api.histories": ("write_history",),
     "mutator.api.libraries": (
         "check_hazard_analysis",
         "check_library",
@@ -69,6 +72,7 @@ _HOMES = {
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.report.film": ("Shot",),
+    "mutator.report.history": ("History",),
     "mutator.store.progress": ("Progress",),
     "mutator.workspace": ("Workspace",),
 }
@@ -83,6 +87,7 @@ __all__ = [
     "Fault",
     "Format",
     "Gate",
+    "History",
     "IncompleteRun",
     "MutantSet",
     "MutatorError",
@@ -123,6 +128,7 @@ __all__ = [
     "try_fault",
     "upgrade_manifest",
     "verify",
+    "write_history",
 ]
 
 

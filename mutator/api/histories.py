@@ -1,5 +1,15 @@
 """The history of a folder of runs."""
 
-from mutator.report.history import History, is_folder_of_runs, write_history
+from pathlib import Path
 
-__all__ = ["History", "is_folder_of_runs", "write_history"]
+from mutator.report import history
+from mutator.report.history import History
+
+
+def write_history(folder: str | Path) -> History:
+    """Write HISTORY.md and history.html into a folder of run folders: what each of them found, and what
+    changed from one run of a plan to the next. The run folders are only read.
+
+    MutatorError where the folder holds no run with results.
+    """
+    return history.write_history(Path(folder))

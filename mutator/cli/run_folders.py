@@ -10,7 +10,6 @@ import typer
 
 import mutator
 from mutator._common.text import counted
-from mutator.api.histories import is_folder_of_runs, write_history
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import AcceptVersions, Json, OutRun, Place, with_place
@@ -95,7 +94,7 @@ def report(
     a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
     """
     terminal = Terminal(as_json)
-    if is_folder_of_runs(run):
+    if not (run / "run.json").exists() and any(run.glob("*/run.json")):
         _history(terminal, run)
         return
     loaded = mutator.load_run(run, workspace=library_if_any(place))
@@ -109,7 +108,7 @@ def report(
 
 
 def _history(terminal: Terminal, folder: Path) -> None:
-    written = write_history(folder)
+    written = mutator.write_history(folder)
     paths = {"markdown": str(written.markdown), "page": str(written.page)}
     if terminal.as_json:
         terminal.emit({**paths, "runs": written.runs, "left_out": list(written.left_out)})

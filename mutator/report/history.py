@@ -60,11 +60,6 @@ class History:
     left_out: tuple[str, ...]
 
 
-def is_folder_of_runs(folder: Path) -> bool:
-    """Whether it is no run folder itself and some lie in it."""
-    return not RunFolder.exists(folder) and bool(_run_folders(folder))
-
-
 def _run_folders(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if RunFolder.exists(path))
 

@@ -225,6 +225,15 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
     assert "report/REPORT.md" in answer.out
 
 
+def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_path: Path) -> None:
+    """It is written into that folder, and names each run."""
+    shutil.copytree(run, tmp_path / "runs" / "first")
+    answer = cli("report", tmp_path / "runs", "--json")
+    assert answer.code == 0
+    assert answer.json["runs"] == 1
+    assert "| first |" in Path(answer.json["markdown"]).read_text()
+
+
 def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
     """It is written, with what failed on top, and the command ends with 1 and names the experiment."""
     run = Path(shutil.copytree(run, tmp_path / "run"))
