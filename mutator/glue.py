@@ -59,7 +59,8 @@ class Run:
     `step(self)`, which drives it on by `step_s` and ends with `self.record(...)`.
 
     `scenario` is a `Scenario`, `seed` an int. Nothing global is seeded; see `seed_globals`. A subclass may
-    use any name but `step_s`, `t`, `done`, `end`, `record`, `hazard`, `alert`, `write`, `open` and `main`.
+    use any name but `step_s`, `t`, `done`, `end`, `record`, `recorded`, `hazard`, `alert`, `write`, `open`
+    and `main`.
     """
 
     # all else that it holds has two underscores: such names are this class's own
@@ -124,6 +125,10 @@ class Run:
             )
         at = f"at {self.t:g} s: "
         self.__rows.append((self.t, *(_number(at + name, channels[name]) for name in self.__channels)))
+
+    def recorded(self) -> dict[str, float]:
+        """The channels of the step that was recorded last, and its time."""
+        return dict(zip((TIME, *self.__channels), self.__rows[-1], strict=True))
 
     def hazard(self, name: str, now: bool) -> None:
         """Judge a hazard of which the manifest only has the name: to be called in each step, before `record`.

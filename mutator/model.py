@@ -38,6 +38,13 @@ class Method(StrEnum):
     RANDOM = "random"
 
 
+class AfterHazard(StrEnum):
+    """What becomes of a run whose drive a terminal hazard has ended."""
+
+    GO_ON = "go_on"
+    STOP = "stop"
+
+
 class Status(StrEnum):
     """Whether the experiment itself worked; never mixed with its outcome."""
 
@@ -164,6 +171,7 @@ class Experiment:
     trigger: Trigger
     seed: int
     setting: tuple[str, ...] = ()
+    after_hazard: AfterHazard = added(AfterHazard.GO_ON)
 
     @cached_property
     def id(self) -> str:

@@ -20,7 +20,7 @@ from mutator.campaigns.trigger_choice import (
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.readings import FILE, Readings
-from mutator.model import Limits, Method
+from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
 _Told = TypeVar("_Told")
@@ -65,7 +65,7 @@ class Campaign:
     time is drawn; None: as the target's manifest says. Triggers are those of the context table `table`, or
     `listed`.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
-    random time to the end).
+    random time to the end). `after_hazard` says whether runs end at their first terminal hazard.
     """
 
     name: str
@@ -91,6 +91,7 @@ class Campaign:
     canary: Canary
     limits: Limits
     chunk: int
+    after_hazard: AfterHazard
     yaml: Source
 
     def armed_after(self, reading: str) -> float | None:
@@ -197,6 +198,11 @@ class CampaignModel(StrictModel, title="The file"):
     )
     seed: int = Field(ge=0, lt=2**63, description="The seed of all that is drawn; `--seed` overrides it.")
     canary: _CanaryModel = Field(description="The check that a known fault does harm.")
+    after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
+        AfterHazard.GO_ON,
+        description="`stop` ends each faulty run at its first [terminal hazard](../explanation/verdicts.md"
+        "#the-end-of-the-drive), which saves time; later hazards and alerts are then not seen.",
+    )
     limits: _LimitsModel = Field(_LimitsModel(), description="What one run may use.")
     chunk: int = Field(
         20,
@@ -261,6 +267,7 @@ def load_campaign(path: Path) -> Campaign:
         canary=Canary(**model.canary.model_dump()),
         limits=Limits(**{field.name: getattr(model.limits, field.name) for field in fields(Limits)}),
         chunk=model.chunk,
+        after_hazard=model.after_hazard,
         yaml=source,
     )
 

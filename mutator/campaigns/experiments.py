@@ -200,6 +200,7 @@ class Expansion:
             trigger=trigger,
             seed=self.seed,
             setting=self.campaign.setting_in(self.reading),
+            after_hazard=self.campaign.after_hazard,
         )
 
     def _scenario_digest(self, scenario: str) -> str:

@@ -25,7 +25,7 @@ from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
-from mutator.model import Experiment
+from mutator.model import AfterHazard, Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, metric_columns, plan_row
 from mutator.outcomes.propagation import channel_facts
 from mutator.store import digests, plan_file
@@ -34,6 +34,7 @@ from mutator.store.digests import Digest, Ledger
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.store.shards import Shard
+from mutator.targets.stopping import stop_source
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -171,6 +172,8 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
     if choices.reading is not None:
         readings.check(choices.reading)
     expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
+    if loaded.after_hazard is AfterHazard.STOP:
+        stop_source(expansion.manifest)  # refused here, not by each run
     once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
     experiments = tuple(experiment for same in once for experiment in same)
     warn_of_values(experiments, workspace.fault_models())

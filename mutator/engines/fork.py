@@ -35,6 +35,7 @@ from mutator.model import Limits, Status
 from mutator.mutants.building import build
 from mutator.mutants.probe import probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.stopping import stop_source
 from mutator.triggers.kinds import always
 
 _Key = tuple[str, int, tuple[str, ...]]
@@ -172,6 +173,7 @@ class ForkEngine:
             "probe": swap.probe,
             "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
             "probe_state": state_after(start.observed, start.began, start.t),
+            "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
@@ -204,6 +206,7 @@ class ForkEngine:
             wall_s=ended.wall_s,
             active=was_active(folder),
             log=tail(folder / "log"),
+            stopped=bool(report and report.get("stopped")),
             mode=RunMode.WARM if self._warm else RunMode.FORK,
         )
 
@@ -240,7 +243,7 @@ class ForkEngine:
         folder = self._work / f"{os.getpid()}-watch-{content_id(_key(job))}"
         try:
             swap = plan_swap(self._manifest, self._null, str(self._running().tree))
-            null = replace(job, mutant=None)
+            null = replace(job, mutant=None, stop=False)
             self._at(job, 0, swap)  # Refused, with the reason, if the run cannot begin
             # From before its beginning: what it observed then, no fork of it would have.
             first = self._running().first

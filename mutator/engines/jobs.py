@@ -38,7 +38,8 @@ class Job:
     hash_seed: int = 0
     golden: Path | None = None  # output folder of the run without the fault, where it is known
     observe: bool = False  # keep what the probe observes
-    watch: bool = False  # the same, and note calls that keep a target from being deterministic
+    stop: bool = False  # end it at its first terminal hazard
+    watch: bool = False  # the same as `observe`, and note calls that keep a target from being deterministic
 
     def problem_of(self, report: object) -> str:
         """What is wrong with what its probe reported; empty if nothing is, or if it has no probe."""
@@ -82,9 +83,9 @@ class Execution:
     exception that ended it, and `active` says whether an injection was active in it. `probe` is the probe's
     report if the tree has one; `log` the tail of what the run printed. `mode` says how it was carried out,
     and `why` another engine did it than the one that was asked; `start` is the step before which the golden
-    run did its work. `modules` are the top-level modules that the run imported from neither its
-    package nor the standard library, `watched` what a watched one noted, and what its probe observed
-    (`seen`), of the reference engine alone.
+    run did its work. `stopped` says that a terminal hazard ended it before its time. `modules` are the top-
+    level modules that the run imported from neither its package nor the standard library, `watched` what a
+    watched one noted, and what its probe observed (`seen`), of the reference engine alone.
     """
 
     status: Status
@@ -99,6 +100,7 @@ class Execution:
     mode: RunMode = RunMode.REFERENCE
     why: str = ""
     start: int = 0
+    stopped: bool = False
     modules: tuple[str, ...] = ()
     watched: Mapping[str, Any] = field(default_factory=dict)
 

@@ -35,6 +35,7 @@ from mutator.engines.processes import (
 from mutator.model import Limits, Status
 from mutator.mutants.probe import probe_module, state_after
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.stopping import stop_source
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
 _LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
@@ -104,6 +105,7 @@ class ReferenceEngine:
             raised=raised and _steady(raised, folder),
             active=was_active(folder),
             log=log,
+            stopped=bool(report and report.get("stopped")),
             modules=tuple(report["modules"]) if report else (),
             watched=report.get("watched", {}) if report else {},
         )
@@ -137,6 +139,8 @@ class ReferenceEngine:
             "memory_mb": self.limits.memory_mb,
             "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
+            "stop": stop_source(self.manifest) if job.stop else None,
+            "stepwise": self.manifest.stepwise,
             "watch": job.watch,
             "observe": self._observed() if job.watch or job.observe else None,
         }

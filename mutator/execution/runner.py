@@ -11,7 +11,7 @@ from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Activation, Experiment, Record, Status
+from mutator.model import Activation, AfterHazard, Experiment, Record, Status
 from mutator.mutants.building import InvalidMutant, Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
@@ -134,6 +134,7 @@ class Runner:
             mutant=built.id,
             injections=built.injections,
             golden=self.goldens.folder(experiment),
+            stop=experiment.after_hazard is AfterHazard.STOP,
         )
 
     def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
@@ -196,6 +197,11 @@ class Runner:
                 raise
             return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation), None
         time = self.manifest.time_channel
+        if execution.stopped:
+            if judged.t_end is None:
+                why = "was stopped, but no terminal hazard is in its trace"
+                return _bare(experiment, Status.HARNESS_ERROR, why, built), None
+            reference = golden.until(reference, faulty[time][-1], time)
         difference = golden.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built), None

@@ -97,6 +97,15 @@ def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
     return trace.get(own_times(channel), trace[time])
 
 
+def until(trace: Trace, end: float, time: str) -> Trace:
+    """A trace up to a time, s."""
+    cut = {}
+    for name, values in trace.items():
+        times = values if name.endswith(own_times("")) else times_of(trace, name, time)
+        cut[name] = values[times <= end]
+    return cut
+
+
 def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
     """A channel's value in each step: the newest one of a channel with times of its own, NaN before its
     first."""

@@ -12,6 +12,7 @@ from mutator._common.files import raising_disk_full, write_atomic
 from mutator._common.hashing import added_values, canonical, plain
 from mutator.errors import MutatorError
 from mutator.model import (
+    AfterHazard,
     Anchor,
     AnchorKind,
     Experiment,
@@ -153,6 +154,8 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
         "trigger": _make(Trigger, trigger, hold=Hold(trigger["hold"])),
         "setting": tuple(data["setting"]),
     }
+    if "after_hazard" in data:
+        read["after_hazard"] = AfterHazard(data["after_hazard"])
     experiment = _make(Experiment, values, **read)
     if experiment.id != data["id"]:
         raise MutatorError(

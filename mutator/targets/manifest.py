@@ -181,7 +181,7 @@ class TargetManifest:
                 expected="`film` in its manifest",
                 remedy="say there which commands take and show a film",
             )
-        return replace(self, entry_args=(*self.entry_args, *self.film.run_args), stepwise=None)
+        return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
 
 
 def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:

@@ -30,6 +30,7 @@ assert _spec and _spec.loader
 child: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(child)
 swap, guard, threads = child.beside("swap"), child.guard, child.beside("threads")
+stop = child.beside("stop")
 
 
 def main(connection: int, start_file: str) -> int:
@@ -219,8 +220,7 @@ class Process:
             run = self.begin(job["args"]) if self.run is None else self.run
             if seen is not None:
                 report |= {"seen": seen, "before": swap.observations_before_steps(run, seen)}
-            while not run.done:
-                run.step()
+            report["stopped"] = stop.drive(run, job["stop"])
             run.write(Path(job["out"]))
             if seen is not None:
                 report["libraries"] = child.libraries(known, self.start["packages"])

@@ -12,6 +12,7 @@ import hashlib
 import importlib
 import importlib.util
 import json
+import operator
 import os
 import resource
 import runpy
@@ -90,7 +91,10 @@ def run(job: dict[str, Any]) -> None:
             seen = beside("swap").keep_observations(probe, *job["observe"])
         if probe and watcher:
             watcher.look_for_threads(probe, seen)
-        run_module(job["module"], job["args"])
+        if job["stop"] is None:
+            run_module(job["module"], job["args"])
+        else:
+            report["stopped"] = run_until(job)
     except BaseException as err:
         report |= describe(err, job["tree"], job["probe"])
     if job["observe"]:
@@ -118,6 +122,16 @@ def run_module(module: str, args: list[str]) -> None:
     except SystemExit as end:
         if end.code not in (None, 0):
             raise
+
+
+def run_until(job: dict[str, Any]) -> bool:
+    """Drive the run step by step to its end or its first terminal hazard, and write it; was it stopped?"""
+    sys.argv = [job["module"], *job["args"]]
+    begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
+    stepped = begin(job["args"])
+    stopped: bool = beside("stop").drive(stepped, job["stop"])
+    stepped.write(Path(job["out"]))
+    return stopped
 
 
 def note_activation(probe: Any, inactive: str) -> None:

@@ -67,6 +67,10 @@ class Recorder:
             )
         )
 
+    def newest(self) -> dict[str, float]:
+        """Every channel's number in the last row."""
+        return dict(zip(CHANNELS, self._rows[-len(CHANNELS) :], strict=True))
+
     def trace(self) -> dict[str, np.ndarray]:
         """Every channel's array."""
         table = np.asarray(self._rows).reshape(-1, len(CHANNELS)).T.copy()  # of its own: rows may be added

@@ -52,6 +52,10 @@ class Run:
         """Make the next step."""
         self._simulator.step()
 
+    def recorded(self) -> dict[str, float]:
+        """The channels as the last step has them."""
+        return self._simulator.recorder.newest()
+
     def write(self, folder: Path) -> None:
         """Write trace and record of the steps made so far into `folder`."""
         write(self._simulator.result(), folder)

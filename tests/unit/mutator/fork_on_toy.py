@@ -41,16 +41,18 @@ class Fork:
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
         return self._engine
 
-    def job(self, trigger: Trigger, anchor: str = "gap", function: str = "Sensor.sense") -> Job:
-        _ = self.engine
+    def fault(self, anchor: str = "gap", function: str = "Sensor.sense") -> Fault:
         place = FaultLocation(
             path="toycar/sensing.py",
             function=function,
             anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name=anchor),
         )
         injection = Injection(location=place, model="offset", params=(("by", 20.0), ("target", anchor)))
-        fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
-        built = build(self.manifest, self.models, fault, trigger)
+        return Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+
+    def job(self, trigger: Trigger, anchor: str = "gap", function: str = "Sensor.sense") -> Job:
+        _ = self.engine
+        built = build(self.manifest, self.models, self.fault(anchor, function), trigger)
         scenario = self.toy.scenario("A")
         return Job(
             name="j",

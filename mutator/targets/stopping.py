@@ -1,0 +1,63 @@
+"""How a run is ended at its first terminal hazard: the manifest's conditions as code for its process."""
+
+import ast
+
+from mutator.config.yaml_files import Keys
+from mutator.errors import MutatorError
+from mutator.targets.judging import Hazard
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import TIME, names_in, parse, to_code
+
+_REMEDY = "leave `after_hazard` out of the campaign, so that runs go on"
+
+
+def stop_source(manifest: TargetManifest) -> str:
+    """Source of a function `over(recorded)`: whether a terminal hazard holds in a step, of which `recorded`
+    has the numbers by their names in the trace. `math` and `_div` must be there.
+
+    MutatorError at what cannot be told of one step alone: a hazard that must last or asks for the steps
+    before, one that the record or temporal logic tells, a channel that is not there in each step; and for a
+    target without a terminal hazard or `entry.stepwise`.
+    """
+    if manifest.stepwise is None:
+        raise _refused(manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps")
+    conditions = [_condition(manifest, hazard) for hazard in manifest.rules if hazard.terminal]
+    if not conditions:
+        raise _refused(manifest, ("hazards",), "no terminal hazard", "one with `terminal`")
+    channels = {channel.name: channel for channel in manifest.channels}
+    derived = [value for value in manifest.observation.derived if value.name not in channels]
+    needed = {name for text in conditions for name in names_in(text)}
+    for value in reversed(derived):
+        needed |= {*names_in(value.text)} if value.name in needed else set()
+    lines = [f"    {TIME} = float(recorded[{manifest.time_channel!r}])"]
+    for channel in manifest.channels:
+        if channel.name in needed and channel.time:
+            keys = ("channels", channel.name, "time")
+            raise _refused(manifest, keys, f"{channel.name} has times of its own", "a number in each step")
+        if channel.name in needed:
+            lines.append(f"    {channel.name} = float(recorded[{channel.in_trace!r}])")
+    lines += [f"    {v.name} = {to_code(v.text, number=True)}" for v in derived if v.name in needed]
+    holds = " or ".join(f"({to_code(text)})" for text in conditions)
+    return "\n".join(["def over(recorded):", *lines, f"    return {holds}", ""])
+
+
+def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
+    """The condition that ends the drive with a hazard."""
+    own = hazard.terminal != "True"
+    text = hazard.terminal if own else hazard.when
+    keys = ("hazards", hazard.name)
+    if not text:
+        judge = "temporal logic" if hazard.stl else "the target itself"
+        raise _refused(manifest, keys, f"{hazard.name}, which {judge} tells", "a condition, `when`")
+    if hazard.for_s and not own:
+        raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} must last", "a condition of one step")
+    calls = {ast.unparse(node.func) for node in ast.walk(parse(text)) if isinstance(node, ast.Call)}
+    if earlier := calls & {"ever", "rate"}:
+        got = f"{hazard.name} asks for `{min(earlier)}`"
+        raise _refused(manifest, keys, got, "a condition of one step alone")
+    return text
+
+
+def _refused(manifest: TargetManifest, keys: Keys, got: str, expected: str) -> MutatorError:
+    got = f"runs cannot stop at a terminal hazard: {got}"
+    return manifest.source.error(keys, got, expected=expected, remedy=_REMEDY)

@@ -1,0 +1,184 @@
+"""Runs that end at their first terminal hazard."""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mutator.campaigns.plans import make_plan
+from mutator.engines.fork import ForkEngine
+from mutator.engines.in_target.stop import compiled
+from mutator.engines.jobs import Engine
+from mutator.errors import MutatorError
+from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
+from mutator.mutants.building import build
+from mutator.outcomes.golden import until
+from mutator.targets.stopping import stop_source
+from mutator.triggers.kinds import always, at_time
+
+from ..fork_on_toy import Edit, Fork
+
+MANIFEST = "fault_library/targets/toycar.yaml"
+HAZARDS = """\
+hazards:
+  H1: {about: contact, when: "25 >= near and hypot(speed, 0) > 0", terminal: true}
+  H3: {when: gap < 22}
+  TOO_FAST: {when: speed > 100, terminal: speed > 90}
+metrics:
+  way: {integral: speed, unit: m, worse: lower, about: x}
+  least: {min: gap, unit: m, worse: lower, about: x}
+"""
+CHANNELS = "  d_rel: {unit: m, from: gap}\nobservation:"
+DERIVED = "  derived:\n    near: {is: d_rel / 1, unit: m, about: x}\n"
+RECORDED = """
+    def recorded(self):
+        names = ("time", "gap", "speed", "lead_speed", "offset", "gas", "brake", "wheel_turn")
+        return dict(zip(names, self.rows[-1], strict=True))
+
+    def write("""
+
+
+@pytest.fixture
+def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
+    """The toy with hazards as data, whose runs tell what they recorded last."""
+    edit(MANIFEST, "hazards: [H1, H3, TOO_FAST]\n", HAZARDS)
+    edit(MANIFEST, "observation:", CHANNELS)
+    edit(MANIFEST, "  derived:\n", DERIVED)
+    edit("tree/toycar/go.py", "\n    def write(", RECORDED)
+    yield fork
+
+
+def drive(fork: Fork, engine: Engine, after: AfterHazard) -> Record:
+    """The record of the toy's fault, which makes it come too near."""
+    manifest = fork.manifest
+    experiment = Experiment(
+        fault=fork.fault(),
+        scenario="A",
+        scenario_digest="",
+        method=Method.GUIDED,
+        trigger=at_time(2.0),
+        seed=7,
+        after_hazard=after,
+    )
+    goldens = Goldens(manifest, lambda scenario, changes: fork.golden)
+    runner = Runner(manifest, fork.models, engine, goldens, fork.toy.scenario)
+    finished: Finished
+    (finished,) = runner.run([experiment])
+    assert finished.mode is not None
+    return finished.record
+
+
+def test_stopped_runs_are_the_beginnings_of_those_that_go_on(stopping: Fork) -> None:
+    """Every engine stops at the same step, and what comes of it is what comes of the whole run by then."""
+    fork = stopping.engine
+    null = build(stopping.manifest, stopping.models, None, always()).files
+    work = stopping.folder / "warm"
+    work.mkdir()
+    warm = ForkEngine(stopping.manifest, fork.reference.base, work, stopping.limits, null=null, warm=True)
+    engines: tuple[Engine, ...] = (fork.reference, fork, warm)
+    stopped, *others = (drive(stopping, one, AfterHazard.STOP) for one in engines)
+    assert others == [stopped, stopped]
+    warm.close()
+    whole = drive(stopping, fork.reference, AfterHazard.GO_ON)
+    assert stopped.t_end is not None
+    assert stopped.experiment_id != whole.experiment_id
+    assert (stopped.outcome, stopped.t_end) == (Outcome.HAZARD, whole.t_end)
+    assert (stopped.metrics, stopped.t_manifest) == (whole.metrics, whole.t_manifest)
+    assert stopped.max_dev == stopped.dev == whole.dev
+    assert [name for name, _ in whole.hazards] == ["H1", "H3"]
+    assert stopped.hazards == tuple((name, t) for name, t in whole.hazards if t <= stopped.t_end)
+    assert stopped.trace_digest != whole.trace_digest
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("terminal: true", "terminal: true, for_s: 1", "H1 must last; expected a condition of one step"),
+        ("25 >= near", "ever(25 >= near)", "H1 asks for `ever`; expected a condition of one step alone"),
+        ("25 >= near", "rate(near) > 5", "H1 asks for `rate`"),
+        (
+            '{about: contact, when: "25 >= near and hypot(speed, 0) > 0", terminal: true}',
+            "{terminal: true}",
+            "H1, which the target itself tells; expected a condition, `when`",
+        ),
+        (
+            "speed: {unit: m/s, role: truth}",
+            "speed: {unit: m/s, role: truth, time: own}",
+            "speed has times of its own; expected a number in each step",
+        ),
+        ("  stepwise: begin\n", "", "no `stepwise`"),
+    ],
+)
+def test_what_cannot_be_told_of_one_step_is_refused(
+    stopping: Fork, edit: Edit, old: str, new: str, message: str
+) -> None:
+    """Whether a drive is over must follow from the numbers of a single step; an error names what does not."""
+    edit(MANIFEST, old, new)
+    with pytest.raises(MutatorError, match=re.escape(f"cannot stop at a terminal hazard: {message}")):
+        stop_source(stopping.toy.manifest("toycar"))
+
+
+def test_a_target_without_a_terminal_hazard_cannot_stop(stopping: Fork, edit: Edit) -> None:
+    """There is nothing to stop at."""
+    edit(MANIFEST, ", terminal: true", "")
+    edit(MANIFEST, ", terminal: speed > 90", "")
+    with pytest.raises(MutatorError, match="no terminal hazard"):
+        stop_source(stopping.toy.manifest("toycar"))
+
+
+@pytest.mark.parametrize(
+    ("gap", "speed", "over"),
+    [
+        (26.0, 9.0, False),
+        (25.0, 9.0, True),
+        (25.0, 0.0, False),
+        (50.0, 90.5, True),
+        (math.nan, 1.0, False),
+    ],
+)
+def test_when_a_drive_is_over(stopping: Fork, gap: float, speed: float, over: bool) -> None:
+    """Any terminal condition ends it, of channels as the trace calls them and of what follows from them."""
+    source = stop_source(stopping.toy.manifest("toycar"))
+    assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
+
+
+def test_a_run_that_does_not_tell_what_it_recorded_is_no_crash(stopping: Fork, edit: Edit) -> None:
+    """That is the glue's fault, before anything is active: no fault is blamed for it."""
+    edit("tree/toycar/go.py", "def recorded(", "def something_else(")
+    record = drive(stopping, stopping.engine.reference, AfterHazard.STOP)
+    assert record.status is Status.HARNESS_ERROR
+    assert "recorded" in record.detail
+
+
+def test_a_campaign_says_so(stopping: Fork, edit: Edit) -> None:
+    """`after_hazard: stop` reaches every experiment, and their ids; what cannot stop is not planned."""
+    edit("fault_library/campaigns/small.yaml", "chunk: 2", "chunk: 2\nafter_hazard: stop")
+    stopped = make_plan(stopping.toy, "small")
+    assert {e.after_hazard for e in (*stopped.experiments, stopped.canary)} == {AfterHazard.STOP}
+    edit("fault_library/campaigns/small.yaml", "after_hazard: stop", "after_hazard: go_on")
+    whole = make_plan(stopping.toy, "small")
+    assert [replace(e, after_hazard=AfterHazard.GO_ON).id for e in stopped.experiments] == [
+        e.id for e in whole.experiments
+    ]
+    assert {e.id for e in stopped.experiments}.isdisjoint(e.id for e in whole.experiments)
+    assert whole.digest != stopped.digest
+    edit("fault_library/campaigns/small.yaml", "after_hazard: go_on", "after_hazard: stop")
+    edit(MANIFEST, "25 >= near", "ever(25 >= near)")
+    with pytest.raises(MutatorError, match="cannot stop"):
+        make_plan(stopping.toy, "small")
+
+
+def test_a_trace_up_to_a_time() -> None:
+    """Every channel ends there, by its own times where it has some."""
+    trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
+    cut = until(trace, 2.0, "t")
+    assert {name: values.tolist() for name, values in cut.items()} == {
+        "t": [0.0, 1.0, 2.0],
+        "a": [0.0, 1.0, 2.0],
+        "b": [7.0],
+        "b@": [0.5],
+    }
