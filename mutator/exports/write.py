@@ -60,21 +60,6 @@ def _content(folder: RunFolder, format: Format, workspace: Workspace | None, par
     table = Results.up_to_date(folder.path)
     if parts.table is Table.RESULTS:
         return table.csv() if format is Format.CSV else table.parquet()
-    return _table(folder.path / f"{parts.table.value}.parquet", format)
-
-
-def _table(path: Path, format: Format) -> bytes:
-    """A table that a run folder has as Parquet alone."""
-    if not path.is_file():
-        raise MutatorError(
-            f"no {path.name}",
-            where=path.parent,
-            argument="table",
-            expected="a run of a target whose table that is",
-            remedy="export another table",
-        )
     if format is Format.PARQUET:
-        return path.read_bytes()
-    import pandas as pd
-
-    return pd.read_parquet(path).to_csv(index=False, lineterminator="\n").encode()
+        return table.propagation_parquet()
+    return table.propagation().to_csv(index=False, lineterminator="\n").encode()

@@ -181,7 +181,7 @@ def compare(
     values that come at other times where the first of them does. `t_end` is the end of the drive, if it has
     one before that of the run."""
     end = np.inf if t_end is None else t_end + _TINY
-    first = _end_of_shorter(golden[time], faulty[time])
+    first = end_of_shorter(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
     driven: list[tuple[str, float]] = []
     for channel in channels:
@@ -223,10 +223,10 @@ def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
     unlike = np.flatnonzero(golden[:rows] != faulty[:rows])
     if unlike.size:
         return float(min(golden[unlike[0]], faulty[unlike[0]]))
-    return _end_of_shorter(golden, faulty)
+    return end_of_shorter(golden, faulty)
 
 
-def _end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
+def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
     """The first time that one run has and the other, which has ended, has not; infinite where both are as
     long."""
     rows = min(len(golden), len(faulty))

@@ -7,7 +7,7 @@ import numpy as np
 
 from mutator.model import Record
 from mutator.outcomes.columns import Column
-from mutator.outcomes.golden import Trace, deviation
+from mutator.outcomes.golden import Trace, deviation, end_of_shorter
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
@@ -29,16 +29,18 @@ def departures(
 ) -> tuple[Departure, ...]:
     """Each of `channels` that left golden beyond its tolerance before the end of the drive, in their order.
 
-    A channel that one of the runs did not record is left out. One whose run ended at another time than golden
-    left it there, with the largest deviation of the time that both have.
+    A channel that one of the runs did not record is left out. If the run ended at another time than golden,
+    all channels left it there, with the largest deviation of the time that both have.
     """
     end = np.inf if t_end is None else t_end + _TINY
+    ended = end_of_shorter(golden[time], faulty[time])
     found = []
     for channel in channels:
         if channel.name in golden and channel.name in faulty:
             one = deviation(golden, faulty, channel, time)
-            if one.t_first <= end and one.t_first < np.inf:
-                found.append((channel.name, one.t_first, one.largest(end)))
+            first = min(one.t_first, ended)
+            if first <= end and first < np.inf:
+                found.append((channel.name, first, one.largest(end)))
     return tuple(found)
 
 

@@ -141,6 +141,10 @@ class Results:
         """A frame of propagation.parquet: a row for each channel of an experiment that left golden."""
         import pandas as pd
 
+        return pd.read_parquet(io.BytesIO(self.propagation_parquet()))
+
+    def propagation_parquet(self) -> bytes:
+        """The bytes of propagation.parquet; MutatorError for a run that recorded none."""
         path = self.path.with_name(results.PROPAGATION)
         if not path.exists():
             raise MutatorError(
@@ -149,7 +153,7 @@ class Results:
                 expected=f"{results.PROPAGATION}, as runs of this version have it",
                 remedy="run the campaign again, into another folder",
             )
-        return pd.read_parquet(io.BytesIO(self._read(path)))
+        return self._read(path)
 
     def _check_header(self, columns: "Sequence[str] | pd.Index[str]") -> None:
         known = set(columns)

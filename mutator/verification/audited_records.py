@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
 
 _DIGEST = 64  # hex digits
+_TINY = 1e-9  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,8 @@ def verdicts(
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
     for one in records:
         flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
-        for got, expected in (*flaws, *_flaws_of_names(one.record, head, tolerances)):
+        flaws_of_names = _flaws_of_names(one.record, head, tolerances)
+        for got, expected in (*flaws, *flaws_of_names, *_flaws_of_path(one.record, head)):
             yield one.difference(got, expected)
 
 
@@ -158,6 +161,24 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
         yield f"differences {record.dev} up to the drive's end", f"none larger than {record.max_dev}"
     if beyond and record.t_manifest is None:
         yield f"{beyond[0]} differs, and was not manifested", "the time of the first difference"
+
+
+def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
+    """What left golden are channels of the target, not after the drive; the first actuator of them says when
+    the fault manifested."""
+    if "channels" not in head:
+        return
+    end = inf if record.t_end is None else record.t_end + _TINY
+    known = [name for name, *_ in head["channels"]]
+    for name, first, _ in record.left:
+        if name not in known:
+            yield f"channel {name} left golden", f"one of {', '.join(known)}"
+        elif first > end:
+            yield f"{name} left golden at {first} s", f"a time before the drive ended, {record.t_end} s"
+    times = [first for name, first, _ in record.left if name in head["compared"]]
+    manifested = record.t_manifest if record.t_manifest is not None and record.t_manifest <= end else None
+    if record.status is Status.OK and min(times, default=None) != manifested:
+        yield f"actuators left golden at {times or 'no time'}", f"first at {manifested}, when it manifested"
 
 
 def _in_order(events: Events, activation: Activation | None) -> bool:

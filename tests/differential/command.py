@@ -12,7 +12,7 @@ from pathlib import Path
 from mutator.workspace import Workspace
 
 LINGER_S = 5.0  # what is left of a command has so long to end after it
-DERIVED = ("results.csv", "results.parquet")
+DERIVED = ("results.csv", "results.parquet", "propagation.parquet")
 Bytes = dict[str, bytes]
 
 

@@ -16,7 +16,7 @@ from mutator.store.records import read_records
 from mutator.verification.equivalence import Proof
 from mutator.workspace import Workspace
 
-TABLES = ("results.csv", "results.parquet")
+TABLES = ("results.csv", "results.parquet", "propagation.parquet")
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from mutator.workspace import Workspace
 
 Runs = dict[str, Path]
 Reseal = Callable[..., None]
-DERIVED = ("results.csv", "results.parquet", "plan.csv", "plan/experiments.jsonl")
+DERIVED = ("results.csv", "results.parquet", "propagation.parquet", "plan.csv", "plan/experiments.jsonl")
 
 
 @pytest.fixture(scope="module")

@@ -89,10 +89,12 @@ def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
         "golden",
         "patches",
         "records",
+        "series",
         "timings",
         "results.csv",
         "results.json",
         "results.parquet",
+        "propagation.parquet",
         "timings.parquet",
         "owner.lock",
     }

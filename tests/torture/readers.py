@@ -20,7 +20,12 @@ from .damages import contents
 AUDITED = re.compile(
     r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/"
 )
-TABLES = ("results.csv", "results.parquet", "timings.parquet")  # verified if they are there
+TABLES = (
+    "results.csv",
+    "results.parquet",
+    "propagation.parquet",
+    "timings.parquet",
+)  # verified if they are there
 HOW = re.compile(r"^## How the experiments were run$.*?^(?=## )", re.MULTILINE | re.DOTALL)  # of a report
 
 

@@ -65,6 +65,8 @@ def test_a_run_that_ends_earlier_has_left_there() -> None:
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
     assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
     assert departures(golden, faulty, [channel("a")], "t", float(T[3])) == ()
+    rare = {"a": np.array([1.0]), "a@": np.array([0.1])}
+    assert departures(golden | rare, faulty | rare, [channel("a")], "t", None) == (("a", T[4], 0.0),)
 
 
 @pytest.mark.parametrize("seed", range(20))

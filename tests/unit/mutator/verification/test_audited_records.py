@@ -25,6 +25,28 @@ def flaws(record: Record) -> list[str]:
 
 
 @pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"left": (("gas", 2.5, 1.0),), "t_manifest": 2.5, "outcome": Outcome.SDC}, ""),
+        ({"left": (("seen", 2.5, 1.0),)}, ""),
+        ({"left": (), "t_manifest": 2.5, "t_end": 2.4, "outcome": Outcome.SDC}, ""),
+        ({"left": (("spare", 2.5, 1.0),)}, "channel spare left golden; expected one of gas, brake, seen"),
+        ({"left": (("seen", 2.5, 1.0),), "t_end": 2.4}, "seen left golden at 2.5 s; expected a time before"),
+        ({"left": (), "t_manifest": 2.5, "outcome": Outcome.SDC}, "actuators left golden at no time"),
+        ({"left": (("gas", 2.5, 1.0),)}, "actuators left golden at [2.5]; expected first at None"),
+    ],
+)
+def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str) -> None:
+    """Channels are the target's, times within the drive, the first actuator is when it manifested; of runs
+    that recorded no channels none of it is asked."""
+    head = HEAD | {"channels": [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]}
+    one = Recorded(Path("r.jsonl"), 7, record(**FINE | fields))
+    found = [str(flaw) for flaw in verdicts(head, [one], MANIFEST)]
+    assert (len(found) == 1 and told in found[0]) if told else not found
+    assert flaws(one.record) == []
+
+
+@pytest.mark.parametrize(
     "fields",
     [
         {},
