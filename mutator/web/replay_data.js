@@ -80,7 +80,7 @@ const ReplayData = (() => {
     return (Number(made) === 0 ? made.replace("-", "") : made).replace("-", "−");
   }
 
-  const unit = (channel) => (channel.unit && channel.unit !== "-" ? channel.unit : "");
+  const unit = (channel) => (channel.unit && channel.unit !== "-" ? channel.unit.replace("^2", "²").replace("^3", "³") : "");
 
   return { TINY, index, held, same, steps, until, largest, range, ticks, digits, text, unit };
 })();

@@ -69,7 +69,7 @@ class ReplayScene {
 
   #line(line) {
     const { context, view, colours } = this, { points, y, dashed } = line;
-    context.strokeStyle = colours.paint;
+    context.strokeStyle = this.road.length ? colours.paint : colours.quiet;
     context.lineWidth = 1.6;
     context.setLineDash(dashed ? ReplayScene.DASH.map((m) => m * view.scale) : []);
     context.lineDashOffset = view.x * view.scale;
@@ -188,7 +188,7 @@ class ReplayScene {
 
   /** A star where the drive ended. */
   #burst({ x, y }) {
-    const { context, colours } = this, size = Math.max(14, this.view.scale * 1.6);
+    const { context, colours } = this, size = Math.min(28, Math.max(14, this.view.scale * 1.6));
     context.beginPath();
     for (let k = 0; k < 20; k++) {
       const far = k % 2 ? size * 0.45 : size, angle = (k * Math.PI) / 10 + 0.1;

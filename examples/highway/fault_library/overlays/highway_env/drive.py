@@ -28,7 +28,9 @@ class Drive(Run):
         closing = car.speed - met.speed if met else 0.0
         self.road.act()
         seen = {"gap": gap, "speed": car.speed, "closing": closing, "crashed": car.crashed}
-        self.record(**seen, on_road=car.on_road, **car.action)
+        seen |= {"place": car.position[0], "across": -car.position[1], "heading": -car.heading}
+        ahead_across = -ahead.position[1] if ahead else 0.0
+        self.record(**seen, ahead_across=ahead_across, on_road=car.on_road, **car.action)
         self.road.step(self.step_s)
 
 
