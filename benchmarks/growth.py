@@ -26,6 +26,7 @@ from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.digests import Digest
 from mutator.store.lines import LineWriter
+from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.verification.seal import seal_of
@@ -115,14 +116,14 @@ def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
     experiments = tuple(next(more) for _ in range(size))
     folder = freeze(replace(plan, experiments=experiments, chunks=(size,)), out, workspace)
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    patches = PatchWriter(out, "0001-main")
     for number, experiment in enumerate(experiments):
         if patch:
-            file = folder.patch(experiment.id)
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(patch)
+            patches.append(experiment.id, patch)
         named = digest(patch) if patch else ""
         lines.append(asdict(replace(record(experiment, number), patch=named)))
     lines.close()
+    patches.close()
     return folder
 
 

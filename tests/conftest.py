@@ -4,7 +4,7 @@ import dataclasses
 import json
 import shutil
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from mutator.model import (
 from mutator.store import digests
 from mutator.store.digests import Digest
 from mutator.store.lines import LineWriter, read_segment
+from mutator.store.patches import Patches, PatchWriter, rewrite
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import Stretch
@@ -186,6 +187,19 @@ def record() -> Callable[..., Record]:
 
 
 @pytest.fixture(scope="session")
+def put_patches() -> Callable[[Path, Mapping[str, bytes | None]], None]:
+    """Gives experiments of a run folder other patches, or none."""
+
+    def put(run: Path, given: Mapping[str, bytes | None]) -> None:
+        found = Patches(run)
+        [path] = found.files()
+        patches = {name: found.read(name) for name in found} | given
+        rewrite(path, [(name, data) for name, data in patches.items() if data is not None])
+
+    return put
+
+
+@pytest.fixture(scope="session")
 def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
     """Makes a run folder whose records are made up: nothing is driven."""
 
@@ -221,10 +235,10 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         write_run(workspace, out, lambda experiment: {"patch": digests.digest(patch)}, **given)
         folder = RunFolder.unverified(out)
         lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").objects(SCHEMA)]
+        patches = PatchWriter(out, "0001-a")
         for line in lines:
-            place = folder.patch(line["experiment_id"])
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(patch)
+            patches.append(line["experiment_id"], patch)
+        patches.close()
         for kind, schema, some in (("proof", SCHEMA, lines[:3]), ("timings", TIMINGS_SCHEMA, lines)):
             writer = LineWriter(out / kind / "0001-a.jsonl", {"schema": schema, "plan": folder.head["plan"]})
             for line in some:

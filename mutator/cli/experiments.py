@@ -31,6 +31,7 @@ Examples:
   mutator show 3f9a --run runs/first --no-plot
   mutator show                               the ten worst
   mutator show --only 'severity >= "S2"' --limit 30
+  mutator show 3f9a --patch | (cd target && patch -p1)
   mutator show 3f9a --video 3f9a.mp4         drives both runs again, with a film
   mutator show 3f9a --still 14.5             a picture of it, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
@@ -66,6 +67,10 @@ def show(
         typer.Option(metavar="EXPR", help="List only those for whose results this holds: 'delta_v > 5'."),
     ] = None,
     limit: Annotated[int, typer.Option(min=1, help="List so many.")] = 10,
+    patch_alone: Annotated[
+        bool,
+        typer.Option("--patch", help="Print its whole patch, probe included, and nothing else."),
+    ] = False,
     as_json: Json = False,
     *,
     place: Place,
@@ -83,6 +88,9 @@ def show(
         return
     found = experiment_view.find_experiment(place.workspace(), run, experiment)
     patch = found.patch
+    if patch_alone:
+        terminal.diff(patch)
+        return
     drawn = _plot(terminal, found) if plot and found.record else None
     filmed = _film(terminal, found, video, still or [])
     stretch = found.stretch

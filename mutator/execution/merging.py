@@ -17,15 +17,21 @@ from mutator.campaigns.provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status
 from mutator.outcomes import results
+from mutator.outcomes.ranking import worth
+from mutator.outcomes.reader import Results
 from mutator.review.gate import FILE as REVIEWED
 from mutator.store import cleaning, digests
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import read_segment, written
+from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
+from mutator.store.run_head import SCHEMA as HEAD_SCHEMA
+from mutator.store.series import FOLDER as SERIES
+from mutator.store.series_packing import pack
 from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
@@ -70,7 +76,9 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             with raising_disk_full(out):
                 (out / f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
-            return results.build(out)
+            built = results.build(out)
+            _pack_series(folders, out)
+            return built
         except BaseException:
             cleaning.clear(out)
             raise
@@ -204,7 +212,11 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
     for folder in folders:
         _copy_patches(folder, out)
         _copy_segments(folder, out)
-    whole = {"choices": first.head["choices"] | {"shard": None}, "stretches": stretches}
+    whole = {
+        "schema": HEAD_SCHEMA,
+        "choices": first.head["choices"] | {"shard": None},
+        "stretches": stretches,
+    }
     head = json_bytes(first.head | whole)
     digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
     digests.close_segments(out, finished=True)
@@ -213,12 +225,19 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
 
 def _copy_patches(folder: RunFolder, out: Path) -> None:
     """The patches that the records name."""
-    merged = RunFolder(out)
+    assert folder.shard is not None
+    writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
     for record in folder.records().values():
         if (data := folder.read_patch(record.experiment_id, record)) is not None:
-            place = merged.patch(record.experiment_id)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(data)
+            writer.append(record.experiment_id, data)
+    writer.close()
+
+
+def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
+    """The series of all shards, under the budget of one run."""
+    merged, shards = RunFolder(out), tuple(folder.path for folder in folders)
+    if any((shard / SERIES).is_dir() for shard in shards):
+        pack(out, merged.head["plan"], worth(Results.of_run(out).rows()), merged.series_mb, others=shards)
 
 
 def _copy_segments(folder: RunFolder, out: Path) -> None:

@@ -29,7 +29,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWa
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record, Status
 from mutator.outcomes import results
-from mutator.outcomes.ranking import badness
+from mutator.outcomes.ranking import worth
 from mutator.outcomes.reader import Results
 from mutator.store import digests
 from mutator.store.progress import Progress, label
@@ -207,8 +207,7 @@ class Session:
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
             rows = Results.of_run(folder.path).rows()
-            worth = {row.experiment_id: badness(row) for row in rows if row.status is Status.OK}
-            pack(folder.path, folder.head["plan"], worth, folder.series_mb)
+            pack(folder.path, folder.head["plan"], worth(rows), folder.series_mb)
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Status
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
+from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import SeriesWriter
@@ -50,6 +51,7 @@ class Worker:
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
+        self._patches = PatchWriter(self.folder.path, assignment.name)
         self._series = SeriesWriter(self.folder.path, assignment.name) if self.folder.series_mb else None
         self._runner = self._make_runner(
             self._engine(assignment.engine), with_series=self._series is not None
@@ -103,7 +105,7 @@ class Worker:
     def close(self) -> None:
         """End the engine; sync and close this worker's files."""
         self._runner.engine.close()
-        for writer in (self._records, self._timings, self._proofs, self._series):
+        for writer in (self._patches, self._records, self._timings, self._proofs, self._series):
             if writer is not None:
                 writer.close()
 
@@ -135,7 +137,7 @@ class Worker:
     def _keep(self, finished: Finished) -> None:
         """Patch first, record last: what has a record has everything."""
         if finished.mutant is not None:
-            self._write_patch(finished.experiment, finished.mutant.patch_bytes)
+            self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
         if self._series is not None and finished.series is not None:
             self._series.append(finished.experiment.id, finished.series)
         self._timings.append(
@@ -150,14 +152,6 @@ class Worker:
             }
         )
         self._records.append(asdict(finished.record))
-
-    def _write_patch(self, experiment: Experiment, data: bytes) -> None:
-        path = self.folder.patch(experiment.id)
-        with raising_disk_full(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if path.is_symlink():  # nothing is written to its end
-                path.unlink()
-            path.write_bytes(data)
 
     def _file(self, kind: str) -> Path:
         return self.folder.path / kind / f"{self._name}.jsonl"

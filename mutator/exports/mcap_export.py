@@ -137,7 +137,7 @@ class Content:
             own = points.channel == row
             runs = ((golden, points.golden), (faulty, points.faulty))
             for told, (run, more) in zip(topics, runs, strict=True):
-                pairs = [*_pairs(run.t, run.values[row]), *_pairs(points.t[own], more[own])]
+                pairs = [*_pairs(run.times(row), run.rows[row]), *_pairs(points.t[own], more[own])]
                 told.append(Topic(name=about["name"], about=_described(about), values=sorted(pairs)))
         return topics
 

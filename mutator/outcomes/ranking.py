@@ -32,3 +32,8 @@ def badness(row: Row) -> tuple[float | str, ...]:
 def worst(rows: Iterable[Row]) -> list[Row]:
     """The rows, the worst first; the order in which they come does not matter."""
     return sorted(rows, key=badness)
+
+
+def worth(rows: Iterable[Row]) -> dict[str, tuple[float | str, ...]]:
+    """What the experiments that ended well are sorted by where there is no room for the series of all."""
+    return {row.experiment_id: badness(row) for row in rows if row.status is Status.OK}

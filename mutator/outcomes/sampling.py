@@ -1,6 +1,7 @@
-"""A run's channels as its series: at most 20 values a second, in single precision, beside those of golden.
+"""A run's channels as its series, in single precision: at most 20 values a second, 10 of what the controller
+believes.
 
-A value is the newest one at its time, so what lasts for less than 50 ms may fall between two. Therefore each
+A value is the newest one at its time, so what lasts for less than 50 ms may fall between two. So each
 channel that differs keeps more points: the first step that differs, those of the largest difference in the
 drive and in the whole run, and the last step of a run that ended early.
 """
@@ -15,10 +16,11 @@ from mutator.model import Record
 from mutator.outcomes.golden import Trace, on_steps
 from mutator.store.series import SeriesFolder, write_kept
 from mutator.store.series_format import Points, Series, encode
-from mutator.targets.channels import Channel
+from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
 RATE = 20.0  # samples a second, at most
+_EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # which of them a channel has
 _TINY = 1e-9  # s; times are sums of steps
 
 
@@ -30,10 +32,12 @@ class Sampler:
         self._clock = manifest.time_channel
         self._time = np.asarray(golden[self._clock], dtype=float)
         self._values = self._on(golden, self._time)
+        self._every = [_EVERY[channel.role] for channel in self._channels]
         self._at = _thinned(self._time)
         self.golden = Series(
             t=self._time[self._at],
-            values=_single(self._values[:, self._at]),
+            rows=self._rows(self._values[:, self._at]),
+            every=self._every,
             about={
                 "start": float(self._time[0]),
                 "end": float(self._time[-1]),
@@ -57,10 +61,22 @@ class Sampler:
         end = int(np.searchsorted(time, min(last, self._time[-1]), side="right")) - 1
         return Series(
             t=time[at],
-            values=_single(values[:, at]),
+            rows=self._rows(values[:, at]),
+            every=self._every,
             about=_happened(record) | {"end": float(max(self._time[-1], last))},
-            points=_points(time, golden, values, at, end, record.t_end),
+            points=_points(time, golden, values, self._sampled(len(time), at), end, record.t_end),
         )
+
+    def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
+        """Whether a channel (row) has a sample in a step (column)."""
+        sampled = np.zeros((len(self._every), count), dtype=bool)
+        for row, every in zip(sampled, self._every, strict=True):
+            row[at[::every]] = True
+        return sampled
+
+    def _rows(self, values: np.ndarray) -> list[np.ndarray]:
+        single = _single(values)
+        return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times of the steps of both runs, and the values of each there: NaN after its end."""
@@ -115,20 +131,23 @@ def _single(values: np.ndarray) -> np.ndarray:
 
 
 def _points(
-    time: np.ndarray, golden: np.ndarray, faulty: np.ndarray, at: np.ndarray, end: int, t_end: float | None
+    time: np.ndarray,
+    golden: np.ndarray,
+    faulty: np.ndarray,
+    sampled: np.ndarray,
+    end: int,
+    t_end: float | None,
 ) -> Points:
-    """The steps between the sampled ones, `at`, that each channel keeps; `end` is the last that both runs
+    """The steps between the `sampled` ones that each channel keeps; `end` is the last that both runs
     have."""
     golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
     drive = end + 1 if t_end is None else int(np.searchsorted(time, t_end + _TINY, side="right"))
-    sampled = np.zeros(len(time), dtype=bool)
-    sampled[at] = True
     found: list[tuple[int, int]] = []
     unlike = (golden != faulty) & ~(np.isnan(golden) & np.isnan(faulty))
     for row in np.flatnonzero(unlike.any(axis=1)).tolist():
         gap = _gap(golden[row], faulty[row])
         steps = {int(np.argmax(unlike[row])), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
-        found += [(row, step) for step in sorted(steps) if unlike[row, step] and not sampled[step]]
+        found += [(row, step) for step in sorted(steps) if unlike[row, step] and not sampled[row, step]]
     rows, places = np.array(found, dtype=int).reshape(-1, 2).T
     one, other = _single(golden[rows, places]), _single(faulty[rows, places])
     shown = one.view("<u4") != other.view("<u4")

@@ -9,11 +9,13 @@ from contextlib import suppress
 from pathlib import Path
 
 from mutator._common.files import is_half_written
+from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import Segment, read_segment
+from mutator.store.patches import Patches
 from mutator.store.records import SCHEMA, second_record
 from mutator.store.run_head import CAMPAIGN, HEAD, Head
 from mutator.store.shards import Shard
@@ -145,6 +147,7 @@ def id_problems(
     run: Path, head: Head, ledger: Ledger | None, planned: Collection[str]
 ) -> Iterator[MutatorError]:
     """Records of experiments that are not planned here, two of one experiment, and missing ones."""
+    patches = Patches(run) if ledger is not None else None
     for kind in digests.SEGMENTS:
         done: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
@@ -154,8 +157,7 @@ def id_problems(
                 yield err
                 continue
             yield from _head_problem(segment, head["plan"])
-            with_patches = kind == "records" and ledger is not None
-            yield from _id_problems(segment, planned, done, patches=with_patches)
+            yield from _id_problems(segment, planned, done, patches if kind == "records" else None)
         missing = [name for name in planned if name not in done]
         if ledger is not None and ledger.finished and kind == "records" and missing:
             more = f" and {len(missing) - _MANY} more" if len(missing) > _MANY else ""
@@ -184,10 +186,10 @@ def _head_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
 
 
 def _id_problems(
-    segment: Segment, planned: Collection[str], done: dict[str, int], *, patches: bool
+    segment: Segment, planned: Collection[str], done: dict[str, int], patches: Patches | None
 ) -> Iterator[MutatorError]:
-    """Those of one segment, with those of the `patches` that its records name; `done` is what the segments
-    before it had, and is added to."""
+    """Those of one segment, with those of the `patches` that its records name, if any. `done` is what
+    the segments before it had, and is added to."""
     for number in segment.lines:
         if number == 1:
             continue
@@ -206,27 +208,26 @@ def _id_problems(
                 remedy=_remedy(segment.path.parent.parent, ""),
             )
         elif status != Status.HARNESS_ERROR.value:
-            if patches:
-                yield from patch_problems(segment.path.parent.parent, name, str(data.get("patch", "")))
+            if patches is not None:
+                yield from patch_problems(patches, name, str(data.get("patch", "")))
             content = hash(segment.body(number))
             if name in done:
                 yield second_record(segment.path, number, name, same=done[name] == content)
             done[name] = content
 
 
-def patch_file(run: Path, experiment_id: str) -> Path:
-    """The source diff of an experiment (exists once it was run)."""
-    return run / "patches" / experiment_id[:2] / f"{experiment_id}.patch"
-
-
-def patch_problems(run: Path, experiment_id: str, known: str) -> Iterator[MutatorError]:
+def patch_problems(patches: Patches, experiment_id: str, known: str) -> Iterator[MutatorError]:
     """A stored patch that is missing, or not the one whose digest the record has; empty for no mutant."""
-    path = patch_file(run, experiment_id)
-    found = Digest.of_file(path)
-    if known and (found is None or found.sha256 != known):
+    if not known:
+        return
+    data = patches.read(experiment_id)
+    found = "" if data is None else digest(data)
+    if found != known:
         yield MutatorError(
-            f"another patch than was run: SHA-256 {found.sha256[:16]}" if found else "missing",
-            where=path,
+            f"another patch of {experiment_id} than was run: SHA-256 {found[:16]}"
+            if found
+            else f"no patch of {experiment_id}",
+            where=patches.file(experiment_id),
             expected=f"SHA-256 {known[:16]}, as the record says",
-            remedy=_remedy(run, ""),
+            remedy=_remedy(patches.run, ""),
         )

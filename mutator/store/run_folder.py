@@ -9,7 +9,7 @@ DIR/
   reviewed.json         who approved what is run, and digests of it (`run --require-reviewed`)
   checks.json           the checks before the campaign, keyed by digest
   golden/<scenario>[+change]/                    fault-free runs: trace and record of the target
-  patches/<xx>/<experiment>.patch                source diff of each experiment that ran
+  patches/<session>-<worker>.blocks              source diff of each experiment that ran, appended
   records/<session>-<worker>.jsonl               one line per finished experiment, appended
   timings/<session>-<worker>.jsonl               CPU and wall time, host: what may differ between runs
   proof/<session>-<worker>.jsonl                 records of the sample run again on the reference engine
@@ -37,8 +37,9 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
 from mutator.store.lines import read_segment
+from mutator.store.patches import Patches
 from mutator.store.records import TIMINGS_SCHEMA, read_records
-from mutator.store.run_head import HEAD, SCHEMA, Head, read_head
+from mutator.store.run_head import FIRST_SCHEMA, HEAD, Head, read_head
 from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
@@ -48,7 +49,14 @@ _LOOKS = 3  # at a folder whose owner writes while it is looked at
 SCRATCH = "work"
 CONTENT = (  # all that may be in a run folder; * stands for any text, folders included
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
-    *("golden/*/*", "patches/*.patch", "records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
+    *(
+        "golden/*/*",
+        "patches/*.blocks",
+        "patches/*.patch",
+        "records/*.jsonl",
+        "timings/*.jsonl",
+        "proof/*.jsonl",
+    ),
     *("series/*.js", "series/*.blocks"),
     *("traces/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
@@ -125,7 +133,7 @@ class RunFolder:
     @property
     def verifiable(self) -> bool:
         """Whether it has digests and checksums: folders of earlier schemas have none."""
-        return bool(self.head["schema"] == SCHEMA)
+        return bool(self.head["schema"] != FIRST_SCHEMA)
 
     @property
     def finished(self) -> bool:
@@ -199,22 +207,22 @@ class RunFolder:
         """Folder with trace and record of the fault-free run."""
         return self.path / "golden" / golden_key(scenario, changes)
 
-    def patch(self, experiment_id: str) -> Path:
-        """The source diff of an experiment (exists once it was run)."""
-        return integrity.patch_file(self.path, experiment_id)
+    @cached_property
+    def patches(self) -> Patches:
+        """The source diffs of the experiments that were run."""
+        return Patches(self.path)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
         """The stored diff of an experiment with that record; None where it has not run, or had no mutant.
 
         MutatorError when it is missing, or not the one that the record names.
         """
-        path = self.patch(experiment_id)
         if self.verifiable:
             if record is None or not record.patch:
                 return None
-            for problem in integrity.patch_problems(self.path, experiment_id, record.patch):
+            for problem in integrity.patch_problems(self.patches, experiment_id, record.patch):
                 raise problem
-        return path.read_bytes() if path.is_file() else None
+        return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> dict[str, Record]:
         """The records of the experiments, or those of the `proof`, by experiment id."""

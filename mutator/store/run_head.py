@@ -11,7 +11,7 @@ from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.model import Limits
 
-SCHEMA = "run/2"
+SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first had neither digests nor checksums
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: take the file from a copy of it"
 _TEXTS = {str: str}

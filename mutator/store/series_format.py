@@ -1,15 +1,15 @@
 """The bytes of a run's series, `series/1`: channels on common times, in single precision, compressed.
 
 Of a run with a fault only the channels are kept that differ from its golden run, as how far they are from
-it: so many numbers of single precision lie between two values, and by how much that changes from one time to
-the next is what is stored, byte by byte in planes, compressed. docs/reference/formats.md has the layout.
+it: so many numbers of single precision lie between two values, and how that goes on from one time to the next
+is what is stored, byte by byte in planes, compressed. docs/reference/formats.md has the layout.
 """
 
 import gzip
 import json
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,33 +36,43 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Series:
-    """A run on common times `t` (s): `values` has a row for each channel, in single precision (NaN: none).
+    """A run on common times `t` (s): `rows` has the values of each channel, in single precision (NaN: none),
+    at each time, or at each second, third, ... of them, as `every` says.
 
     `about` is plain data that goes with it. `points` are those of a run with a fault between these times.
     """
 
     t: np.ndarray
-    values: np.ndarray
+    rows: Sequence[np.ndarray]
+    every: Sequence[int]
     about: Mapping[str, Any]
     points: Points = field(default_factory=Points)
+
+    def times(self, channel: int) -> np.ndarray:
+        """The times (s) of a channel's values."""
+        return self.t[:: self.every[channel]]
 
 
 def encode(one: Series, golden: Series | None = None) -> bytes:
     """The bytes of a run with a fault, whose times are the first ones of `golden`, and then its own; those of
     a golden run without `golden`. The same bytes each time."""
     known = 0 if golden is None else int(np.isin(golden.t, one.t).sum())
-    apart = _ordered(one.values.astype("<f4", copy=False)) - _ordered(_reference(golden, known, one))
-    changed = np.arange(len(apart)) if golden is None else np.flatnonzero(apart.any(axis=1))
+    apart = [
+        _ordered(row) - _ordered(reference)
+        for row, reference in zip(one.rows, _references(golden, known, map(len, one.rows)), strict=True)
+    ]
+    changed = [channel for channel, row in enumerate(apart) if golden is None or row.any()]
     points = one.points
     head = {
         **one.about,
         "known": known,
         "more": len(one.t) - known,
-        "changed": changed.tolist(),
+        "changed": changed,
         "points": points.channel.tolist(),
+        **({"every": list(one.every)} if golden is None else {}),
     }
-    flat = (_changes(apart[changed]).ravel(), points.golden.view("<u4"), points.faulty.view("<u4"))
-    planes = np.concatenate(flat).astype("<u4", copy=False).view(np.uint8).reshape(-1, 4).T
+    words = [*(_words(apart[channel]) for channel in changed), points.golden, points.faulty]
+    planes = np.concatenate([row.view("<u4") for row in words]).view(np.uint8).reshape(-1, 4).T
     text = canonical(head).encode()
     times = (one.t[known:].astype("<f8").tobytes(), points.t.astype("<f8").tobytes())
     raw = b"".join((_LENGTH.pack(len(text)), text, *times, planes.tobytes()))
@@ -82,29 +92,32 @@ def _decode(raw: bytes, golden: Series | None) -> Series:
     at = _LENGTH.size + length
     about = json.loads(raw[_LENGTH.size : at])
     known, more, changed, channels = (about.pop(key) for key in ("known", "more", "changed", "points"))
+    every = about.pop("every") if golden is None else golden.every
     times = np.frombuffer(raw, "<f8", more + len(channels), at)
-    at += times.nbytes
-    words = np.frombuffer(raw, np.uint8, -1, at).reshape(4, -1).T.copy().view("<u4").ravel()
-    own = times[:more]
-    t = own.copy() if golden is None else np.concatenate((golden.t[:known], own))
-    count, rows = len(t), len(changed) if golden is None else len(golden.values)
-    if len(words) != len(changed) * count + 2 * len(channels):
+    words = np.frombuffer(raw, np.uint8, -1, at + times.nbytes).reshape(4, -1).T.copy().view("<u4").ravel()
+    t = times[:more].copy() if golden is None else np.concatenate((golden.t[:known], times[:more]))
+    lengths = [len(t[::step]) for step in every]
+    if len(words) != sum(lengths[channel] for channel in changed) + 2 * len(channels):
         raise ValueError("another number of values")
-    apart = np.zeros((rows, count), dtype="<i4")
-    apart[changed] = _sums(words[: len(changed) * count].reshape(len(changed), count))
-    blank = Series(t=t, values=apart, about={})
-    values = _unordered(apart + _ordered(_reference(golden, known, blank)))
-    rest = words[len(changed) * count :].view("<f4").reshape(2, -1)
+    rows = list(_references(golden, known, lengths))
+    begin = 0
+    for channel in changed:
+        apart = _numbers(words[begin : begin + lengths[channel]])
+        rows[channel] = _unordered(apart + _ordered(rows[channel]))
+        begin += lengths[channel]
+    rest = words[begin:].view("<f4").reshape(2, -1)
     points = Points(channel=np.array(channels, dtype=int), t=times[more:], golden=rest[0], faulty=rest[1])
-    return Series(t=t, values=values, about=about, points=points)
+    return Series(t=t, rows=rows, every=every, about=about, points=points)
 
 
-def _reference(golden: Series | None, known: int, one: Series) -> np.ndarray:
-    """The values that those of `one` are compared with."""
-    values = np.full(one.values.shape, np.nan, dtype="<f4")
-    if golden is not None:
-        values[:, :known] = golden.values[:, :known]
-    return values
+def _references(golden: Series | None, known: int, lengths: Iterable[int]) -> Iterator[np.ndarray]:
+    """Of each channel the values that others are compared with: none after the end of golden."""
+    for channel, length in enumerate(lengths):
+        row = np.full(length, np.nan, dtype="<f4")
+        if golden is not None:
+            there = len(range(0, known, golden.every[channel]))
+            row[:there] = golden.rows[channel][:there]
+        yield row
 
 
 def _ordered(values: np.ndarray) -> np.ndarray:
@@ -119,14 +132,15 @@ def _unordered(numbers: np.ndarray) -> np.ndarray:
     return words.view("<f4")
 
 
-def _changes(numbers: np.ndarray) -> np.ndarray:
-    """How much each number of a row is more than the one before it (modulo 2^32), as words that are small for
-    small numbers of either sign."""
-    steps = np.diff(numbers, axis=1, prepend=np.int32(0))
+def _words(numbers: np.ndarray) -> np.ndarray:
+    """How the change from each number to the next changes (modulo 2^32), as words that are small for small
+    changes of either sign."""
+    steps = np.diff(numbers, n=2, prepend=np.zeros(2, dtype="<i4"))
     return ((steps << 1) ^ (steps >> 31)).view("<u4")
 
 
-def _sums(words: np.ndarray) -> np.ndarray:
-    """The numbers of which `_changes` made words."""
+def _numbers(words: np.ndarray) -> np.ndarray:
+    """The numbers of which `_words` made words."""
     steps = (words >> 1).view("<i4") ^ -(words & 1).view("<i4")
-    return np.cumsum(steps, axis=1, dtype="<i4")
+    numbers: np.ndarray = steps.cumsum(dtype="<i4").cumsum(dtype="<i4")
+    return numbers

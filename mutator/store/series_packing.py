@@ -78,7 +78,7 @@ class _Found:
 
 def segments(run: Path) -> list[Path]:
     """The files that workers appended to and that are not packed yet."""
-    return sorted((run / FOLDER).glob(f"*{SUFFIX}"))
+    return [path for path in sorted((run / FOLDER).glob(f"*{SUFFIX}")) if path.is_file()]
 
 
 def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:

@@ -76,15 +76,18 @@ def mutants(
             yield one.difference(f"tree {one.record.tree[:16] or 'none'}", tree[:16] or "none")
         if folder.verifiable and one.record.patch != patch:
             yield one.difference(f"patch {one.record.patch[:16] or 'none'}", patch[:16] or "none")
-        stored = folder.patch(one.record.experiment_id)
-        found = digest(stored.read_bytes()) if stored.is_file() else ""
+        stored = folder.patches.read(one.record.experiment_id)
+        found = "" if stored is None else digest(stored)
         if found != patch:
-            got = f"a patch with SHA-256 {found[:16]}" if found else "missing"
-            yield MutatorError(got, where=stored, expected=f"that of the mutant, {patch[:16] or 'none'}")
+            name = one.record.experiment_id
+            got = f"a patch of {name} with SHA-256 {found[:16]}" if found else f"no patch of {name}"
+            where = folder.patches.file(one.record.experiment_id)
+            yield MutatorError(got, where=where, expected=f"that of the mutant, {patch[:16] or 'none'}")
     known = {one.record.experiment_id for one in records}
-    for stored in sorted((folder.path / "patches").rglob("*.patch")):
-        if folder.verifiable and folder.finished and stored.stem not in known:
-            yield MutatorError("a patch of no experiment", where=stored, expected="one of each that ran")
+    for name in folder.patches if folder.verifiable and folder.finished else ():
+        if name not in known:
+            got, where = f"a patch of {name}, no experiment of this run", folder.patches.file(name)
+            yield MutatorError(got, where=where, expected="one of each that ran")
 
 
 def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:

@@ -17,8 +17,10 @@ from mutator.campaigns.plans import CSV, load_plan, plan_csv
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.store import digests, integrity
+from mutator.store.blocks import read_blocks
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import Segment, read_segment, written
+from mutator.store.patches import rewrite
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.verification.audited_records import recorded
@@ -45,10 +47,9 @@ def repair(folder: RunFolder) -> list[str]:
         ledger = digests.settled(folder.path)
         lost = _lost_patches(folder)
         changes = [*_files(folder, ledger), *_segments(folder, ledger, lost)]
-        for name in [name for name, *_ in changes] + [_patch(folder, one) for one in lost]:
+        for name, *_ in changes:
             _put_aside(folder.path, name)
-        for one in lost:  # or it would be written to, and with it what a link leads to
-            folder.patch(one).unlink(missing_ok=True)
+        _drop_patches(folder, lost)
         if changes or renewed:
             _carry_out(folder.path, changes, ledger)
     return [*renewed, *(said for *_, said in changes), *(f"patch of {one} put aside" for one in lost)]
@@ -95,8 +96,24 @@ def _lost_patches(folder: RunFolder) -> list[str]:
     return lost
 
 
-def _patch(folder: RunFolder, experiment_id: str) -> str:
-    return folder.patch(experiment_id).relative_to(folder.path).as_posix()
+def _drop_patches(folder: RunFolder, lost: Collection[str]) -> None:
+    """Put aside the files of these patches; the other patches in them stay."""
+    run, patches = folder.path, folder.patches
+    for one in lost:
+        old = patches.old_file(one)
+        _put_aside(run, old.relative_to(run).as_posix())
+        old.unlink(missing_ok=True)
+    for path in patches.files() if lost else ():
+        if not path.is_file():
+            _put_aside(run, path.relative_to(run).as_posix())
+            continue
+        found = read_blocks(path)
+        names = dict.fromkeys(block.key for block in found.blocks)
+        if not found.damaged and not names.keys() & set(lost):
+            continue
+        _put_aside(run, path.relative_to(run).as_posix())
+        kept = ((name, patches.read(name)) for name in names if name not in lost)
+        rewrite(path, [(name, data) for name, data in kept if data is not None])
 
 
 def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:

@@ -78,38 +78,50 @@ const SeriesFile = (() => {
 
   const ordered = (word) => word ^ ((word >> 31) & SIGN);
 
-  /** A run, as store/series_format.py writes it: { about, t, rows, points }; `rows` are of the channels of golden. */
+  /** A run, as store/series_format.py writes it: { about, t, every, rows, points }; `rows` are of the channels of
+   *  golden, each with a value at so many times as `every` says. */
   async function decoded(bytes, golden) {
     const raw = await inflated(bytes), view = new DataView(raw);
     const text = 4 + view.getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, text - 4)));
     const { known, more, changed, points } = about, own = new Float64Array(raw.slice(text, text + 8 * (more + points.length)));
-    const planes = new Uint8Array(raw, text + own.byteLength), count = planes.length / 4, length = known + more;
-    if (count !== changed.length * length + 2 * points.length) throw new Error("another number of values");
-    const words = new Int32Array(count);
-    for (let i = 0; i < count; i++) words[i] = planes[i] | (planes[count + i] << 8) | (planes[2 * count + i] << 16) | (planes[3 * count + i] << 24);
-    const t = new Float64Array(length);
+    const t = new Float64Array(known + more), every = golden ? golden.every : about.every;
     if (golden) t.set(golden.t.subarray(0, known));
     t.set(own.subarray(0, more), known);
-    const rows = (golden ? golden.rows : changed).map((row) => {
-      const values = new Float32Array(new Int32Array(length).fill(NONE).buffer);
-      if (golden) values.set(row.subarray(0, known));
+    const words = unplaned(new Uint8Array(raw, text + own.byteLength));
+    const rows = every.map((step, channel) => {
+      const values = new Float32Array(new Int32Array(Math.ceil(t.length / step)).fill(NONE).buffer);
+      if (golden) values.set(golden.rows[channel].subarray(0, Math.ceil(known / step)));
       return values;
     });
-    changed.forEach((channel, k) => {
-      const numbers = new Int32Array(rows[channel].buffer);
-      for (let i = 0, apart = 0; i < length; i++) {
-        const word = words[k * length + i];
-        apart = (apart + ((word >>> 1) ^ -(word & 1))) | 0;
-        numbers[i] = ordered((ordered(numbers[i]) + apart) | 0);
-      }
-    });
-    const exact = new Float32Array(words.buffer, 4 * changed.length * length);
-    return { about, t, rows, points: points.map((channel, i) => ({ channel, t: own[more + i], golden: exact[i], faulty: exact[points.length + i] })) };
+    let at = 0;
+    for (const channel of changed) {
+      change(new Int32Array(rows[channel].buffer), words.subarray(at));
+      at += rows[channel].length;
+    }
+    if (words.length !== at + 2 * points.length) throw new Error("another number of values");
+    const exact = new Float32Array(words.buffer, 4 * at);
+    return { about, t, every, rows, points: points.map((channel, i) => ({ channel, t: own[more + i], golden: exact[i], faulty: exact[points.length + i] })) };
   }
 
-  /** Golden and faulty on the same times, with the points between them. */
+  /** Words whose first bytes come first, then all second ones, and so on. */
+  function unplaned(planes) {
+    const count = planes.length / 4, words = new Int32Array(count);
+    for (let i = 0; i < count; i++) words[i] = planes[i] | (planes[count + i] << 8) | (planes[2 * count + i] << 16) | (planes[3 * count + i] << 24);
+    return words;
+  }
+
+  /** Golden's values, as bits, become those of the faulty run. */
+  function change(bits, words) {
+    for (let i = 0, step = 0, apart = 0; i < bits.length; i++) {
+      step = (step + ((words[i] >>> 1) ^ -(words[i] & 1))) | 0;
+      apart = (apart + step) | 0;
+      bits[i] = ordered((ordered(bits[i]) + apart) | 0);
+    }
+  }
+
+  /** Golden and faulty of a channel on the same times, with the points between them. */
   function together(golden, run, channel) {
-    const t = run.t.length > golden.t.length ? run.t : golden.t;
+    const longer = run.t.length > golden.t.length ? run : golden, t = longer.t.filter((_, i) => i % golden.every[channel] === 0);
     const between = run.points.filter((p) => p.channel === channel), length = t.length + between.length;
     const made = { t: new Float64Array(length), golden: new Float32Array(length), faulty: new Float32Array(length) };
     const put = (k, time, one, other) => {
@@ -117,10 +129,11 @@ const SeriesFile = (() => {
       made.golden[k] = one;
       made.faulty[k] = other;
     };
+    const one = golden.rows[channel], other = run.rows[channel];
     let k = 0, next = 0;
     for (let i = 0; i < t.length; i++) {
       for (; next < between.length && between[next].t < t[i]; next++) put(k++, between[next].t, between[next].golden, between[next].faulty);
-      put(k++, t[i], i < golden.t.length ? golden.rows[channel][i] : NaN, i < run.t.length ? run.rows[channel][i] : NaN);
+      put(k++, t[i], i < one.length ? one[i] : NaN, i < other.length ? other[i] : NaN);
     }
     for (; next < between.length; next++) put(k++, between[next].t, between[next].golden, between[next].faulty);
     return made;

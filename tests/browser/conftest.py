@@ -22,6 +22,7 @@ from mutator.outcomes.sampling import Sampler, keep_series
 from mutator.report import building
 from mutator.report.panels import figures
 from mutator.store.lines import LineWriter
+from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
@@ -85,13 +86,13 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     out = freeze(plan, folder / "run", workspace)
     manifest, models = workspace.manifest("toycar"), workspace.fault_models()
     lines = LineWriter(out.path / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    patches = PatchWriter(out.path, "0001-main")
     for number, experiment in enumerate(plan.experiments):
         data = build(manifest, models, experiment.fault, experiment.trigger).patch_bytes
         lines.append(asdict(record(experiment, number, data)))
-        place = out.patch(experiment.id)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes(data)
+        patches.append(experiment.id, data)
     lines.close()
+    patches.close()
     results.build(out.path)
     t = np.arange(0.0, 6.0, 0.05)
     names = ("gas", "brake", "wheel_turn", "gap", "speed")

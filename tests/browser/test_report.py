@@ -12,6 +12,7 @@ import pytest
 
 from mutator.report import building
 from mutator.report.panels import figures
+from mutator.store.patches import Patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder
 
@@ -76,7 +77,7 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
-    patch = (run / "patches" / name[:2] / f"{name}.patch").read_text()
+    patch = (Patches(run).read(name) or b"").decode()
     tagged = [line[1:] for line in patch.splitlines() if line.startswith("+") and "# fi:" in line]
     injected = [line for line in tagged if "fi:probe" not in line and "fi:observe" not in line]
     for mode in ("Side by side", "Unified"):
@@ -167,8 +168,9 @@ def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: l
             "gap",
             "speed",
         ]
-        for channel, one, other in zip(found["channels"], golden.values, faulty.values, strict=True):
-            assert channel["t"] == golden.t.tolist()
+        for number, channel in enumerate(found["channels"]):
+            one, other = golden.rows[number], faulty.rows[number]
+            assert channel["t"] == golden.times(number).tolist()
             assert channel["golden"] == one.view("<u4").tolist()
             assert channel["faulty"] == other.view("<u4").tolist()
         assert found["marks"][-1] == ["hazard", pytest.approx(4.7), "H3"]

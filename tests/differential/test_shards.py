@@ -15,6 +15,7 @@ from mutator.execution.merging import merge
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.review import gate
+from mutator.store.patches import Patches
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.verification.seal import seal_of
@@ -51,12 +52,21 @@ def change_head(run: Path, **values: object) -> None:
 
 
 def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """Results, plan and patches are those of the single run, byte for byte, in whatever order shards come."""
+    """Results, plan, patches and series are those of the single run, byte for byte, in whatever order shards
+    come."""
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     for name in DERIVED:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
-    patches = {p.name: p.read_bytes() for p in (tmp_path / "out" / "patches").rglob("*.patch")}
-    assert patches == {p.name: p.read_bytes() for p in (runs["whole"] / "patches").rglob("*.patch")}
+    merged, whole = (
+        {name: found.read(name) for name in found}
+        for found in map(Patches, (tmp_path / "out", runs["whole"]))
+    )
+    assert merged == whole and None not in merged.values()
+    series = [
+        {path.name: path.read_bytes() for path in (run / "series").iterdir()}
+        for run in (tmp_path / "out", runs["whole"])
+    ]
+    assert series[0] == series[1] and len(series[0]) == 3
     heads = [json.loads((run / "run.json").read_text()) for run in (tmp_path / "out", runs["whole"])]
     stretches = [head.pop("stretches") for head in heads]
     assert heads[0] == heads[1]

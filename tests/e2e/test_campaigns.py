@@ -20,6 +20,7 @@ from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
+from mutator.store.patches import Patches
 from mutator.store.progress import Progress
 from mutator.workspace import Workspace
 
@@ -103,7 +104,7 @@ def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
     assert {p.name for p in (out / "golden").iterdir()} == {"A", "A+alone"}
     for row in rows_of(out):
         name = row["experiment_id"]
-        assert (out / "patches" / name[:2] / f"{name}.patch").read_text().startswith("diff --git a/")
+        assert (Patches(out).read(name) or b"").startswith(b"diff --git a/")
 
 
 def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path) -> None:
@@ -124,8 +125,7 @@ def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -
     name = row["experiment_id"]
     tree = tmp_path / "patched"
     shutil.copytree(toy.library.parent / "tree", tree, ignore=shutil.ignore_patterns("__pycache__"))
-    patch = finished / "patches" / name[:2] / f"{name}.patch"
-    subprocess.run(["patch", "-p1", "-s", "-d", str(tree), "-i", str(patch)], check=True)
+    subprocess.run(["patch", "-p1", "-s", "-d", str(tree)], input=Patches(finished).read(name), check=True)
     single, same = rerun(toy, finished, name)
     assert same
     assert (tree / "toycar" / "_fi.py").is_file()

@@ -23,6 +23,8 @@ from mutator.execution.running import run_campaign
 from mutator.model import Experiment
 from mutator.outcomes import results
 from mutator.store import plan_file
+from mutator.store.patches import Patches
+from mutator.store.patches import rewrite as rewrite_patches
 from mutator.store.run_folder import RunFolder
 from mutator.verification.seal import golden_digests, seal_of
 from mutator.workspace import Workspace
@@ -96,10 +98,18 @@ def a_time(run: Path, deep: bool) -> None:
 
 def a_patch(run: Path, deep: bool) -> None:
     _, _, record = hazardous(run)
-    path = RunFolder.unverified(run).patch(record["experiment_id"])
-    path.write_bytes(path.read_bytes().replace(b"# fi:", b"# by hand fi:", 1))
+    name = record["experiment_id"]
+    forged = (Patches(run).read(name) or b"").replace(b"# fi:", b"# by hand fi:", 1)
+    put_patch(run, name, forged)
     if deep:
-        change(run, patch=digest(path.read_bytes()))
+        change(run, patch=digest(forged))
+
+
+def put_patch(run: Path, name: str, data: bytes) -> None:
+    found = Patches(run)
+    [path] = found.files()
+    patches = {other: found.read(other) or b"" for other in found} | {name: data}
+    rewrite_patches(path, patches.items())
 
 
 def a_golden_trace(run: Path, deep: bool) -> None:
@@ -140,9 +150,7 @@ def an_added_record(run: Path, deep: bool) -> None:
 
 
 def copy_patch(run: Path, name: str, other: str) -> None:
-    folder = RunFolder.unverified(run)
-    folder.patch(other).parent.mkdir(exist_ok=True)
-    shutil.copy(folder.patch(name), folder.patch(other))
+    put_patch(run, other, Patches(run).read(name) or b"")
 
 
 def a_plan_condition(run: Path, deep: bool) -> None:

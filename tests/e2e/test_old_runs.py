@@ -72,7 +72,7 @@ def assert_same_cells(new: Path, old: Path) -> None:
     version 0.1 left empty."""
     today, then = (pd.read_csv(path, dtype=str, keep_default_na=False) for path in (new, old))
     assert {*today.columns} - {*then.columns} <= LATER
-    shared = [column for column in today.columns if column not in LATER]
+    shared = [column for column in today.columns if column in then.columns or column not in LATER]
     assert (then[shared] == today[shared]).all(axis=None)
     gone = then.drop(columns=shared)
     assert {*gone.columns} <= {"h2", "t_h2", "max_dev_steer"} and (gone == "").all(axis=None)
@@ -219,7 +219,7 @@ def damages(data: bytes, draw: random.Random) -> Iterator[bytes]:
     yield b"".join(lines)
 
 
-READ = ("*.json", "*.jsonl", "*.yaml", "*.csv", "*.parquet", "*.npz", "*.patch")
+READ = ("*.json", "*.jsonl", "*.yaml", "*.csv", "*.parquet", "*.npz", "*.patch", "*.blocks")
 
 
 def test_a_damaged_one_never_ends_in_a_traceback(cli: Cli, place: Path) -> None:

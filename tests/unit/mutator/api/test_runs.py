@@ -19,6 +19,7 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.reader import Results
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
+from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -116,9 +117,9 @@ def driven_once(
     golden = folder.golden(experiment.scenario, experiment.changes)
     golden.parent.mkdir()
     single.golden.rename(golden)
-    patch = folder.patch(experiment.id)
-    patch.parent.mkdir(parents=True)
-    (root / "single" / "mutant.patch").rename(patch)
+    patches = PatchWriter(folder.path, "0002-a")
+    patches.append(experiment.id, (root / "single" / "mutant.patch").read_bytes())
+    patches.close()
     lines = LineWriter(
         folder.path / "records" / "0002-a.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
     )

@@ -1,6 +1,7 @@
 """A run's channels as its series: 20 values a second, and the steps between them that must not be lost."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from mutator.outcomes.golden import Trace
 from mutator.outcomes.sampling import Sampler, keep_series
 from mutator.store.series import SeriesFolder
 from mutator.store.series_format import Series, decode, encode
+from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -43,9 +45,23 @@ def test_a_channel_has_twenty_values_a_second_and_the_last(
     golden, faulty = stored(one, trace(speed=np.cos(T)), record())
     assert golden.t.tolist() == [*T[::5], 4.99]
     assert faulty.t.tolist() == golden.t.tolist()
-    assert golden.values[SPEED].tolist() == np.sin(golden.t).astype("f4").tolist()
-    assert faulty.values[SPEED].tolist() == np.cos(golden.t).astype("f4").tolist()
+    assert golden.rows[SPEED].tolist() == np.sin(golden.t).astype("f4").tolist()
+    assert faulty.rows[SPEED].tolist() == np.cos(golden.t).astype("f4").tolist()
     assert [channel["name"] for channel in golden.about["channels"]][:2] == ["gas", "brake"]
+
+
+def test_what_the_controller_believes_has_ten_values_a_second(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """With the peaks between them, also where other channels have a value."""
+    inside = [replace(c, role=Role.INTERNAL) if c.name == "speed" else c for c in manifest.channels]
+    one = Sampler(replace(manifest, channels=tuple(inside)), trace(speed=np.sin(T)))
+    speed = np.sin(T)
+    speed[5] = 3.0
+    golden, faulty = stored(one, trace(speed=speed), record())
+    assert golden.times(SPEED).tolist() == [*T[::10], 4.99]
+    assert faulty.rows[SPEED].tolist() == np.sin(golden.times(SPEED)).astype("f4").tolist()
+    assert (faulty.points.t.tolist(), faulty.points.faulty.tolist()) == ([0.05], [3.0])
 
 
 def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
@@ -86,7 +102,7 @@ def test_a_run_that_lasts_longer_has_more_times(
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     assert faulty.t[-1] == 6.99
     assert np.diff(faulty.t).max() < 0.06
-    assert faulty.values[SPEED].tolist() == faulty.t.astype("f4").tolist()
+    assert faulty.rows[SPEED].tolist() == faulty.t.astype("f4").tolist()
 
 
 def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
@@ -96,7 +112,7 @@ def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
     time = np.arange(0.0, 5.0, 0.03)
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1
-    assert faulty.values[SPEED].tolist() == time[place].astype("f4").tolist()
+    assert faulty.rows[SPEED].tolist() == time[place].astype("f4").tolist()
 
 
 def test_a_channel_with_its_own_times_has_its_newest_value(
@@ -105,7 +121,7 @@ def test_a_channel_with_its_own_times_has_its_newest_value(
     """None before its first."""
     own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
     golden = stored(Sampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
-    gap = dict(zip(golden.t.tolist(), golden.values[3], strict=True))
+    gap = dict(zip(golden.times(3).tolist(), golden.rows[3], strict=True))
     assert np.isnan(gap[0.95])
     assert (gap[1.0], gap[2.95], gap[3.0]) == (1.0, 1.0, 2.0)
 
@@ -122,5 +138,5 @@ def test_a_series_of_its_own_file_is_read_back(
     assert path.read_bytes() == before
     found = SeriesFolder(tmp_path).read(one.experiment_id)
     assert found is not None
-    assert (found[0].values[SPEED] == 0).all()
+    assert (found[0].rows[SPEED] == 0).all()
     assert found[1].about["alerts"] == [["brake_hard", 2.5]]

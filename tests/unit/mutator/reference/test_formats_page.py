@@ -30,7 +30,7 @@ def test_every_schema_in_the_page_is_in_the_code() -> None:
     """The page names no format that is gone, and what it reserves is not in use."""
     assert set(IN_PAGE.findall(BEFORE)) - in_code() == set()
     reserved = set(re.findall(rf"^\| `{SCHEMA.pattern}` \|", RESERVED, re.MULTILINE))
-    assert {"series/1", "chunk/1"} <= reserved
+    assert {"chunk/1"} <= reserved
     assert reserved & in_code() == set()
 
 

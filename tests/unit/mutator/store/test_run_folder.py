@@ -56,8 +56,8 @@ def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Worksp
 def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
     """A run folder of a newer mutator is not touched."""
     path = folder.path / "run.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": "run/3"}))
-    with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' was written by a newer mutator"):
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": "run/4"}))
+    with pytest.raises(MutatorError, match=r"run\.json: schema 'run/4' was written by a newer mutator"):
         RunFolder.open(folder.path)
 
 

@@ -14,12 +14,18 @@ from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack, segm
 IDS = [f"{number:016x}" for number in range(150)]
 DRAW = np.random.default_rng(1)
 VALUES = DRAW.random((151, 4, 600)).astype("<f4")
-GOLDEN = Series(t=np.arange(600) / 20, values=VALUES[150], about={"channels": []})
+
+
+def series(number: int) -> Series:
+    return Series(t=np.arange(600) / 20, rows=list(VALUES[number]), every=[1] * 4, about={"n": number})
+
+
+GOLDEN = series(150)
 MADE = {
     name: EncodedSeries(
         key="A" if number % 2 else "B+alone",
         golden=encode(GOLDEN),
-        faulty=encode(Series(t=GOLDEN.t, values=VALUES[number], about={"n": number}), GOLDEN),
+        faulty=encode(series(number), GOLDEN),
     )
     for number, name in enumerate(IDS)
 }
@@ -57,7 +63,7 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
         found = folder.read(name)
         assert found is not None
         assert found[1].about == {"n": number}
-        assert (found[1].values == VALUES[number]).all()
+        assert (np.array(found[1].rows) == VALUES[number]).all()
     assert folder.read("f" * 16) is None
     assert segments(packed) == []
 

@@ -11,6 +11,7 @@ from mutator._common.locks import owned
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
 from mutator.store.lines import written
+from mutator.store.patches import Patches
 from mutator.store.run_folder import RunFolder
 from mutator.verification.repairing import repair
 from mutator.workspace import Workspace
@@ -97,16 +98,27 @@ def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
     assert folder.records() == {} and said == [f"{RECORDS} is gone"]
 
 
-def test_a_lost_patch_takes_its_record_with_it(run: Path) -> None:
+def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[..., None]) -> None:
     """Running the experiment again makes both."""
     one, other = list(plan_file.ids(run))[:2]
-    folder = RunFolder.unverified(run)
-    folder.patch(one).write_bytes(b"other")
-    folder.patch(other).unlink()
+    [file] = Patches(run).files()
+    put_patches(run, {one: b"other", other: None})
+    before = file.read_bytes()
     said, folder = repaired(run)
     assert len(folder.records()) == 22 and not {one, other} & folder.records().keys()
-    assert (run / "damaged" / folder.patch(one).relative_to(run)).read_bytes() == b"other"
+    assert (run / "damaged" / file.relative_to(run)).read_bytes() == before
+    assert {*Patches(run)} == {*folder.records()}
     assert any(one in text for text in said)
+
+
+def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Path) -> None:
+    """The first of a file is a whole patch, which the others are packed beside: all are run again."""
+    [file] = Patches(run).files()
+    data = file.read_bytes()
+    file.write_bytes(data[:60] + bytes([data[60] ^ 1]) + data[61:])
+    _, folder = repaired(run)
+    assert folder.records() == {} and [*Patches(run)] == []
+    assert (run / "damaged" / file.relative_to(run)).is_file()
 
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
@@ -195,7 +207,7 @@ def test_repair_waits_for_nobody(run: Path) -> None:
     with owned(run), pytest.raises(MutatorError, match="in use"):
         repair(RunFolder.unverified(run))
     head = run / "run.json"
-    head.write_text(head.read_text().replace("run/2", "run/1"))
+    head.write_text(head.read_text().replace("run/3", "run/1"))
     with pytest.raises(MutatorError, match="run/1 has no checksums"):
         repair(RunFolder.unverified(run))
 
@@ -215,12 +227,14 @@ def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> No
     assert aside.is_symlink() if is_link else (aside / "thesis.tex").read_text() == "mine"
 
 
-def test_a_patch_that_is_a_link_is_put_aside(run: Path) -> None:
-    """It is taken away, or the patch that is made anew would be written to where it leads."""
-    one, other = sorted((run / "patches").rglob("*.patch"))[:2]
-    other.write_bytes(b"not the patch of the record")
-    one.unlink()
-    one.symlink_to(other)
+def test_a_file_of_patches_that_is_a_link_is_put_aside(run: Path, put_patches: Callable[..., None]) -> None:
+    """What it leads to is left alone."""
+    name = next(plan_file.ids(run))
+    put_patches(run, {name: b"not the patch of the record"})
+    [file] = Patches(run).files()
+    other = Path(shutil.move(file, run.parent / "elsewhere"))
+    before = other.read_bytes()
+    file.symlink_to(other)
     repaired(run)
-    assert not one.is_symlink() and not one.exists()
-    assert (run / "damaged" / one.relative_to(run)).read_bytes() == b"not the patch of the record"
+    assert not file.is_symlink() and name not in Patches(run)
+    assert other.read_bytes() == before

@@ -110,7 +110,7 @@ def test_what_is_not_finished_has_none(run: Path) -> None:
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
-    edit(run / "run.json", '"run/2"', '"run/1"')
+    edit(run / "run.json", '"run/3"', '"run/1"')
     folder = RunFolder.unverified(run)
     assert seal_or_why_not(folder) == "none: not verifiable, as run/1 has no digests"
 

@@ -1,0 +1,139 @@
+"""The patches of a run folder: packed, each as what it has beside another one, which most of it is.
+
+Each worker appends to a file of its own, `patches/<session>-<worker>.blocks`. Folders of earlier schemas have
+a file a patch, `patches/<xx>/<experiment>.patch`. Whether one is what was run, the digest in its record says.
+"""
+
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from mutator._common.files import write_atomic
+from mutator.store.blocks import Block, BlockWriter, as_block, read_blocks
+
+FOLDER, SUFFIX = "patches", ".blocks"
+WHOLE, BESIDE = 0, 1  # kinds of blocks: a patch by itself, or beside the last whole one before it
+_WINDOW = 32_768  # bytes that deflate looks back
+_RUN = 256  # patches to a whole one: what depends on it is lost with it
+_LEVEL = 9
+
+
+class _Packer:
+    """Makes the blocks of one file."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._whole = b""
+
+    def block(self, data: bytes) -> tuple[int, bytes]:
+        """Kind and content of the block of the next patch."""
+        is_whole = self._count % _RUN == 0
+        self._count += 1
+        if is_whole:
+            self._whole = data[-_WINDOW:]
+            return WHOLE, zlib.compress(data, _LEVEL)
+        packer = zlib.compressobj(_LEVEL, zdict=self._whole)
+        return BESIDE, packer.compress(data) + packer.flush()
+
+
+class PatchWriter:
+    """Appends the patches of a worker."""
+
+    def __init__(self, run: Path, worker: str) -> None:
+        self._path = run / FOLDER / f"{worker}{SUFFIX}"
+        self._blocks: BlockWriter | None = None  # nothing was appended yet
+        self._packer = _Packer()
+
+    def append(self, experiment_id: str, data: bytes) -> None:
+        if self._blocks is None:
+            self._blocks = BlockWriter(self._path)
+        kind, content = self._packer.block(data)
+        self._blocks.append(kind, experiment_id, content)
+
+    def close(self) -> None:
+        if self._blocks is not None:
+            self._blocks.close()
+
+
+class _Whole:
+    """A whole patch, unpacked once."""
+
+    def __init__(self, block: Block) -> None:
+        self._block = block
+
+    @cached_property
+    def data(self) -> bytes:
+        return zlib.decompress(self._block.data)
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a patch is: its block, and the whole patch that it is beside, or is."""
+
+    path: Path
+    block: Block
+    whole: _Whole | None
+
+
+class Patches:
+    """Reads the patches of the run folder at `run`."""
+
+    def __init__(self, run: Path) -> None:
+        self.run = run
+
+    def __iter__(self) -> Iterator[str]:
+        """Every experiment that a patch is there of."""
+        old = (path.stem for path in (self.run / FOLDER).glob("*/*.patch"))
+        return iter(sorted({*self._places, *old}))
+
+    def read(self, experiment_id: str) -> bytes | None:
+        """The newest patch of an experiment; None where none is there, or only a damaged one."""
+        place = self._places.get(experiment_id)
+        if place is None:
+            path = self.old_file(experiment_id)
+            return path.read_bytes() if path.is_file() else None
+        try:
+            if place.block.kind == WHOLE or place.whole is None:
+                return zlib.decompress(place.block.data)
+            packer = zlib.decompressobj(zdict=place.whole.data[-_WINDOW:])
+            return packer.decompress(place.block.data) + packer.flush()
+        except zlib.error:  # the whole patch is lost
+            return None
+
+    def file(self, experiment_id: str) -> Path:
+        """The file that has it, or that would have it if it were there."""
+        place = self._places.get(experiment_id)
+        if place is not None:
+            return place.path
+        path = self.old_file(experiment_id)
+        return path if path.exists() else self.run / FOLDER
+
+    def old_file(self, experiment_id: str) -> Path:
+        """Where folders of earlier schemas have it."""
+        return self.run / FOLDER / experiment_id[:2] / f"{experiment_id}.patch"
+
+    def files(self) -> list[Path]:
+        """The files of blocks, oldest session first, and what else has such a name."""
+        return sorted((self.run / FOLDER).glob(f"*{SUFFIX}"))
+
+    @cached_property
+    def _places(self) -> dict[str, _Place]:
+        found: dict[str, _Place] = {}
+        for path in filter(Path.is_file, self.files()):  # nobody waits for what a pipe may say
+            whole: _Whole | None = None
+            for block in read_blocks(path).blocks:
+                if block.kind == WHOLE:
+                    whole = _Whole(block)
+                found[block.key] = _Place(path, block, whole)
+        return found
+
+
+def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
+    """Write a file of blocks anew, with these patches alone."""
+    packer, blocks = _Packer(), []
+    for experiment_id, data in patches:
+        kind, content = packer.block(data)
+        blocks.append(as_block(kind, experiment_id, content))
+    write_atomic(path, b"".join(blocks))

@@ -1,0 +1,111 @@
+"""Series as a page reads them: the same numbers as in Python, from a fixture of the format."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series_format import Points, Series, encode
+from mutator.web import asset
+
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "run-3"
+LOADED = """async (id) => {
+    const words = (values) => [...new Uint32Array(values.buffer)];
+    try {
+        const series = await SeriesFile.load(id);
+        const bits = ({ t, golden, faulty }) => ({ t: [...t], golden: words(golden), faulty: words(faulty) });
+        return series && { ...series, channels: series.channels.map((one) => ({ ...one, ...bits(one) })) };
+    } catch (error) {
+        return error.message;
+    }
+}"""  # values as their bits
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """The series of the fixture in a run folder with a page that can do nothing but load them."""
+    shutil.copytree(FIXTURE / "small" / "series", tmp_path / "series")
+    facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).kept_ids()}}
+    (tmp_path / "report").mkdir()
+    told = f'<script type="application/json" id="facts">{json.dumps(facts)}</script>'
+    page = f"<!doctype html><meta charset='utf-8'>{told}<script>{asset('series_file.js')}</script>"
+    (tmp_path / "report" / "index.html").write_text(page)
+    return tmp_path
+
+
+def load(browser: Any, run: Path, name: str) -> Any:
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto((run / "report" / "index.html").as_uri())
+    found = page.evaluate(LOADED, name)
+    context.close()
+    return found
+
+
+def as_read(run: Path, name: str) -> list[dict[str, Any]]:
+    """Channels as Python reads them, as bits, the points between the values among them."""
+    read = SeriesFolder(run).read(name)
+    assert read is not None
+    golden, faulty = read
+    found = []
+    for number, channel in enumerate(golden.about["channels"]):
+        mine = faulty.points.channel == number
+        t = np.concatenate((golden.times(number), faulty.points.t[mine]))
+        order = np.argsort(t, kind="stable")
+        runs = ((golden, faulty.points.golden), (faulty, faulty.points.faulty))
+        one, other = (np.concatenate((run.rows[number], points[mine]))[order] for run, points in runs)
+        bits = {"golden": one.view("<u4").tolist(), "faulty": other.view("<u4").tolist()}
+        found.append({"name": channel["name"], "t": t[order].tolist(), **bits})
+    return found
+
+
+def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Path) -> None:
+    """Packed or in a file of its own: bit by bit those that were written down when the fixture was made."""
+    expected = json.loads((FIXTURE / "series.json").read_text())
+    for name, known in expected.items():
+        told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
+        assert as_read(run, name) == told
+        found = load(browser, run, name)
+        assert [{key: one[key] for key in told[0]} for one in found["channels"]] == told
+        assert (found["active"], found["tEnd"]) == (known["about"]["active"], known["about"]["t_end"])
+        assert found["end"] == known["about"]["end"]
+
+
+def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> None:
+    """Of a channel with a value at each second time, infinite values, and a run that lasts longer."""
+    t = np.arange(9) / 20
+    rows = [np.arange(7, dtype="<f4"), np.array([1, np.inf, -np.inf, np.nan], dtype="<f4")]
+    about = {"start": 0.0, "end": 0.3, "channels": [{"name": "a"}, {"name": "b"}]}
+    golden = Series(t=t[:7], rows=rows, every=[1, 2], about=about)
+    single = np.array([7.5, np.inf], dtype="<f4")
+    points = Points(channel=np.array([0, 1]), t=np.array([0.11, 0.01]), golden=single, faulty=-single)
+    longer = [np.arange(9, dtype="<f4") ** 2, np.array([1, 2, 3, 4, 5], dtype="<f4")]
+    happened = {"active": None, "manifest": None, "alerts": [], "hazards": [], "t_end": None, "end": 0.4}
+    faulty = Series(t=t, rows=longer, every=[1, 2], about=happened, points=points)
+    name = SeriesFolder(run).kept_ids()[0]
+    write_kept(SeriesFolder(run).kept(name), encode(golden), encode(faulty, golden))
+    (run / "series" / "index.js").unlink()
+    page = run / "report" / "index.html"
+    page.write_text(page.read_text().replace('"packed": true', '"packed": false'))
+    a, b = load(browser, run, name)["channels"]
+    assert a["t"] == [0.0, 0.05, 0.1, 0.11, *t[3:].tolist()]
+    assert b["t"] == [0.0, 0.01, 0.1, 0.2, 0.3, 0.4]
+    values = {key: np.array(b[key], dtype="<u4").view("<f4").tolist() for key in ("golden", "faulty")}
+    assert values["faulty"] == [1, -np.inf, 2, 3, 4, 5]
+    assert values["golden"][:4] == [1, np.inf, np.inf, -np.inf] and np.isnan(values["golden"][4:]).all()
+    assert np.array(a["faulty"], dtype="<u4").view("<f4").tolist() == [0, 1, 4, -7.5, 9, 16, 25, 36, 49, 64]
+
+
+def test_a_damaged_series_is_said_to_be(browser: Any, run: Path) -> None:
+    """A flipped bit in the middle of a series gives words, no plot; an experiment without one gives null."""
+    name = next(iter(json.loads((FIXTURE / "series.json").read_text())))
+    for path in (run / "series").glob(f"{16 * '[0-9a-f]'}.js"):
+        data = path.read_bytes()
+        place = next(place for place in range(100, len(data)) if data[place] > 0xA0)
+        path.write_bytes(data[:place] + bytes([data[place] ^ 2]) + data[place + 1 :])
+    assert str(load(browser, run, name)).startswith(f"The series of {name} cannot be read")
+    assert load(browser, run, "f" * 16) is None
