@@ -63,6 +63,7 @@ def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("caches")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder))
+        patch.setenv("COLUMNS", "1000")  # so that no sentence that a test looks for is folded
         yield folder
 
 

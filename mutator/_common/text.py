@@ -2,6 +2,7 @@
 
 import difflib
 import re
+import textwrap
 from typing import Any
 
 
@@ -35,3 +36,36 @@ def operator_hint(text: str) -> str:
     """What to write for the operators of other languages in an expression; empty if it has none."""
     found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
     return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)
+
+
+_BEFORE_VALUE = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
+_COMMAND = re.compile(r"`[^`]*`")
+_NO_BREAK = "\0"
+
+
+def folded(text: str, width: int) -> str:
+    """The text with lines of at most `width` characters, broken between words. A word that is longer, and a
+    command in backticks, stays whole; what follows a break is indented, to the value of a `name  value`."""
+    return "\n".join(_folded_line(line, width) if len(line) > width else line for line in text.split("\n"))
+
+
+def _folded_line(line: str, width: int) -> str:
+    if line.startswith("|"):  # a row of a Markdown table
+        return line
+    start = _BEFORE_VALUE.match(line)
+    indent = len(start[0]) if start and len(start[0]) <= width // 2 else _indent(line) + 2
+    kept = _COMMAND.sub(lambda command: command[0].replace(" ", _NO_BREAK), line)
+    lines = textwrap.wrap(
+        kept,
+        max(width, indent + 1),
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+        expand_tabs=False,
+        replace_whitespace=False,
+    )
+    return "\n".join(lines).replace(_NO_BREAK, " ")
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())

@@ -120,7 +120,7 @@ def plan(
     terminal.say(f"expected: {_cost_line(cost)}")
     terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {made.digest[:16]})")
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
-    terminal.say(f"run it: {shlex.join(command)}")
+    terminal.say(f"run it: {shlex.join(command)}", whole=True)
 
 
 def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:
@@ -268,7 +268,7 @@ def _print_end(
     if summary.problem:
         terminal.complain(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
-        terminal.say(f"go on: {resume_command()}", style="bold")
+        terminal.say(f"go on: {resume_command()}", style="bold", whole=True)
 
 
 def resume_command() -> str:

@@ -19,11 +19,14 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common.hashing import plain
 from mutator._common.tables import Table
+from mutator._common.text import folded
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
+
+PIPE_COLUMNS = 100  # of lines that no terminal shows, unless COLUMNS says otherwise
 
 STYLES = {
     "ok": "green",
@@ -52,20 +55,20 @@ class Terminal:
     def err(self) -> "Console":
         return _console(stderr=True)
 
-    def say(self, text: str = "", style: str | None = None) -> None:
-        """One line or paragraph as it is: no markup, no wrapping at a pipe's invented width."""
+    def say(self, text: str = "", style: str | None = None, *, whole: bool = False) -> None:
+        """Lines of text, folded; `whole`: as they are, as of a command that one copies."""
         if not self.as_json:
-            self.out.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+            _print(self.out, text, style, whole=whole)
 
     def note(self, text: str) -> None:
         """A remark beside the result: to standard error, so that a pipe gets the result alone."""
         with remarking():
-            self.err.print(text, style="dim", markup=False, highlight=False, soft_wrap=True)
+            _print(self.err, text, "dim")
 
     def complain(self, text: str) -> None:
         """What went wrong, to standard error."""
         with remarking():
-            self.err.print(f"error: {text}", style="bold red", markup=False, highlight=False, soft_wrap=True)
+            _print(self.err, f"error: {text}", "bold red")
 
     def emit(self, data: Any) -> None:
         """The result as one JSON document; numbers JSON does not know (infinity, nan) become null."""
@@ -88,7 +91,7 @@ class Terminal:
         if self.out.is_terminal:
             self.out.print(_rich_table(heads, cells, right, total))
         else:
-            self.say(Table(heads=heads, rows=cells, right=right).as_text())
+            self.say(Table(heads=heads, rows=cells, right=right).as_text(), whole=True)
 
     def diff(self, patch: str) -> None:
         """A unified diff, coloured in a terminal; elsewhere its very bytes, for `patch`."""
@@ -246,6 +249,19 @@ def _console(*, stderr: bool) -> "Console":
             raise BrokenPipeError
 
     return Piped(stderr=stderr, highlight=False, emoji=False)  # `:x:` in a text is no picture
+
+
+def _print(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
+    """Print text without markup, folded unless it stays `whole`."""
+    if not whole:
+        text = folded(text, console.width if console.is_terminal else _columns())
+    console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+def _columns() -> int:
+    """How wide a line is that goes into a pipe or a file."""
+    told = os.environ.get("COLUMNS", "")
+    return int(told) if told.isdecimal() and int(told) else PIPE_COLUMNS
 
 
 def _cell(value: object) -> str:

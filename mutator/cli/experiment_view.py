@@ -149,5 +149,5 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
         terminal.say(f"the fault-free run reaches {reached} itself: that need not be the fault's doing")
     if trial.log.strip() and trial.record.detail:
         terminal.say("last lines of the run:")
-        terminal.say(trial.log.strip())
+        terminal.say(trial.log.strip(), whole=True)
     terminal.say(f"plot: {drawn}" if drawn else "no plot: the run left no trace")

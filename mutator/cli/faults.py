@@ -167,7 +167,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
         terminal.emit([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
         # `patch` skips what stands before a diff, so the heading may stay in a pipe.
-        terminal.say(f"# {fault}", style="bold")
+        terminal.say(f"# {fault}", style="bold", whole=True)
         text, note = (patch, "") if whole else readable(patch)
         terminal.diff(text)
         if note:
@@ -235,4 +235,4 @@ def generate(
     first = out / index[0]["patch"]
     root = mutants.bench.manifest.root
     if mutants.bench.manifest.overlay is None:  # else a patch is of two folders
-        terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}")
+        terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}", whole=True)

@@ -57,7 +57,7 @@ def stpa(
     if svg:
         terminal.say(f"control structure: {short_path(svg)}")
     for problem in problems:
-        terminal.say(error_text(problem), style="red")
+        terminal.say(error_text(problem), style="red", whole=not terminal.out.is_terminal)
     if problems:
         terminal.say(counted(len(problems), "problem"), style="bold red")
         raise typer.Exit(EXIT_CHECK_FAILED)

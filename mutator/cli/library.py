@@ -185,7 +185,7 @@ def check(
         told = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
         terminal.emit({"problems": told, "findings": findings})
     for problem in problems:
-        terminal.say(error_text(problem), style="red")
+        terminal.say(error_text(problem), style="red", whole=not terminal.out.is_terminal)
     for finding in findings:
         if drive or finding.level != "ok":
             _say_finding(terminal, finding)

@@ -65,7 +65,7 @@ def merge(
     results = short_path(out / "results.csv")
     terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
     terminal.say(f"seal: {seal}")
-    terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}")
+    terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}", whole=True)
 
 
 REPORT_EXAMPLES = """\b

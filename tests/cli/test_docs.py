@@ -130,6 +130,7 @@ def run(command: str, folder: Path) -> str:
     """Standard output of a command line that must be fine; `mutator` is that of this interpreter."""
     bin_folder = str(Path(sys.executable).parent)
     environment = os.environ | {"PATH": bin_folder + os.pathsep + os.environ["PATH"]}
+    environment.pop("COLUMNS", None)  # a page shows what a pipe gets
     done = subprocess.run(
         ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
@@ -191,6 +192,7 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
 def test_what_costs_little_is_always_tried(cli: Cli, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lists and diffs in README and tutorial are those of the library and target as they are."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE))
+    monkeypatch.delenv("COLUMNS")
     said = {command: said for page in (README, TUTORIAL) for command, said in sessions(page)}
     answer = cli(*shlex.split(command)[1:])
     assert (answer.code, lines_of(answer.out)) == (0, said[command])

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from mutator._common.text import folded
 from mutator.cli.console import Terminal
 from mutator.cli.progress import campaign_progress
 from mutator.execution.phases import duration
@@ -114,3 +115,67 @@ def test_each_stage_has_its_name_and_its_own_remaining_time(capsys: pytest.Captu
             notify(Progress(stage=stage, **timed))
     lines = capsys.readouterr().err.splitlines()
     assert lines == ["planning", "checks", "golden runs", "proof 7/23, 8 s left", "tables", "report"]
+
+
+LONG = "expected: one of " + ", ".join(f"'name_{line}' (line {line})" for line in range(34, 39))
+COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_smoke --by NAME`"
+
+
+@pytest.mark.parametrize(
+    ("text", "width", "lines"),
+    [
+        ("short  and\tleft  alone", 22, ["short  and\tleft  alone"]),
+        ("one two three", 8, ["one two", "  three"]),
+        ("  to do: mend it now", 14, ["  to do: mend", "    it now"]),
+        ("plot  a value of many words", 20, ["plot  a value of", "      many words"]),
+        ("a /path/that/is/longer/than/a/line b", 12, ["a", "  /path/that/is/longer/than/a/line", "  b"]),
+        ("no-break at-hyphens", 10, ["no-break", "  at-hyphens"]),
+        ("do it: `mutator run x` now", 14, ["do it:", "  `mutator run x`", "  now"]),
+        ("one two\n| a cell | of a table |", 8, ["one two", "| a cell | of a table |"]),
+        ("", 8, [""]),
+    ],
+)
+def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
+    """Lines break between words, go on indented, and lose nothing; commands and long words stay whole."""
+    assert folded(text, width).split("\n") == lines
+
+
+@pytest.mark.parametrize(("columns", "width"), [(None, 100), ("60", 60), ("many", 100)])
+def test_a_pipe_gets_lines_of_100_columns(
+    columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Results, remarks and errors are folded to 100 columns, or to COLUMNS; tables and what is to be copied
+    are not."""
+    monkeypatch.delenv("COLUMNS")
+    if columns:
+        monkeypatch.setenv("COLUMNS", columns)
+    terminal = Terminal()
+    terminal.say(LONG)
+    terminal.note(LONG)
+    terminal.complain(LONG)
+    out, err = capsys.readouterr()
+    for line in (out + err).splitlines():
+        assert len(line) <= width
+    assert max(map(len, out.splitlines())) > width - 20
+    assert " ".join(out.split()) == LONG
+    terminal.say(LONG, whole=True)
+    terminal.table(["a", "b"], [(LONG, COMMAND)])
+    whole = capsys.readouterr().out.splitlines()
+    assert whole[0] == LONG
+    assert whole[2].split("  ") == [LONG, COMMAND]
+
+
+def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
+    """A terminal of 120 columns shows the lines folded to 120."""
+    Terminal().say(f"{LONG}; or {COMMAND}")
+    lines = ANSI.sub("", capsys.readouterr().out).splitlines()
+    assert all(len(line) <= 120 for line in lines)
+    assert " ".join(" ".join(lines).split()) == f"{LONG}; or {COMMAND}"
+    assert lines[-1].endswith(COMMAND)
+
+
+def test_json_is_never_folded(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However narrow the terminal is, JSON is as it is."""
+    wide = cli("list", "specs", "--json").out
+    monkeypatch.setenv("COLUMNS", "20")
+    assert cli("list", "specs", "--json").out == wide
