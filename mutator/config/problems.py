@@ -1,6 +1,7 @@
 """Words for what pydantic found wrong with a file: value shown, what was expected, a remedy."""
 
 import types
+from collections.abc import Sequence
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -23,12 +24,11 @@ _TYPES = {
 
 def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, str, tuple[str | int, ...]]:
     """(got, expected, remedy, keys) for one validation problem of `model`."""
-    keys = tuple(problem["loc"])
+    keys, known = _place(model, tuple(problem["loc"]))
     key = next((str(k) for k in reversed(keys) if isinstance(k, str)), "")
     kind = problem["type"]
     context = problem.get("ctx", {})
     if kind == "extra_forbidden":
-        known = _fields_at(model, keys[:-1])
         return (
             f"unknown key '{key}'",
             f"one of {', '.join(known)}",
@@ -48,24 +48,50 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
     return got, problem["msg"].removeprefix("Input should be "), "correct the value", keys
 
 
-def _fields_at(model: type[BaseModel], keys: tuple[str | int, ...]) -> list[str]:
-    """Names of the keys that the model found at `keys` takes."""
+def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
+    """The problem to tell first: a misspelt key, which also misses. Where a value may have several shapes, it
+    is of the shape that the value has."""
+    shapes = {p["loc"] for p in found if p["type"] in ("list_type", "dict_type", "model_type")}
+    inside = {p["loc"][: len(loc) - 1] for loc in shapes for p in found if len(p["loc"]) > len(loc)}
+    apt = [p for p in found if p["loc"] not in shapes or p["loc"][:-1] not in inside]
+    return min(apt or found, key=lambda problem: problem["type"] != "extra_forbidden")
+
+
+def _place(model: type[BaseModel], loc: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], list[str]]:
+    """The keys of the file that lead to a problem of `model`, and the keys that are known beside the last.
+
+    Of a value that may have several shapes, pydantic also names the shape: that is no key.
+    """
     current: Any = model
-    for key in keys:
+    keys: list[str | int] = []
+    known: list[str] = []
+    for key in loc:
+        shapes = _shapes(current)
+        if len(shapes) > 1:
+            current = next((one for one in shapes if _named(one, str(key))), None)
+            continue
+        (current,) = shapes
+        keys.append(key)
         if isinstance(current, type) and issubclass(current, BaseModel):
             by_alias = {field.alias or name: field for name, field in current.model_fields.items()}
-            current = _inner(by_alias[str(key)].annotation)
+            known = list(by_alias)
+            current = by_alias[str(key)].annotation if str(key) in by_alias else None
         else:
-            current = _inner(get_args(current)[-1])
-    if isinstance(current, type) and issubclass(current, BaseModel):
-        return [field.alias or name for name, field in current.model_fields.items()]
-    return []
+            known = []
+            current = (get_args(current) or (None,))[-1]
+    return tuple(keys), known
 
 
-def _inner(annotation: Any) -> Any:
-    """`X` of `X | None` and of `Annotated[X, ...]`; anything else as it is."""
+def _named(shape: Any, tag: str) -> bool:
+    """Whether pydantic calls a shape so: `list[str]`, or the name of a model."""
+    name: str = (get_origin(shape) or shape).__name__
+    return tag.partition("[")[0] == name
+
+
+def _shapes(annotation: Any) -> list[Any]:
+    """What `X`, `X | None`, `Annotated[X, ...]` or `X | Y` allow but None."""
     if get_origin(annotation) is Annotated:
-        return _inner(get_args(annotation)[0])
+        return _shapes(get_args(annotation)[0])
     if get_origin(annotation) in (Union, types.UnionType):
-        return next(a for a in get_args(annotation) if a is not type(None))
-    return annotation
+        return [one for part in get_args(annotation) if part is not type(None) for one in _shapes(part)]
+    return [annotation]

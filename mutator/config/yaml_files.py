@@ -243,9 +243,7 @@ def read(
         return model.model_validate(body), source
     except ValidationError as error:
         found = error.errors(include_url=False)
-        # a misspelt key also misses: the misspelling says more
-        found.sort(key=lambda problem: problem["type"] != "extra_forbidden")
-        got, expected, remedy, keys = problems.explain(found[0], model)
+        got, expected, remedy, keys = problems.explain(problems.most_telling(found), model)
         if len(found) > 1:
             remedy += f" ({counted(len(found) - 1, 'more mistake')} after this one)"
         raise source.error(keys, got, expected=expected, remedy=remedy) from None
