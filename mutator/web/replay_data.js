@@ -38,6 +38,17 @@ const ReplayData = (() => {
     return found;
   }
 
+  /** How far golden and faulty are apart as a rule, from the activation to the end of the drive, as a share of the axis: the
+   *  root of the mean square. A value that only one of them has counts as the whole axis. */
+  function apart(channel, { low, high }, begin, end) {
+    let sum = 0, count = 0;
+    for (let i = index(channel.t, begin); i < channel.t.length && channel.t[i] <= end + TINY; i++, count++) {
+      const by = same(channel.faulty[i], channel.golden[i]) ? 0 : Math.abs(channel.faulty[i] - channel.golden[i]) / (high - low);
+      sum += Math.min(1, Number.isFinite(by) ? by : 1) ** 2;
+    }
+    return Math.sqrt(sum / (count || 1));
+  }
+
   /** The axis of a channel, of what it is up to the end of the drive; `cut`: from where to where its values really
    *  go, if that is too far to show; `isWhole`: they are all whole numbers. A headway time near standstill goes to any height, and nothing else would be seen. */
   function range(channel, end) {
@@ -82,5 +93,5 @@ const ReplayData = (() => {
 
   const unit = (channel) => (channel.unit && channel.unit !== "-" ? channel.unit.replace("^2", "²").replace("^3", "³") : "");
 
-  return { TINY, index, held, same, steps, until, largest, range, ticks, digits, text, unit };
+  return { TINY, index, held, same, steps, until, largest, apart, range, ticks, digits, text, unit };
 })();

@@ -20,12 +20,6 @@ class ReplayPlot {
       el("span.name", { title: channel.about || null }, channel.name, unit ? ` [${unit}]` : ""), this.golden, this.faulty, this.by), this.room, this.#note());
   }
 
-  /** Where golden and faulty differ most, as a share of the axis. */
-  get weight() {
-    const { by } = this.largest;
-    return Number.isNaN(by) ? 1 : by / (this.axis.high - this.axis.low);
-  }
-
   #text = (value) => ReplayData.text(value, this.places);
 
   #inWords() {

@@ -3,8 +3,8 @@
 
 class ReplayPlots {
   static NARROWEST = 0.2; // s that are shown at least
-  static CHOSEN = 6; // plots at first, at most
-  static SEEN = 0.01; // share of an axis that a difference must have to be seen
+  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // plots at first, at most
+  static SEEN = 0.002; // share of an axis by which a channel must be apart to be seen
   static FACTOR = 1.6; // of a step of zoom
 
   constructor(channels, axes, series, clock, zoomed) {
@@ -22,10 +22,13 @@ class ReplayPlots {
     this.#fill();
   }
 
-  /** The channels that are plotted at first: those that differ most; else the first three. */
+  /** The channels that are plotted at first: of each role those that differ most; none does: the first three. */
   #interesting() {
-    const differ = this.plots.filter(({ weight }) => weight > ReplayPlots.SEEN).sort((a, b) => b.weight - a.weight);
-    return (differ.length ? differ.slice(0, ReplayPlots.CHOSEN) : this.plots.slice(0, 3)).map(({ channel }) => channel);
+    const begin = this.series.active?.[0] ?? this.series.start, end = ReplayData.until(this.series);
+    const ranked = this.plots.map(({ channel, axis }) => ({ channel, apart: ReplayData.apart(channel, axis, begin, end) }))
+      .filter(({ apart }) => apart > ReplayPlots.SEEN).sort((a, b) => b.apart - a.apart).map(({ channel }) => channel);
+    const found = Object.entries(ReplayPlots.CHOSEN).flatMap(([role, most]) => ranked.filter((channel) => channel.role === role).slice(0, most));
+    return found.length ? found : this.plots.slice(0, 3).map(({ channel }) => channel);
   }
 
   #tools() {
