@@ -35,6 +35,7 @@ from mutator.report import page as report_page
 from mutator.report.browse import Browse
 from mutator.report.page import Content
 from mutator.report.panels.answers import answers_panel
+from mutator.report.panels.paths import paths_panel
 from mutator.report.studies import ReportedRun
 from mutator.review.groups import shapes
 from mutator.store.lines import LineWriter
@@ -132,7 +133,10 @@ def write(size: int, out: Path) -> dict[str, float]:
     began = process_time()
     found = Results.of_run(out)
     rows, lines = found.rows(), list(found.lines())
-    table = embedded(report_browse.table(rows, lines), "table")
+    run = ReportedRun.open(RunFolder.open(out), None)
+    table = embedded(report_browse.table(rows, lines, run.paths), "table")
+    assert run.paths is not None
+    ways = embedded(run.paths.data([row.experiment_id for row in rows]), "paths")
     table_s = process_time() - began
     shown = [experiments[row.experiment_id] for row in rows]
     details = report_browse.details(shown, shapes(patches(workspace, shown)), rows)
@@ -140,7 +144,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     index_kb = write_series(workspace, [record(e, n) for n, e in enumerate(shown)], out)
     browse = Browse(
         facts=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
-        scripts=tuple(map(Markup, (table, detail, embedded({}, "media")))),
+        scripts=tuple(map(Markup, (table, detail, ways, embedded({}, "media")))),
     )
     content = Content(
         name=f"{size} experiments",
@@ -149,14 +153,14 @@ def write(size: int, out: Path) -> dict[str, float]:
         planned="",
         notes="",
         study="",
-        answers=answers_panel(ReportedRun.open(RunFolder.open(out), None)),
-        panels=(),
+        answers=answers_panel(run),
+        panels=[panel for panel in (paths_panel(run),) if panel],
         browse=browse,
     )
     page = report_page.page_html(content)
     (out / "report").mkdir()
     (out / "report" / "index.html").write_text(page)
-    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail}
+    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "paths_kb": ways}
     found = {name: len(text.encode()) / 1000 for name, text in sizes.items()}
     return {"table_s": table_s} | found | {"index_kb": index_kb}
 

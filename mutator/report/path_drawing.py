@@ -3,7 +3,7 @@
 It has the colours of the page, light or dark; ways.js changes the numbers when another fault type is chosen.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator
 from html import escape
 from urllib.parse import quote
 
@@ -16,7 +16,7 @@ _WIDEST = 7.0  # px, of the line of a link that all faults got through
 _THIN = 1.8
 
 
-def draw_ways(structure: StructureModel, counts: PathCounts, links: Mapping[str, LinkModel]) -> str:
+def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
     """The SVG of a control structure; `links` are those that some fault may take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
     layout = lay_out(structure.model_copy(update={"components": plain}))
@@ -32,8 +32,9 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Mapping[str,
     for name, link in structure.links.items():
         if name not in links:
             lines += _idle(layout.arrows[name], link)
-    for name, link in links.items():
-        lines += _way(name, layout.arrows[name], link, counts)
+    for name, link in structure.links.items():
+        if name in links:
+            lines += _way(name, layout.arrows[name], link, counts)
     for name, component in plain.items():
         lines += _box(name, layout.boxes[name], component.label, component.about, counts)
     return "\n".join((*lines, "</svg>"))

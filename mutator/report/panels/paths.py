@@ -7,13 +7,13 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_ways, share_text
 from mutator.report.paths import ALL, FoundPaths, PathCounts, counts_by_fault_type
 from mutator.report.studies import ReportedRun
-from mutator.stpa.analysis import LinkModel
 from mutator.web import plainly_embedded
 
 _ABOUT = (
-    "Of the faults that were active: how many came to the start of each link of the control structure, and "
+    "Of the faults that were active: how many came to the start of each link between components, and "
     "how many got through, so that what is recorded behind it left the golden run."
 )
+_NONE_STOPPED = "None: each fault that was active changed an actuator."
 _HTML = """\
 <h2>How far faults got</h2>
 <p>{{ about }}</p>
@@ -28,18 +28,23 @@ no path. A link filters the list to the experiments that got through it, a box t
 </select> <span class="quiet" id="ways-active" role="status">{{ counts[all].active }} active</span></div>
 <div class="scroll" id="ways" tabindex="0" role="group" aria-label="Control structure">{{ figure }}</div>
 {{ data }}
-<details><summary>The same numbers as a table</summary>
+{% endif %}
+<details{{ "" if figure else " open" }}>
+<summary>{{ "The same numbers as a table" if figure else "Links" }}</summary>
 <div class="scroll"><table id="ways-table"><thead><tr><th scope="col">from</th><th scope="col">to</th>
 <th scope="col">what it carries</th><th scope="col">got through, of those that came</th></tr></thead><tbody>
-{% for name, link in links.items() %}
-<tr data-link="{{ name }}"><td>{{ label(link.from_) }}</td><td>{{ label(link.to) }}</td>
-<td>{{ link.label }}</td>
+{% for name, (tail, tip, carries) in links.items() %}
+<tr data-link="{{ name }}"><td>{{ label(tail) }}</td><td>{{ label(tip) }}</td>
+<td>{{ carries }}</td>
 <td class="number">{{ share(counts[all].through[name], counts[all].came[name]) }}</td></tr>
 {% endfor %}
 </tbody></table></div></details>
-{% endif %}
 <h3>Where faults were stopped</h3>
+{% if stops %}
 {{ stops.as_html("counts") }}
+{% else %}
+<p>{{ none_stopped }}</p>
+{% endif %}
 """
 
 
@@ -52,14 +57,12 @@ def paths_panel(run: ReportedRun) -> Panel | None:
     links = _links(paths)
     structure = paths.ways.structure
     stops = _stops(counts, paths)
-    parts = ["## How far faults got", _ABOUT]
-    if links:
-        parts.append(_table(links, counts[ALL], paths).as_markdown())
-    parts += ["### Where faults were stopped", stops.as_markdown()]
+    parts = ["## How far faults got", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
+    parts += ["### Where faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
     html = rendered(
         _HTML,
         about=_ABOUT,
-        figure=_markup(draw_ways(structure, counts[ALL], links)) if structure else None,
+        figure=_markup(draw_ways(structure, counts[ALL], links.keys())) if structure else None,
         kinds=list(counts),
         all=ALL,
         counts=counts,
@@ -68,29 +71,44 @@ def paths_panel(run: ReportedRun) -> Panel | None:
         label=paths.label,
         share=lambda through, came: share_text(through, came) or "none came",
         stops=stops,
+        none_stopped=_NONE_STOPPED,
     )
     return Panel(anchor="propagation", link="Paths", markdown="\n\n".join(parts), html=html)
 
 
-def _links(paths: FoundPaths) -> Mapping[str, LinkModel]:
-    """The links of the structure that some path has, in its order."""
-    taken = {crossing.link for path in paths.by_id.values() for crossing in path.crossings}
+Links = Mapping[str, tuple[str, str, str]]  # tail, tip, what it carries
+
+
+def _links(paths: FoundPaths) -> Links:
+    """The links that some path has, in the order of the structure."""
+    crossings = {c.link: c for path in paths.by_id.values() for c in path.crossings}
     structure = paths.ways.structure
-    return {name: link for name, link in structure.links.items() if name in taken} if structure else {}
+    known = structure.links if structure else {}
+    order = [
+        *(name for name in known if name in crossings),
+        *(name for name in crossings if name not in known),
+    ]
+    return {
+        name: (crossings[name].tail, crossings[name].tip, known[name].label if name in known else "")
+        for name in order
+    }
 
 
-def _table(links: Mapping[str, LinkModel], counts: PathCounts, paths: FoundPaths) -> Table:
+def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
     rows = [
-        (paths.label(link.from_), paths.label(link.to), link.label, share_text(counts.through[name], came))
-        for name, link in links.items()
+        (paths.label(tail), paths.label(tip), carries, share_text(counts.through[name], came))
+        for name, (tail, tip, carries) in links.items()
         if (came := counts.came[name])
     ]
     return Table(heads=("from", "to", "what it carries", "got through, of those that came"), rows=rows)
 
 
-def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table:
-    """A line for each fault type, the total last; a column for each component that stopped a fault."""
+def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
+    """A line for each fault type, the total last; a column for each component that stopped a fault. None
+    where no fault was stopped."""
     names = [name for name in paths.components if counts[ALL].stopped[name]]
+    if not names:
+        return None
     heads = ["fault type", "active", *(f"stopped at {paths.label(name)}" for name in names)]
     order = [*(kind for kind in counts if kind != ALL), ALL]
     rows: list[Sequence[str]] = [

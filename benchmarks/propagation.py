@@ -1,0 +1,63 @@
+"""What it costs to know which channels left golden: CPU of an experiment's verdict with all channels of the
+manifest, beside that with those alone that the verdict needs, and beside the CPU of the run.
+
+`python benchmarks/propagation.py [--repeat N]`. One experiment of the shipped target is driven on the
+reference engine; its trace is then loaded and compared again and again. Exit code 1 where the difference is
+more than 1 % of the run's CPU.
+"""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+from time import process_time
+
+import mutator
+from mutator.outcomes.golden import compare, load_trace
+from mutator.outcomes.judging import load_channels
+from mutator.outcomes.propagation import departures
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[1]
+GOAL = 0.01  # of the CPU of a run
+
+
+def cpu_ms(todo: Callable[[], object], repeat: int) -> float:
+    """CPU of one call."""
+    todo()
+    began = process_time()
+    for _ in range(repeat):
+        todo()
+    return 1000 * (process_time() - began) / repeat
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--repeat", type=int, default=200)
+    repeat = parser.parse_args().repeat
+    workspace = Workspace.find(root=ROOT)
+    before = getrusage(RUSAGE_CHILDREN)
+    trial = mutator.try_fault("radar/chaff", "S1", "C2", workspace=workspace)
+    after = getrusage(RUSAGE_CHILDREN)
+    run_ms = 1000 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 2  # golden, too
+    manifest, out = workspace.manifest("openpilot"), trial.folder / "faulty"
+    golden, faulty = load_channels(manifest, trial.single.golden), load_channels(manifest, out)
+    needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]
+    time = manifest.time_channel
+    parts = {
+        "load what a verdict needs": cpu_ms(lambda: load_trace(manifest, out, needed), repeat),
+        "load all channels": cpu_ms(lambda: load_channels(manifest, out), repeat),
+        "compare actuators": cpu_ms(lambda: compare(golden, faulty, manifest.compared, time), repeat),
+        "compare all channels": cpu_ms(
+            lambda: departures(golden, faulty, manifest.channels, time, None), repeat
+        ),
+    }
+    for name, ms in parts.items():
+        print(f"{name:26} {ms:8.2f} ms")
+    more = parts["load all channels"] - parts["load what a verdict needs"] + parts["compare all channels"]
+    print(f"{'the run':26} {run_ms:8.0f} ms\nmore for {len(manifest.channels)} channels: {more / run_ms:.2%}")
+    return 1 if more > GOAL * run_ms else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
