@@ -85,8 +85,11 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
     experiments = [replace(known[i % len(known)], seed=1 + i // len(known)) for i in range(size)]
     freeze(replace(plan, experiments=tuple(experiments), chunks=(size,)), out, workspace)
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": plan.digest})
+    draw = np.random.default_rng(1)
+    names = [metric.name for metric in workspace.manifest("openpilot").measures]
     for number, experiment in enumerate(experiments):
-        lines.append(asdict(record(experiment, number)))
+        metrics = tuple(zip(names, map(float, draw.normal(10.0, 5.0, len(names))), strict=True))
+        lines.append(asdict(replace(record(experiment, number), metrics=metrics)))
     lines.close()
     results.build(out)
     return experiments

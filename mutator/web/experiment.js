@@ -121,8 +121,8 @@ class Experiment {
     const name = this.text("severity"), scale = this.facts.severity;
     if (!name || !scale) return "";
     const about = scale.classes.find(([of]) => of === name)?.[2];
-    return el("p", {}, el("b", {}, `Severity ${name}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
-      about ? `, ${about}` : "", ". ", el("span.quiet", {}, `${scale.name}, ${scale.source}`));
+    return el("div", {}, el("b", {}, `Severity ${name}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
+      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Where the classes come from"), `${scale.name}: ${scale.source}`));
   }
 
   /** The metrics of this run, with their meaning. */
