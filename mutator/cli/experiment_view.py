@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mutator.api.runs import RunExperiment
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
+    from mutator.outcomes.paths import Stage
     from mutator.outcomes.rows import Row
     from mutator.workspace import Workspace
 
@@ -110,11 +111,15 @@ def print_path(terminal: Terminal, found: "RunExperiment") -> None:
     """How far the fault got, in two lines."""
     if (path := found.fault_path) is None:
         return
-    times = [f" {stage.t_first:.2f} s" if stage.t_first is not None else "" for stage in path.stages]
-    told = [f"{s.component} {s.state.value}{time}" for s, time in zip(path.stages, times, strict=True)]
-    terminal.say(f"path: {' > '.join(told)}")
+    terminal.say(f"path: {' > '.join(map(_stage, path.stages))}")
     stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
     terminal.say(f"reached: {path.reached or 'nothing that is recorded'}{stopped}")
+
+
+def _stage(stage: "Stage") -> str:
+    """`brakes reached 3.50 s`; what an injected component records may have changed by feedback alone."""
+    known = stage.t_first is not None and stage.state.value != "injected"
+    return f"{stage.component} {stage.state.value}" + (f" {stage.t_first:.2f} s" if known else "")
 
 
 def _events(record: "Record") -> list[tuple[float, str]]:

@@ -3,7 +3,7 @@ controlled process.
 
 Feedback is no part of the path, so links out of the process and those of people are left out. A component of
 the path that left golden only after the process had is taken for one that the feedback changed, where
-feedback can have come to it before.
+feedback can have come to it, and did so no later than the fault along the path.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -169,7 +169,9 @@ class Ways:
             elif name in passed or left[name] <= moved:
                 states[name] = State.REACHED
             else:
-                by_loop = not came or self._fed_back(way.fed.get(name, ()), left) < left[name]
+                back = self._fed_back(way.fed.get(name, ()), left)
+                along = min((left[f] for f in way.feeders(name) & arrived if f in left), default=inf)
+                by_loop = not came or (back <= left[name] and back <= along)
                 states[name] = State.FEEDBACK if by_loop else State.REACHED
             if states[name] in _CAME or (states[name] is State.UNSEEN and came):
                 arrived.add(name)

@@ -54,7 +54,10 @@ class ComponentModel(StrictModel, title="A component"):
     kind: Kind = Field(strict=False, description="What it is.")
     label: str = Field(description="What the drawing calls it.")
     about: str = Field(description="What it does.")
-    modules: list[str] = Field(default_factory=list, description="Its sources, files of the target.")
+    modules: list[str] = Field(
+        default_factory=list,
+        description="Its sources, files of the target: a fault in one of them begins its path here.",
+    )
     process_model: dict[str, VariableModel] = Field(
         default_factory=dict, description="Name -> variable of a controller's process model."
     )

@@ -83,7 +83,14 @@ const Path = (() => {
     return el(`div.path-box.is-${state}`, { "data-component": name, title: [`${label}. ${what}`, about, ...changed].join("\n") },
       el("strong", {}, label),
       el("span.state", {}, el("span", { "aria-hidden": "true" }, `${sign} `), word),
-      channels.length ? el("span.time", {}, seconds(first(channels)), el("span.quiet", {}, ` ${since(first(channels), begin)}`)) : "");
+      times(state, channels, begin));
+  }
+
+  /** When it was first active, or left golden. */
+  function times(state, channels, begin) {
+    const { el } = Dom;
+    if (state === "injected") return Number.isNaN(begin) ? "" : el("span.time", {}, seconds(begin));
+    return channels.length ? el("span.time", {}, seconds(first(channels)), el("span.quiet", {}, ` ${since(first(channels), begin)}`)) : "";
   }
 
   /** Every channel that left golden, also of components off the path. */

@@ -84,7 +84,7 @@ def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
     opened.page.wait_for_selector(".path-strip")
     boxes = opened.page.locator(".path-strip .path-box")
     assert [text.split("\n") for text in boxes.all_inner_texts()] == [
-        ["Sensing", "⚡ injected"],
+        ["Sensing", "⚡ injected", "1.50 s"],
         ["Control", "? not recorded"],
         ["Pedals", "● reached", "1.60 s +0.10 s"],
         ["World", "● reached", "1.70 s +0.20 s"],

@@ -173,7 +173,7 @@ def test_feedback_is_no_path() -> None:
 def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
     """The speed control left golden after the car had, and something off the path leads to it: so it and what
     it alone leads to have only been fed back to, while a branch that came first was reached."""
-    found = path("finder", "wheel", seen=1.0, angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
+    found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
         "finder": State.INJECTED,
         "wheel": State.INJECTED,
@@ -195,12 +195,20 @@ def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
     assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
 
 
-@pytest.mark.parametrize(("pace", "state"), [(1.5, State.REACHED), (1.4, State.FEEDBACK)])
-def test_feedback_cannot_come_before_its_sensor(pace: float, state: State) -> None:
-    """What leads to the speed control from off the path left golden no earlier than it: so it was the fault,
-    although the car had moved already."""
+@pytest.mark.parametrize(
+    ("left", "state"),
+    [
+        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet seen that the car moved otherwise
+        ({"pace": 1.5}, State.FEEDBACK),
+        ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault was there before
+        ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
+    ],
+)
+def test_what_came_first_decides_between_fault_and_feedback(left: dict[str, float], state: State) -> None:
+    """The car has moved already when the speed control leaves golden: what leads to it along the path changed
+    it, or what does so from off it, whichever left golden first."""
     ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
-    found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, pace=pace)
+    found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
