@@ -34,12 +34,14 @@ CHANNELS = [
 ]
 GOLDEN = Series(
     t=np.array([0.0, 0.5, 1.0]),
-    values=np.array([[0.0, 0.25, 0.5], [40.0, 30.0, math.inf]], dtype="<f4"),
+    rows=list(np.array([[0.0, 0.25, 0.5], [40.0, 30.0, math.inf]], dtype="<f4")),
+    every=[1, 1],
     about={"start": 0.0, "end": 1.0, "channels": CHANNELS},
 )
 FAULTY = Series(  # it ended after 0.5 s; between the two times gas was 1 for a step
     t=np.array([0.0, 0.5]),
-    values=np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4"),
+    rows=list(np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4")),
+    every=[1, 1],
     about={"end": 1.0},
     points=Points(
         channel=np.array([0]),
