@@ -358,9 +358,12 @@ class RunExperiment(ExperimentResult):
     def traces(self, *, exact: bool = False) -> TraceFrames:
         """Golden and faulty run as pandas frames.
 
-        A kept trace is read. Without one, and always with `exact`, the experiment is driven again, and its
-        trace is kept; that takes as long as one run. MutatorError when it has not run yet, when target,
-        templates or scenario have changed since, and when another result comes out than the campaign's.
+        They are the experiment's series: the manifest's channels, at most 20 values a second (10 of what the
+        controller believes), in single precision; a value is the newest one at its time, so what lasts for
+        less may be missed. With `exact` it is driven again, which takes as long as one run: all channels in
+        every step. So is one that has no series (left out under the budget, or of an earlier version), whose
+        series is then kept. MutatorError when it has not run yet, and, where it is driven, when target,
+        templates or scenario have changed since, or another result comes out than the campaign's.
         """
         if exact:
             trial = self.rerun(keep=True)
@@ -369,7 +372,9 @@ class RunExperiment(ExperimentResult):
                     f"{self.id} driven again is not what the campaign found", where=self.run.path
                 )
             return trial.traces()
-        golden, faulty = self._load_traces()
+        if self.record is None:
+            raise self.not_run()
+        golden, faulty = self.run._traces.sampled(self.id, drive=True)
         manifest = self._target()
         return TraceFrames(golden=trace_frame(golden, manifest), faulty=trace_frame(faulty, manifest))
 

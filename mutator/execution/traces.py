@@ -8,8 +8,10 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden import Trace, load_trace, trace_digest
+from mutator.outcomes.sampling import keep_series, sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -56,6 +58,26 @@ class Traces:
                 raise MutatorError(f"{experiment_id} driven again is not what the campaign found")
             golden = single.golden
         return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
+
+    def sampled(self, experiment_id: str, *, drive: bool = False) -> tuple[Trace, Trace]:
+        """(fault-free, faulty) of an experiment from its series: at most 20 values a second.
+
+        One without a series is driven again if `drive` says so. MutatorError where there is none, where it is
+        damaged, and where driving fails as in `of`.
+        """
+        series = SeriesFolder(self.folder.path)
+        found = series.read(experiment_id)
+        if found is None and drive:
+            traces, record = self.of(experiment_id), self.record(experiment_id)
+            keep_series(self.folder.path, self.manifest, *traces, record)
+            found = series.read(experiment_id)
+        if found is None:
+            raise MutatorError(
+                f"no series of {experiment_id}",
+                where=self.folder.path,
+                remedy=f"drive it again: `mutator rerun {experiment_id} --trace --run {self.folder.path}`",
+            )
+        return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
         """Whether the trace of the campaign's run is there, not that of another state of the sources."""

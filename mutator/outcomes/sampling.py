@@ -186,6 +186,18 @@ def _happened(record: Record) -> dict[str, Any]:
     }
 
 
+def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
+    """The runs of a series as traces with the time channel `time`: a channel that has a value at each second
+    time alone keeps it to the next."""
+    names = [str(channel["name"]) for channel in golden.about["channels"]]
+
+    def trace(run: Series) -> Trace:
+        rows = [np.repeat(row, every)[: len(run.t)] for row, every in zip(run.rows, run.every, strict=True)]
+        return {time: run.t, **dict(zip(names, rows, strict=True))}
+
+    return trace(golden), trace(faulty)
+
+
 def keep_series(run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> None:
     """Write the series of one experiment into a file of its own in the run folder `run`."""
     sampler = Sampler(manifest, golden)

@@ -10,6 +10,7 @@ from mutator.execution.traces import Traces
 from mutator.figures.figures import Drawing
 from mutator.figures.run_plot import marks_of
 from mutator.model import fault_label
+from mutator.outcomes.sampling import RATE
 from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.run_pair import draw
 from mutator.store.run_folder import RunFolder
@@ -27,9 +28,8 @@ def example_drawings(
 ) -> tuple[Drawing, ...]:
     """A drawing of each that is wanted; one without a figure says why there is none.
 
-    `frame` is of `statistics.frame.load`. Without a workspace there are no traces.
-    Experiments without a kept trace are driven again, which takes as long as a run of the target; their
-    traces are kept in the run folder.
+    `frame` is of `statistics.frame.load`. Without a workspace there are no traces. They are the experiments'
+    series: nothing is driven.
     """
     made = []
     for one in wanted:
@@ -58,7 +58,7 @@ def _drawing(folder: RunFolder, frame: pd.DataFrame, workspace: Workspace | None
     if found.empty:
         return _none(wanted, "no experiment of this run fits the query")
     if workspace is None:
-        return _none(wanted, "no fault library was found here to drive an experiment again with")
+        return _none(wanted, "no fault library was found here, which says what the channels are")
     traces = Traces(workspace, folder)
     manifest = traces.manifest
     recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
@@ -67,8 +67,9 @@ def _drawing(folder: RunFolder, frame: pd.DataFrame, workspace: Workspace | None
     looked_at = found.head(LOOKED_AT).to_dict("records")
     for number, row in enumerate(looked_at, start=1):
         record = traces.record(row["experiment_id"])
-        golden, faulty = traces.of(record.experiment_id)
-        pair = Pair.of(golden, faulty, record, manifest.time_channel, manifest.step_s, wanted.hazard)
+        golden, faulty = traces.sampled(record.experiment_id)
+        step_s = max(manifest.step_s, 1.0 / RATE)
+        pair = Pair.of(golden, faulty, record, manifest.time_channel, step_s, wanted.hazard)
         steps = wanted.look(pair)
         if steps is not None:
             return Drawing(

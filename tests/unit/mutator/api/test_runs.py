@@ -135,8 +135,9 @@ def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
     return mutator.load_run(run, workspace=toycar)
 
 
-def test_traces_are_driven_when_asked_for(driven: Run) -> None:
-    """Golden and faulty run are frames by time with units; the latter is driven again, once, and kept."""
+def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
+    """Golden and faulty run are frames by time with units. Without a series the experiment is driven again,
+    once; exact ones are driven each time, and have all channels in double precision."""
     [name] = driven.results.index
     golden = driven.golden("A")
     assert (golden.index.name, len(golden)) == ("time", 120)
@@ -144,15 +145,19 @@ def test_traces_are_driven_when_asked_for(driven: Run) -> None:
     assert not (driven.path / "traces").exists()
     experiment = driven.experiment(name[:6])
     traces = experiment.traces()
-    assert traces.golden.equals(golden)
-    assert list(traces.faulty.columns) == list(golden.columns)
+    channels = ["gas", "brake", "wheel_turn", "gap", "speed"]
+    assert list(traces.faulty.columns) == list(traces.golden.columns) == channels
+    assert (traces.golden == golden[channels].astype("f4")).all(axis=None)
+    assert traces.golden.attrs["units"]["speed"] == "m/s"
     assert traces.difference["wheel_turn"].abs().max() > 0.0
     kept = driven.path / "traces" / name / "faulty" / "log.npz"
     assert kept.is_file()
     before = kept.stat().st_mtime_ns
     assert experiment.traces().faulty.equals(traces.faulty)
     assert kept.stat().st_mtime_ns == before
-    assert experiment.traces(exact=True).faulty.equals(traces.faulty)
+    exact = experiment.traces(exact=True)
+    assert exact.golden.equals(golden) and list(exact.faulty.columns) == list(golden.columns)
+    assert (exact.faulty[channels].astype("f4") == traces.faulty).all(axis=None)
     assert kept.stat().st_mtime_ns > before
 
 

@@ -14,6 +14,7 @@ from mutator.execution.running import run_campaign
 from mutator.figures.figures import Drawing, write_drawings
 from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.examples import candidates, example_drawings
+from mutator.report import building
 from mutator.statistics.frame import load
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -35,12 +36,10 @@ BRAKE = Wanted(
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A toy car's place with a run of shifted lanes, of which one was driven again for its trace."""
+    """A toy car's place with a run of shifted lanes."""
     place = tmp_path_factory.mktemp("driven")
     only = Choices(only='fault_type == "lane"')
     assert run_campaign(copy_toycar(place), "small", place / "run", choices=only).exit_code == 0
-    assert not (place / "run" / "traces").exists()
-    drawn(place, BRAKE)
     return place
 
 
@@ -65,13 +64,13 @@ def edit_target(place: Path) -> None:
         file.write("\n# edited\n")
 
 
-def test_an_experiment_is_found_driven_again_and_drawn(driven: Path) -> None:
+def test_an_experiment_is_found_and_drawn(driven: Path) -> None:
     """The figure has a panel per recorded channel with its unit, the marks, both lines and the shade; its
-    note tells the experiment, and its codes the query and how to see more."""
+    note tells the experiment, and its codes the query and how to see more. Nothing is driven."""
     drawing = drawn(driven, BRAKE)
-    [name] = [path.name for path in (driven / "run" / "traces").iterdir()]
-    assert name in drawing.note
+    [name] = [name for name in RunFolder.open(driven / "run").records() if name in drawing.note]
     assert [code for _, code in drawing.codes] == [BRAKE.query, f"mutator show {name} --run DIR"]
+    assert not (driven / "run" / "traces").exists()
     assert drawing.figure is not None
     brake, gap = drawing.figure.axes
     assert (brake.get_ylabel(), gap.get_ylabel()) == ("brake [-]", "distance [m]")
@@ -81,8 +80,23 @@ def test_an_experiment_is_found_driven_again_and_drawn(driven: Path) -> None:
     assert (len(brake.patches), len(gap.patches)) == (1, 0)
 
 
-def test_a_kept_trace_is_enough(place: Path, tmp_path: Path) -> None:
-    """Drawn again after the target was edited, from the kept trace, it is the same file."""
+def test_a_report_drives_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is written anew, with the figures of its study, where no process can be started."""
+
+    def start(*words: object, **keywords: object) -> None:
+        raise AssertionError("a report started a process")
+
+    monkeypatch.setattr("subprocess.Popen", start)
+    monkeypatch.setattr("mutator.execution.single_run.run_single", start)
+    workspace = Workspace.find(root=place / "toy")
+    report = building.write(place / "run", workspace)
+    assert '"packed": true' in report.page.read_text()
+    assert drawn(place, BRAKE).figure is not None
+    assert not (place / "run" / "traces").exists()
+
+
+def test_a_series_is_enough(place: Path, tmp_path: Path) -> None:
+    """Drawn again after the target was edited, it is the same file."""
     contents = []
     for _ in range(2):
         write_drawings([drawn(place, BRAKE)], tmp_path)
@@ -91,31 +105,26 @@ def test_a_kept_trace_is_enough(place: Path, tmp_path: Path) -> None:
     assert contents[0] == contents[1]
 
 
-def test_what_cannot_be_driven_again_is_said(place: Path, tmp_path: Path) -> None:
-    """An edited target, one that is gone, no library at all: a sentence each, and no picture is left over."""
+def test_what_cannot_be_drawn_is_said(place: Path, tmp_path: Path) -> None:
+    """No series, a damaged one, a target that is gone, no library at all: a sentence each, and no picture is
+    left over."""
     for kind in ("svg", "png"):
         (tmp_path / "figures").mkdir(exist_ok=True)
         (tmp_path / "figures" / f"brake.{kind}").touch()
-    shutil.rmtree(place / "run" / "traces")
-    edit_target(place)
-    edited = drawn(place, BRAKE)
-    assert "changed since this run was planned: target" in edited.note
-    write_drawings([edited], tmp_path)
+    series = place / "run" / "series"
+    for path in series.glob(f"{16 * '[0-9a-f]'}.js"):
+        path.write_bytes(path.read_bytes()[:-40])
+    assert "damaged" in drawn(place, BRAKE).note
+    shutil.rmtree(series)
+    without = drawn(place, BRAKE)
+    assert "no series of " in without.note
+    write_drawings([without], tmp_path)
     assert list((tmp_path / "figures").iterdir()) == []
     shutil.rmtree(place / "toy" / "tree")
     assert drawn(place, BRAKE).note.startswith("No figure: ")
     run = place / "run"
     [nowhere] = example_drawings(RunFolder.open(run), load(run / "results.csv"), None, [BRAKE])
     assert "no fault library" in nowhere.note
-
-
-def test_a_trace_of_another_run_is_not_drawn(place: Path) -> None:
-    """A kept trace that is not of the campaign's run is made anew."""
-    [trace] = (place / "run" / "traces").glob("*/faulty/log.npz")
-    right = trace.read_bytes()
-    trace.write_bytes(right[:-1])
-    assert drawn(place, BRAKE).figure is not None
-    assert trace.read_bytes() == right
 
 
 def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
@@ -132,11 +141,10 @@ def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
     assert "not to be seen in the first" in none.note
 
 
-def test_a_query_that_finds_nothing_drives_nothing(place: Path) -> None:
+def test_a_query_that_finds_nothing_is_said(place: Path) -> None:
     """The report says so; so it does of a target without the actuator."""
     assert "no experiment of this run fits" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
-    assert len(list((place / "run" / "traces").iterdir())) == 1  # the one that was kept
 
 
 def test_candidates_come_largest_first_then_by_id() -> None:
