@@ -53,8 +53,10 @@ const Replay = (() => {
       this.states = el("span.states");
       this.live = el("p.visually-hidden", { "aria-live": "polite" });
       this.root = el("div.replay-player", { role: "group", "aria-label": "Replay. Space plays, arrows step, Shift and an arrow goes a second.",
-        onkeydown: (event) => this.#key(event), onpointerdown: ({ target }) => {
-          if (!target.closest("button, select")) this.bar.element.focus({ preventScroll: true }); // for the keys
+        onkeydown: (event) => this.#key(event), onpointerdown: (event) => {
+          if (!event.target.matches("canvas")) return;
+          if (event.pointerType === "mouse") event.preventDefault(); // or the focus would go to the page
+          this.bar.element.focus({ preventScroll: true }); // for the keys
         } },
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
         this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,

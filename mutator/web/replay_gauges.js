@@ -44,7 +44,7 @@ class ReplayGauges {
     if (!isWritten) return;
     const [text, other] = [now, before].map((value) => ReplayData.text(value, places));
     faulty.textContent = text;
-    golden.textContent = text === other ? "" : `golden ${other}`;
+    golden.replaceChildren(...(text === other ? [] : [Dom.el("span.visually-hidden", {}, "golden "), other]));
     button.classList.toggle("differs", text !== other);
   }
 

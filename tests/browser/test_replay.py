@@ -277,7 +277,7 @@ def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
     print(f"replay: {rate:.0f} frames a second")
     assert replayed.t == END
     assert rate > 0
-    replayed.press(" ")
+    replayed.page.click("canvas.scene")
     assert replayed.page.evaluate("player.clock.isPlaying")
     replayed.page.wait_for_function(f"{T} > {END}")
     replayed.press(" ")

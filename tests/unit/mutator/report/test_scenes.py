@@ -1,0 +1,28 @@
+"""What the page gets of a target's scene."""
+
+from collections.abc import Iterator
+
+from mutator.report.scenes import scene_facts
+from mutator.triggers.trees import Tree
+from mutator.workspace import Workspace
+
+
+def names(tree: Tree) -> Iterator[str]:
+    """The channels that a tree is of."""
+    if isinstance(tree, str):
+        yield tree
+    elif isinstance(tree, list):
+        for part in tree[1:]:
+            yield from names(part)
+
+
+def test_the_shipped_scene_is_of_channels() -> None:
+    """Every formula of it is over channels of the target; it follows an actor that is always in sight."""
+    manifest = Workspace.find().manifest("openpilot")
+    scene = scene_facts(manifest)
+    assert scene is not None
+    trees = [actor[key] for actor in scene["actors"] for key in ("x", "y", "heading", "visible")]
+    used = {name for tree in (*trees, scene["speed"]) for name in names(tree)}
+    assert {"d_rel", "v_ego", "lateral_offset"} <= used <= {channel.name for channel in manifest.channels}
+    [followed] = [actor for actor in scene["actors"] if actor["name"] == scene["follow"]]
+    assert followed["visible"] is True
