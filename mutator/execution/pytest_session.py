@@ -94,7 +94,10 @@ class LazyWorker:
 def configure(
     config: pytest.Config, campaign: str, out: Path, *, reviewed: bool, accept_versions: bool
 ) -> None:
-    """Put the plugin of this process's role in place."""
+    """Put the plugin of this process's role in place. Whatever the user's configuration says of files, each
+    worker takes the next piece of work."""
+    if getattr(config.option, "dist", "no") != "no":
+        config.option.dist = "load"
     given = getattr(config, "workerinput", {}).get(_INPUT)
     if given is not None:
         config.pluginmanager.register(WorkerSide(config, given, config.workerinput["workerid"]))  # type: ignore[attr-defined]
@@ -271,7 +274,12 @@ def _told(config: pytest.Config) -> Notify | None:
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or config.get_verbosity() < 0:
         return None
-    return Lines(reporter.write_line)
+
+    def write(line: str) -> None:
+        reporter.ensure_newline()
+        reporter.write_line(line)
+
+    return Lines(write)
 
 
 def _lines(summary: Summary) -> list[str]:

@@ -6,6 +6,7 @@ runs observe is kept by their null mutants, whose runs are the same.
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from inspect import signature
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -29,13 +30,16 @@ Arming = tuple[float, Callable[..., bool]]  # when a trigger is armed (s), and i
 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
     """Keep what the golden run `key` observed in `folder`."""
-    (folder / FOLDER).mkdir(parents=True, exist_ok=True)
-    np.save(folder / FOLDER / f"{key}.npy", np.array(list(seen), dtype=float))
+    path = folder / FOLDER / f"{key}.npy"
+    path.parent.mkdir(parents=True, exist_ok=True)  # scenarios may lie in folders
+    np.save(path, np.array(list(seen), dtype=float))
 
 
 def read_observed(folder: Path) -> dict[str, Observed]:
     """What the golden runs observed, by their keys; without those that are not kept in `folder`."""
-    return {path.stem: np.load(path) for path in (folder / FOLDER).glob("*.npy")}
+    base = folder / FOLDER
+    found = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
+    return {name.removesuffix(".npy"): np.load(path) for name, path in found.items()}
 
 
 def arming(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Arming:
@@ -49,6 +53,11 @@ def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
     """Whether a trigger holds in one of these observations."""
     armed_t, condition = trigger
     return any(row[0] >= armed_t and condition(*row) for row in rows)
+
+
+def _fits(trigger: Arming, observed: Observed) -> bool:
+    """Whether the condition is over what is observed: templates of before ask for derived values, too."""
+    return len(signature(trigger[1]).parameters) == len(observed.T)
 
 
 def remarks(
@@ -74,7 +83,9 @@ def remarks(
         if (key, trigger) not in known:
             if trigger not in armings:
                 armings[trigger] = arming(workspace, manifest, trigger)
-            known[key, trigger] = holds(armings[trigger], observed[key].tolist())
+            known[key, trigger] = not _fits(armings[trigger], observed[key]) or holds(
+                armings[trigger], observed[key].tolist()
+            )
         if not known[key, trigger]:
             never[f"{trigger.name} in {experiment.scenario}"] += 1
     return list(_sentences(total, late, never))

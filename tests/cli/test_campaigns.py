@@ -190,7 +190,7 @@ def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
 
     While it runs, a second command in the same folder is refused.
     """
-    words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "12"]
+    words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "6"]
     command = [sys.executable, "-m", "mutator", *words]
     unchecked = str(root / "no-cache")  # so there is time for the second command, during the checks
     environment = os.environ | {"MUTATOR_ROOT": str(root), "XDG_CACHE_HOME": unchecked}
@@ -205,11 +205,11 @@ def test_an_interrupted_run_says_how_to_go_on(root: Path) -> None:
     assert second.returncode == 2
     assert "in use" in second.stderr
     assert process.returncode == 130
-    assert "go on: mutator run toy --out runs/cut -n 0 --limit 12" in out + err
+    assert "go on: mutator run toy --out runs/cut -n 0 --limit 6" in out + err
     assert "Traceback" not in err
     again = mutator(root, *words)
     assert again.returncode == 0
-    assert "12 of 12 experiments done" in again.stdout
+    assert "6 of 6 experiments done" in again.stdout
 
 
 def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:

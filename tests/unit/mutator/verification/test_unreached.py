@@ -50,9 +50,9 @@ def test_what_never_holds_is_told(
 def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
     """Observations come back as they were, by the keys of their golden runs; without any there are none."""
     assert read_observed(tmp_path) == {}
-    write_observed(tmp_path, "A+alone", SEEN)
+    write_observed(tmp_path, "town/A+alone", SEEN)
     assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
-        "A+alone": [list(row) for row in SEEN]
+        "town/A+alone": [list(row) for row in SEEN]
     }
 
 
