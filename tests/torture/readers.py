@@ -26,7 +26,9 @@ TABLES = (
     "propagation.parquet",
     "timings.parquet",
 )  # verified if they are there
-HOW = re.compile(r"^## How the experiments were run$.*?^(?=## )", re.MULTILINE | re.DOTALL)  # of a report
+HOW = re.compile(  # of a report
+    r"^## (How the experiments were run|Where the time went)$.*?^(?=## )", re.MULTILINE | re.DOTALL
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
