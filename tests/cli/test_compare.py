@@ -137,3 +137,11 @@ def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
     for folder in (".", "after"):
         refused = cli("export", after, "--format", "csv", "--out", folder)
         assert (refused.code, "expected: a file to write" in refused.err) == (2, True)
+
+
+def test_a_gate_on_severity_needs_classes(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """Of a target without severity nobody can say that a contact got worse: that is wrong input."""
+    answer = cli("compare", *runs, "--fail-on", "severity:S2")
+    assert answer.code == 2
+    assert "has no classes of severity" in answer.err
+    assert "severity:S2" in cli("compare", *runs, "--fail-on", "severity:S9").err
