@@ -1,4 +1,4 @@
-"""A run's channels as its series, in single precision: at most 20 values a second, 10 of what the controller
+"""A run's channels as its series, six digits each: at most 20 values a second, 10 of what the controller
 believes.
 
 A value is the newest one at its time, so what lasts for less than 50 ms may fall between two. So each
@@ -21,6 +21,7 @@ from mutator.targets.manifest import TargetManifest
 
 RATE = 20.0  # samples a second, at most
 _EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # which of them a channel has
+_HALF = np.uint32(8)  # of the lowest bit that is kept
 _TINY = 1e-9  # s; times are sums of steps
 
 
@@ -69,6 +70,16 @@ class Sampler:
 
     def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
         """Whether a channel (row) has a sample in a step (column)."""
+        if count == len(self._time) and len(at) == len(self._at):
+            return self._usual
+        return self._marked(count, at)
+
+    @cached_property
+    def _usual(self) -> np.ndarray:
+        """That of a run that is as long as golden."""
+        return self._marked(len(self._time), self._at)
+
+    def _marked(self, count: int, at: np.ndarray) -> np.ndarray:
         sampled = np.zeros((len(self._every), count), dtype=bool)
         for row, every in zip(sampled, self._every, strict=True):
             row[at[::every]] = True
@@ -124,10 +135,13 @@ def _filled(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _single(values: np.ndarray) -> np.ndarray:
+    """In single precision, rounded to six digits (20 bits): the last ones would take a tenth of the room."""
     with np.errstate(over="ignore"):  # too large for single precision: infinite
         single = values.astype("<f4")
+        words = (single.view("<u4") + _HALF) & ~np.uint32(2 * _HALF - 1)
+    finite = np.isfinite(single)
     single[np.isnan(single)] = np.nan  # one pattern of bits
-    return single
+    return np.where(finite, words.view("<f4"), single)
 
 
 def _points(
@@ -138,16 +152,15 @@ def _points(
     end: int,
     t_end: float | None,
 ) -> Points:
-    """The steps between the `sampled` ones that each channel keeps; `end` is the last that both runs
-    have."""
+    """The steps between the `sampled` ones that each channel keeps; `end` is the last that both runs have."""
     golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
     drive = end + 1 if t_end is None else int(np.searchsorted(time, t_end + _TINY, side="right"))
     found: list[tuple[int, int]] = []
-    unlike = (golden != faulty) & ~(np.isnan(golden) & np.isnan(faulty))
-    for row in np.flatnonzero(unlike.any(axis=1)).tolist():
-        gap = _gap(golden[row], faulty[row])
-        steps = {int(np.argmax(unlike[row])), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
-        found += [(row, step) for step in sorted(steps) if unlike[row, step] and not sampled[row, step]]
+    for row in np.flatnonzero((golden != faulty).any(axis=1)).tolist():
+        gap = _gap(golden[row], faulty[row])  # row by row, as all rows do not fit into a cache
+        apart = gap > 0.0
+        steps = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
+        found += [(row, step) for step in sorted(steps) if apart[step] and not sampled[row, step]]
     rows, places = np.array(found, dtype=int).reshape(-1, 2).T
     one, other = _single(golden[rows, places]), _single(faulty[rows, places])
     shown = one.view("<u4") != other.view("<u4")
@@ -158,9 +171,11 @@ def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
     """How far two runs are apart in each step: 0 where both are the same or have no value, infinite where one
     has none."""
     with np.errstate(invalid="ignore", over="ignore"):
-        gap = np.where(golden == faulty, 0.0, np.abs(faulty - golden))
-    gap[np.isnan(gap)] = np.inf
-    gap[np.isnan(golden) & np.isnan(faulty)] = 0.0
+        gap: np.ndarray = np.abs(faulty - golden)
+    odd = np.isnan(gap)
+    if odd.any():
+        same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))
+        gap[odd] = np.where(same[odd], 0.0, np.inf)
     return gap
 
 
