@@ -17,8 +17,10 @@ Bytes = dict[str, bytes]
 
 
 def results(out: Path) -> Bytes:
-    """The results table of a run folder, as bytes."""
-    return {name: (out / name).read_bytes() for name in DERIVED}
+    """The results tables and the packed series of a run folder, as bytes."""
+    series = {path.name: path.read_bytes() for path in (out / "series").iterdir()}
+    assert "index.js" in series
+    return series | {name: (out / name).read_bytes() for name in DERIVED}
 
 
 def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
