@@ -107,8 +107,9 @@ def a_patch(run: Path, deep: bool) -> None:
 
 def put_patch(run: Path, name: str, data: bytes) -> None:
     found = Patches(run)
-    [path] = found.files()
-    patches = {other: found.read(other) or b"" for other in found} | {name: data}
+    path = found.file(name) if name in set(found) else found.files()[0]  # each worker has one
+    kept = {other: found.read(other) or b"" for other in found if found.file(other) == path}
+    patches = kept | {name: data}
     rewrite_patches(path, patches.items())
 
 
@@ -255,7 +256,7 @@ def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:
     name = hazardous(genuine)[2]["experiment_id"]
     out = run.parent
     return {
-        "run": ("run", campaign, "--out", run),
+        "run": ("run", campaign, "--out", run, "-n", "0"),
         "report": ("report", run),
         "show": ("show", name, "--run", run, "--no-plot"),
         "rerun": ("rerun", name, "--run", run),
