@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.chunks import Pending
-from mutator.execution.pytest_session import Controller
+from mutator.execution.pytest_session import Controller, configure
 from mutator.workspace import Workspace
 
 
@@ -78,6 +78,17 @@ def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
     again = pytest_campaign(toy, *words, "-n", "2")
     assert again.returncode == 0, again.stdout
     assert "12 of 12 experiments done, 0 now" in again.stdout
+
+
+@pytest.mark.parametrize(("given", "used"), [("loadfile", "load"), ("load", "load"), ("no", "no")])
+def test_work_is_dealt_out_piece_by_piece(tmp_path: Path, given: str, used: str) -> None:
+    """Chunks have one name for a file: a user's `--dist loadfile` would give all of them to one worker."""
+    registered: list[object] = []
+    manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
+    config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
+    configure(config, "small", tmp_path, reviewed=False, accept_versions=False)
+    assert config.option.dist == used
+    assert len(registered) == 1
 
 
 class Counting:
