@@ -359,7 +359,7 @@ class RunExperiment(ExperimentResult):
         """Golden and faulty run as pandas frames.
 
         They are the experiment's series: the manifest's channels, at most 20 values a second (10 of what the
-        controller believes), in single precision; a value is the newest one at its time, so what lasts for
+        controller believes), to six digits; a value is the newest one at its time, so what lasts for
         less may be missed. With `exact` it is driven again, which takes as long as one run: all channels in
         every step. So is one that has no series (left out under the budget, or of an earlier version), whose
         series is then kept. MutatorError when it has not run yet, and, where it is driven, when target,

@@ -237,8 +237,8 @@ def open_session(
             raise
         digests.close_segments(folder.path)
         remove_folder(folder.work)
-        # not everywhere: there may be thousands of patches
-        written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in ("plan", "report")))
+        folders = ("plan", "report", "series", "patches")
+        written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
         for path in chain(*written):
             if is_half_written(path.name):
                 path.unlink()

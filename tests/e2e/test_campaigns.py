@@ -109,13 +109,14 @@ def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
 
 def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path) -> None:
     """The next command deletes it wherever the harness writes, and touches nothing else."""
-    left = [finished / place for place in (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7")]
+    places = (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7", "series/.index.js.7")
+    left = [finished / place for place in places]
     mine = finished / "report" / "tables" / ".notes"
     (finished / "report" / "tables").mkdir(parents=True)
     for path in (*left, mine):
         path.touch()
     assert run_campaign(toy, "small", finished).ran == 0
-    assert [path.exists() for path in (*left, mine)] == [False, False, False, True]
+    assert [path.exists() for path in (*left, mine)] == [False, False, False, False, True]
 
 
 @pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
