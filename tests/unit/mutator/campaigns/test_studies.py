@@ -45,14 +45,19 @@ def test_the_study_that_ships_is_installed() -> None:
 
 
 def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path: Path) -> None:
-    """The example of the how-to page works as it stands: its panel is in both forms, with its source."""
+    """The example of the how-to page works as it stands: both forms of its page have its panel and source."""
     run = tmp_path / "run"
     run.mkdir()
     written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
-    for text in (written.markdown.read_text(), written.page.read_text()):
+    page = written.page.with_name("study.html").read_text()
+    for text in (written.markdown.with_name("STUDY.md").read_text(), page):
         assert "Crashed runs: 1 here, 12 in the published tests." in text
+        assert "A. Author: Crash tests, 2026." in text
+    for text in (written.markdown.read_text(), written.page.read_text()):
         assert "crash_tests (A. Author: Crash tests, 2026)" in text
-    assert '<a href="#crash-tests">Crash tests</a>' in written.page.read_text()
+    assert '<a href="#crash-tests">Crash tests</a>' in page
+    assert 'href="study.html"' in written.page.read_text()
+    assert "(STUDY.md)" in written.markdown.read_text()
 
 
 def test_what_is_not_there_is_refused_with_what_is(installed: None) -> None:
