@@ -3,7 +3,8 @@ believes.
 
 A value is the newest one at its time, so what lasts for less than 50 ms may fall between two. So each
 channel that differs keeps more points: the first step that differs, those of the largest difference in the
-drive and in the whole run, and the last step of a run that ended early.
+drive and in the whole run, and the last step of a run that ended early. And every channel keeps the steps in
+which a hazard first came, so that a replay shows there what the hazard was judged by.
 """
 
 from functools import cached_property
@@ -65,7 +66,7 @@ class Sampler:
             rows=self._rows(values[:, at]),
             every=self._every,
             about=_happened(record) | {"end": float(max(self._time[-1], last))},
-            points=_points(time, golden, values, self._sampled(len(time), at), end, record.t_end),
+            points=_points(time, golden, values, self._sampled(len(time), at), end, record),
         )
 
     def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
@@ -150,21 +151,30 @@ def _points(
     faulty: np.ndarray,
     sampled: np.ndarray,
     end: int,
-    t_end: float | None,
+    record: Record,
 ) -> Points:
     """The steps between the `sampled` ones that each channel keeps; `end` is the last that both runs have."""
     golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
-    drive = end + 1 if t_end is None else int(np.searchsorted(time, t_end + _TINY, side="right"))
+    drive = end + 1 if record.t_end is None else _until(time, record.t_end)
+    hazards = {_until(time, t) - 1 for _, t in record.hazards} & set(range(end + 1))
     found: list[tuple[int, int]] = []
-    for row in np.flatnonzero((golden != faulty).any(axis=1)).tolist():
-        gap = _gap(golden[row], faulty[row])  # row by row, as all rows do not fit into a cache
-        apart = gap > 0.0
-        steps = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
-        found += [(row, step) for step in sorted(steps) if apart[step] and not sampled[row, step]]
+    for row, differs in enumerate((golden != faulty).any(axis=1).tolist()):
+        steps = set(hazards)
+        if differs:
+            gap = _gap(golden[row], faulty[row])  # row by row, as all rows do not fit into a cache
+            apart = gap > 0.0
+            peaks = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
+            steps |= {step for step in peaks if apart[step]}
+        found += [(row, step) for step in sorted(steps) if not sampled[row, step]]
     rows, places = np.array(found, dtype=int).reshape(-1, 2).T
     one, other = _single(golden[rows, places]), _single(faulty[rows, places])
-    shown = one.view("<u4") != other.view("<u4")
+    shown = (one.view("<u4") != other.view("<u4")) | np.isin(places, list(hazards))
     return Points(channel=rows[shown], t=time[places[shown]], golden=one[shown], faulty=other[shown])
+
+
+def _until(time: np.ndarray, t: float) -> int:
+    """How many steps there are up to a time, which counts too."""
+    return int(np.searchsorted(time, t + _TINY, side="right"))
 
 
 def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:

@@ -96,6 +96,22 @@ def test_what_is_not_a_number_stays_what_it_is(
     assert first[3] == pytest.approx(3.4e38)
 
 
+def test_the_step_of_a_hazard_is_kept_of_every_channel(
+    manifest: TargetManifest, record: Callable[..., Record]
+) -> None:
+    """A hazard between two samples is judged by values that a look at its time must show: also those of
+    channels that equal golden there. One after the end of either run has no such step."""
+    speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
+    one = Sampler(manifest, trace(speed=T, gap=gap))
+    hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # at 3.00 s there is a sample
+    points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].points
+    there = points.t == 2.52
+    assert points.channel[there].tolist() == [0, 1, 2, 3, SPEED]
+    assert points.faulty[there] == pytest.approx([0, 0, 0, 6.48, 5.04], rel=1e-6)
+    assert points.golden[there] == pytest.approx([0, 0, 0, 6.48, 2.52], rel=1e-6)
+    assert not np.isin(points.t, [3.0, 7.0]).any()
+
+
 def test_a_run_that_ends_early_has_no_values_afterwards_and_keeps_its_last_step(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
