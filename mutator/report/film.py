@@ -50,7 +50,8 @@ def film_experiment(
                 remedy="choose an experiment that drives",
             )
         events = folder / "events.json"
-        events.write_text(json.dumps(_events(single.record, title, _hazards(workspace))), encoding="utf-8")
+        names = _hazards(workspace, manifest)
+        events.write_text(json.dumps(_events(single.record, title, names)), encoding="utf-8")
         places = {
             "golden": str(single.golden / FILM),
             "faulty": str(single.faulty / FILM),
@@ -61,11 +62,13 @@ def film_experiment(
     return same
 
 
-def _hazards(workspace: Workspace) -> dict[str, str]:
-    """Each hazard in a few words, if the library describes any: what is before the first bracket."""
+def _hazards(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
+    """Each hazard in a few words: as the manifest says how it is found; where that says nothing, as the
+    hazard analysis does, up to the first bracket."""
     known = workspace.hazards()
     about = known.hazards if known else {}
-    return {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
+    names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
+    return names | {rule.name: rule.about for rule in manifest.rules if rule.about}
 
 
 def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, object]:
