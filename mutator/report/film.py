@@ -50,7 +50,7 @@ def film_experiment(
                 remedy="choose an experiment that drives",
             )
         events = folder / "events.json"
-        names = _hazards(workspace, manifest)
+        names = hazards_in_words(workspace, manifest)
         events.write_text(json.dumps(_events(single.record, title, names)), encoding="utf-8")
         places = {
             "golden": str(single.golden / FILM),
@@ -62,7 +62,7 @@ def film_experiment(
     return same
 
 
-def _hazards(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
+def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
     """Each hazard in a few words: as the manifest says how it is found; where that says nothing, as the
     hazard analysis does, up to the first bracket."""
     known = workspace.hazards()
