@@ -64,6 +64,12 @@ def test_every_experiment_ends_well(run: Path) -> None:
     assert len({row["outcome"] for row in rows(run)} & {"hazard", "sdc"}) == 2
 
 
+def test_only_a_contact_has_a_contact_speed(run: Path) -> None:
+    """A car that leaves the road hits nothing: it has neither contact speed nor delta-v."""
+    contacts = [(row.get("contact_speed", ""), row.get("delta_v", "")) for row in rows(run)]
+    assert all(bool(speed) == bool(delta_v) for speed, delta_v in contacts)
+
+
 def test_nearly_all_are_forked(run: Path) -> None:
     """Of the experiments that do not crash, at least 95 % are forks of the golden run."""
     ended = {row["experiment_id"] for row in rows(run) if row["status"] == "ok"}
