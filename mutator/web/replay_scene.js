@@ -170,13 +170,13 @@ class ReplayScene {
     return Boolean(active) && this.t >= active[0] - ReplayData.TINY && this.t <= active[1] + ReplayData.TINY;
   }
 
-  /** The names of what is there; of the golden run's followed actor, where it is when it is out of sight. */
+  /** The names of what is there; of what the controller believes, and of the golden run's followed actor, where they are when out of sight. */
   #names(faulty, golden) {
     const { colours, width, view } = this;
     for (const pose of faulty) {
       const above = this.#y(pose.y) - (pose.actor.shape === "circle" ? pose.actor.length : pose.actor.width) / 2 * view.scale;
       const name = pose.actor.name.replaceAll("_", " ");
-      if (pose.actor.believed) this.#label(name, this.#x(pose.x), above + pose.actor.width * view.scale + 16, colours.belief, "center");
+      if (pose.actor.believed) this.#believed(pose, name, above + pose.actor.width * view.scale + 16, faulty.find(this.#isOwn));
       else this.#label(name, this.#x(pose.x), above - 7, colours.ink, "center");
     }
     const own = golden.find(({ actor }) => actor.name === this.tracks.scene.follow), here = faulty.find(({ actor }) => actor === own?.actor);
@@ -184,6 +184,13 @@ class ReplayScene {
     const x = this.#x(own.x), by = Math.abs(own.x - here.x).toFixed(0), y = this.#y(own.y) + 4;
     if (x > width) this.#label(`golden ${by} m ahead ▶`, width - 8, y, colours.goldenText, "right");
     else if (x < 0) this.#label(`◀ golden ${by} m behind`, 8, y, colours.goldenText);
+  }
+
+  /** The name of what the controller believes; out of sight ahead, how much free road it sees to there. */
+  #believed(pose, name, y, own) {
+    const { colours, width } = this, by = own ? (pose.x - own.x - (pose.actor.length + own.actor.length) / 2).toFixed(0) : null;
+    if (own && this.#x(pose.x - pose.actor.length / 2) > width) this.#label(`${name} ${by} m ahead ▶`, width - 8, y, colours.belief, "right");
+    else this.#label(name, this.#x(pose.x), y, colours.belief, "center");
   }
 
   /** A star where the drive ended. */

@@ -267,6 +267,20 @@ def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
     assert not vivid(replayed.pixels(room))
 
 
+def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) -> None:
+    """A ghost 170 m ahead is beyond the view; that it is there, and how far, must be seen all the same."""
+    ghost = ACTOR | {"name": "believed_lead", "x": 172.0, "believed": True}
+    replayed.show(FACTS | {"scene": SCENE | {"actors": [*SCENE["actors"], ghost]}})
+    replayed.page.evaluate("""() => {
+        window.written = [];
+        const paper = document.querySelector("canvas.scene").getContext("2d"), write = paper.fillText;
+        paper.fillText = (text, ...place) => (window.written.push(text), write.call(paper, text, ...place));
+    }""")
+    seek(replayed, 2.5)
+    assert "believed lead 170 m ahead ▶" in replayed.page.evaluate("written")
+    replayed.show(FACTS)
+
+
 def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
     """It pauses at the end of the drive, and goes on if asked to; its frame rate is said."""
     replayed.show(FACTS)
