@@ -121,6 +121,8 @@ class ForkEngine:
             first = self._running().first
             first.load(_needed(swap), self._patience_s)
             return self._become(first, job, folder, swap, _FROM_THE_START)
+        if job.stop and job.golden_ends:
+            raise Refused("a terminal hazard ends its golden run")
         start = first_active(swap.probe, self._observed(job, job.golden))
         if start is None:
             return _golden(job, job.golden)

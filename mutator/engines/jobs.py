@@ -39,6 +39,7 @@ class Job:
     golden: Path | None = None  # output folder of the run without the fault, where it is known
     observe: bool = False  # keep what the probe observes
     stop: bool = False  # end it at its first terminal hazard
+    golden_ends: bool = False  # one is in its golden run, too
     watch: bool = False  # the same as `observe`, and note calls that keep a target from being deterministic
 
     def problem_of(self, report: object) -> str:

@@ -54,6 +54,7 @@ class Goldens:
         self._folder_of = folder_of
         self._traces: dict[tuple[str, tuple[str, ...]], Trace] = {}
         self._samplers: dict[str, Sampler] = {}
+        self._ends: dict[tuple[str, tuple[str, ...]], bool] = {}
 
     def folder(self, experiment: Experiment) -> Path:
         """Where the run without the fault left its files."""
@@ -65,6 +66,14 @@ class Goldens:
             folder = self.folder(experiment)
             self._traces[key] = load_channels(self._manifest, folder)
         return self._traces[key]
+
+    def ends(self, experiment: Experiment) -> bool:
+        """Whether a terminal hazard is in the golden run of an experiment."""
+        key = (experiment.scenario, experiment.changes)
+        if key not in self._ends:
+            _, judged = load_judged(self._manifest, self.folder(experiment))
+            self._ends[key] = judged.t_end is not None
+        return self._ends[key]
 
     def sampler(self, experiment: Experiment) -> Sampler:
         """What makes the series of runs that are compared with the golden run of an experiment."""
@@ -125,6 +134,7 @@ class Runner:
         yield from refused
 
     def _job(self, experiment: Experiment, built: Mutant) -> Job:
+        stop = experiment.after_hazard is AfterHazard.STOP
         return Job(
             name=experiment.id,
             scenario=self.scenario_file(experiment.scenario),
@@ -134,7 +144,8 @@ class Runner:
             mutant=built.id,
             injections=built.injections,
             golden=self.goldens.folder(experiment),
-            stop=experiment.after_hazard is AfterHazard.STOP,
+            stop=stop,
+            golden_ends=stop and self.goldens.ends(experiment),
         )
 
     def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:

@@ -1,5 +1,6 @@
 """Writes a run in the format that is asked for."""
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,6 +61,12 @@ def _content(folder: RunFolder, format: Format, workspace: Workspace | None, par
     table = Results.up_to_date(folder.path)
     if parts.table is Table.RESULTS:
         return table.csv() if format is Format.CSV else table.parquet()
-    if format is Format.PARQUET:
-        return table.propagation_parquet()
-    return table.propagation().to_csv(index=False, lineterminator="\n").encode()
+    is_timings = parts.table is Table.TIMINGS
+    data = table.timings_parquet() if is_timings else table.propagation_parquet()
+    return data if format is Format.PARQUET else _csv_of(data)
+
+
+def _csv_of(parquet: bytes) -> bytes:
+    import pandas as pd
+
+    return pd.read_parquet(io.BytesIO(parquet)).to_csv(index=False, lineterminator="\n").encode()

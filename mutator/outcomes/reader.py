@@ -155,6 +155,10 @@ class Results:
             )
         return self._read(path)
 
+    def timings_parquet(self) -> bytes:
+        """The bytes of timings.parquet."""
+        return self._read(self.path.with_name(results.TIMINGS_PARQUET))
+
     def _check_header(self, columns: "Sequence[str] | pd.Index[str]") -> None:
         known = set(columns)
         if missing := [name for name in _NEEDED if name not in known]:

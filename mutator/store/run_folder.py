@@ -63,7 +63,7 @@ CONTENT = (  # all that may be in a run folder; * stands for any text, folders i
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
     *("exports/mutation-elements.json", "exports/junit.xml"),
-    *("exports/results.csv", "exports/results.parquet"),
+    *("exports/*.csv", "exports/*.parquet", "exports/mcap/*.mcap"),
     *("damaged/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 

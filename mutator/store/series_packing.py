@@ -111,19 +111,25 @@ def _packed(folder: SeriesFolder) -> _Found:
         return found
     if index is None:
         return found
-    names = {number: name for name, number in index.goldens.items()}
-    users: dict[int, list[str]] = {}
-    for name, number in index.entries.items():
-        users.setdefault(number, []).append(name)
+    goldens = _by_entry(index.goldens)
+    users = _by_entry(index.entries)
     for number in range(len(index.sizes)):
         try:
             entry = _entry(folder.entry(number), lambda number=number: folder.entry(number))  # type: ignore[misc]
         except MutatorError:
             continue
-        if number in names:
-            found.goldens[names[number]] = entry
+        for name in goldens.get(number, ()):
+            found.goldens[name] = entry
         for name in users.get(number, ()):
             found.experiments[name] = (index.golden_of[name], entry)
+    return found
+
+
+def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
+    """All that have an entry, by its number: runs that are the same bytes share one."""
+    found: dict[int, list[str]] = {}
+    for name, number in entries.items():
+        found.setdefault(number, []).append(name)
     return found
 
 

@@ -50,7 +50,7 @@ const SeriesFile = (() => {
     if (!bytes) return null;
     const data = JSON.parse(new TextDecoder().decode(await inflated(bytes)));
     if (data.schema !== "series/1") throw new Error(`series of the unknown schema ${data.schema}`);
-    const places = [], of = new Map(), keys = Object.keys(data.goldens);
+    const places = [], of = new Map(), keys = Object.keys(data.goldens).sort(); // else names that are numbers come first
     for (const [name, count] of data.chunks) {
       for (let at = 0, i = 0; i < count; i++) {
         const size = data.sizes[places.length];

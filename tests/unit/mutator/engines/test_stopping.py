@@ -52,7 +52,7 @@ def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
     yield fork
 
 
-def drive(fork: Fork, engine: Engine, after: AfterHazard) -> Record:
+def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Record:
     """The record of the toy's fault, which makes it come too near."""
     manifest = fork.manifest
     experiment = Experiment(
@@ -60,7 +60,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard) -> Record:
         scenario="A",
         scenario_digest="",
         method=Method.GUIDED,
-        trigger=at_time(2.0),
+        trigger=at_time(at),
         seed=7,
         after_hazard=after,
     )
@@ -92,6 +92,22 @@ def test_stopped_runs_are_the_beginnings_of_those_that_go_on(stopping: Fork) -> 
     assert [name for name, _ in whole.hazards] == ["H1", "H3"]
     assert stopped.hazards == tuple((name, t) for name, t in whole.hazards if t <= stopped.t_end)
     assert stopped.trace_digest != whole.trace_digest
+
+
+@pytest.mark.parametrize("at", [2.0, 1000.0])
+@pytest.mark.parametrize("terminal", ["t > 1.0", "t >= 0"])
+def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
+    stopping: Fork, edit: Edit, terminal: str, at: float
+) -> None:
+    """Golden has a terminal hazard, too, so no run comes to its fault: nothing is forked beyond that end."""
+    edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
+    reference, forked = (
+        drive(stopping, one, AfterHazard.STOP, at) for one in (stopping.engine.reference, stopping.engine)
+    )
+    assert reference == forked
+    assert (reference.outcome, reference.activation) == (Outcome.NOT_ACTIVATED, None)
+    whole = drive(stopping, stopping.engine, AfterHazard.GO_ON, at)
+    assert (whole.activation is not None) == (at == 2.0)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from mutator.errors import MutatorError, MutatorWarning
 from mutator.exports import Format, Table
 from mutator.exports.write import Parts, export
 from mutator.model import Activation, Experiment, Outcome
+from mutator.store.cleaning import check
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder, write_kept
 from mutator.store.series_format import Points, Series, encode
@@ -165,4 +166,16 @@ def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
     assert export(run, Format.PARQUET, None, parts=parts).name == "propagation.parquet"
     kept = (run / "exports" / "propagation.parquet").read_bytes()
     assert kept == (run / "propagation.parquet").read_bytes()
-    assert export(run, Format.CSV, None, parts=Parts(table=Table.TIMINGS)).name == "timings.csv"
+    timings = export(run, Format.CSV, None, parts=Parts(table=Table.TIMINGS))
+    assert timings == run / "exports" / "timings.csv"
+    kept_timings = pd.read_parquet(run / "timings.parquet")
+    pd.testing.assert_frame_equal(pd.read_csv(timings), kept_timings, check_dtype=False)
+
+
+def test_a_run_folder_with_exports_can_be_cleaned(run: Path) -> None:
+    """Whatever `export` writes into it belongs to the run."""
+    for table in Table:
+        export(run, Format.CSV, None, parts=Parts(table=table))
+        export(run, Format.PARQUET, None, parts=Parts(table=table))
+    written = export(run, Format.MCAP, None)
+    assert {*written.iterdir()} <= {*check(run)}

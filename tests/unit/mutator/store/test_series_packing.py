@@ -110,6 +110,19 @@ def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) ->
     assert files(tmp_path / "whole") == files(packed)
 
 
+def test_golden_runs_that_are_the_same_bytes_stay_apart(tmp_path: Path) -> None:
+    """Packed again, an experiment keeps its series, whichever of these golden runs it has."""
+    append(tmp_path, "0001-main", IDS[:2])
+    for worker, names in (("0002-main", IDS[2:3]), ("0003-main", IDS[3:4])):
+        pack(tmp_path, "p", WORTH, 500)
+        append(tmp_path, worker, names)
+    pack(tmp_path, "p", WORTH, 500)
+    index = SeriesFolder(tmp_path).index
+    assert index is not None
+    assert [*index.entries] == IDS[3::-1]
+    assert {*index.golden_of.values()} == {"A", "B+alone"}
+
+
 def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
     """A kill in the middle of a block."""
     append(tmp_path, "0001-main", IDS[:3])
