@@ -15,11 +15,12 @@ def worst_results(run: Path, only: str | None = None) -> list[Row]:
     results holds (`severity >= "S2" and not alerts`). The table is brought up to date first; MutatorError for
     a filter that does not fit it."""
     lines = list(Results.up_to_date(run).lines())
-    if only is not None:
-        columns = list(lines[0]) if lines else []
-        accepts = compile_filter(only, columns)
-        lines = [line for line in lines if accepts(_typed(line))]
-    return worst(map(row_from, lines))
+    rows = worst(map(row_from, lines))  # of all: those that are left keep their order
+    if only is None:
+        return rows
+    accepts = compile_filter(only, list(lines[0]) if lines else [])
+    accepted = {line["experiment_id"] for line in lines if accepts(_typed(line))}
+    return [row for row in rows if row.experiment_id in accepted]
 
 
 def _typed(line: Mapping[str, str]) -> dict[str, object]:

@@ -40,7 +40,12 @@ class Row:
     detail: str
     severity: str = ""  # class of the contact that ended the drive
     delta_v: float | None = None  # m/s, in it
-    margin: float | None = None  # the least one: of the hazards that came, else of all
+    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that came, else to all
+
+    @property
+    def margin(self) -> float | None:
+        """The least margin, as a number in whatever unit its hazard has it."""
+        return min((margin for _, margin in self.margins), default=None)
 
     @property
     def ending(self) -> str:
@@ -174,13 +179,13 @@ def row_from(line: Mapping[str, str]) -> Row:
         detail=line["detail"],
         severity=line.get("severity", ""),
         delta_v=_number(line.get(DELTA_V, "")),
-        margin=_least_margin(line, [name for name, _ in hazards] or checked),
+        margins=_margins(line, [name for name, _ in hazards] or checked),
     )
 
 
-def _least_margin(line: Mapping[str, str], hazards: Sequence[str]) -> float | None:
-    margins = [line.get(f"margin_{name.lower()}", "") for name in hazards]
-    return min((float(text) for text in margins if text), default=None)
+def _margins(line: Mapping[str, str], hazards: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    texts = [(name, line.get(f"margin_{name.lower()}", "")) for name in hazards]
+    return tuple((name, float(text)) for name, text in texts if text)
 
 
 def _number(text: str) -> float | None:

@@ -8,8 +8,8 @@ from mutator.outcomes.columns import SEVERITY, result_columns
 from mutator.outcomes.ranking import worst
 from mutator.outcomes.reader import Results
 
-METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "delta_v")]
-COLUMNS = [column.name for column in result_columns(("H1", "H2"), ("gas",), METRICS, (SEVERITY,))]
+METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
+COLUMNS = [column.name for column in result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY,))]
 OK = {
     "module": "m",
     "fault_type": "f",
@@ -18,8 +18,10 @@ OK = {
     "status": "ok",
     "h1": "0",
     "h2": "0",
+    "h3": "0",
 }
 HAZARD = OK | {"outcome": "hazard", "t_activation": "1", "t_h2": "3", "margin_h1": "-9"}
+LEFT = OK | {"outcome": "hazard", "t_activation": "1", "t_h3": "3", "margin_h1": "-9"}
 CONTACT = HAZARD | {"t_h1": "2", "severity": "S2", "delta_v": "6"}
 WORST_FIRST = {
     "s3": CONTACT | {"severity": "S3", "delta_v": "12"},
@@ -27,12 +29,18 @@ WORST_FIRST = {
     "s2-a": CONTACT,
     "s2-b": CONTACT,
     "s0": CONTACT | {"severity": "S0", "delta_v": "0"},
-    "deep": HAZARD | {"margin_h2": "-2"},  # of H2, which came; that of H1 says nothing
-    "less-deep": HAZARD | {"margin_h2": "-1"},
+    # H2 and H3 take turns, though H3's numbers are larger; margins of hazards that did not come say nothing
+    "deep-2": HAZARD | {"margin_h2": "-0.3"},
+    "deep-3": LEFT | {"margin_h3": "-500"},
+    "both": LEFT | {"t_h2": "3", "margin_h2": "-0.2", "margin_h3": "-2"},  # second of H2, third of H3
+    "second-3": LEFT | {"margin_h3": "-100"},
+    "third-2": HAZARD | {"margin_h2": "-0.1", "margin_h3": "-9"},
+    "fourth-3": LEFT | {"margin_h3": "-1"},
     "no-margin": HAZARD,
     "crash": OK | {"status": "crashed"},
-    "near": OK | {"outcome": "sdc", "margin_h1": "5", "margin_h2": "0.5"},
-    "far": OK | {"outcome": "sdc", "margin_h1": "1"},
+    "near-1": OK | {"outcome": "sdc", "margin_h1": "1"},
+    "near-2": OK | {"outcome": "sdc", "margin_h1": "5", "margin_h2": "0.5"},
+    "second-1": OK | {"outcome": "sdc", "margin_h1": "2", "margin_h2": "9"},
     "masked": OK | {"outcome": "masked", "margin_h1": "0.1"},
     "idle": OK | {"outcome": "not_activated"},
     "no-result": OK | {"status": "harness_error"},
@@ -40,8 +48,8 @@ WORST_FIRST = {
 
 
 def test_the_worst_come_first(tmp_path: Path) -> None:
-    """By class, then delta-v; without a class by ending, then margin; at last by id, in whatever order they
-    come."""
+    """By class, then delta-v; without a class by ending, then by margin, a hazard after the other; at last by
+    id, in whatever order they come."""
     path = tmp_path / "results.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")
