@@ -118,8 +118,12 @@ def print_path(terminal: Terminal, found: "RunExperiment") -> None:
 
 def _stage(stage: "Stage") -> str:
     """`brakes reached 3.50 s`; what an injected component records may have changed by feedback alone."""
-    known = stage.t_first is not None and stage.state.value != "injected"
-    return f"{stage.component} {stage.state.value}" + (f" {stage.t_first:.2f} s" if known else "")
+    what = f"{stage.component} {stage.state.value}"
+    if stage.state.value == "injected":
+        return what
+    if stage.t_by is not None:
+        return f"{what} by {stage.t_by:.2f} s"
+    return what if stage.t_first is None else f"{what} {stage.t_first:.2f} s"
 
 
 def _events(record: "Record") -> list[tuple[float, str]]:

@@ -43,14 +43,20 @@ class Passage(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stage:
-    """A component on a path: its channels that left golden, and when (s) the first of them did."""
+    """A component on a path, and its channels that left golden.
+
+    `t_by` is when (s) what it alone feeds left golden, where that was before any channel of its own: by then
+    it had changed, although what is recorded of it did not show that yet.
+    """
 
     component: str
     state: State
     channels: tuple[Departure, ...]
+    t_by: float | None = None
 
     @property
     def t_first(self) -> float | None:
+        """When (s) the first of its channels left golden."""
         return min((first for _, first, _ in self.channels), default=None)
 
 
@@ -136,9 +142,16 @@ class Ways:
         for departure in record.left:
             left.setdefault(self.component_of.get(departure[0], ""), []).append(departure)
         times = {name: min(t for _, t, _ in found) for name, found in left.items()}
-        states, arrived = self._states(way, times)
+        latest = self._latest(way, times)
+        states, arrived = self._states(way, times.keys(), latest)
         stages = [
-            Stage(component=n, state=states[n], channels=tuple(left.get(n, ()))) for n in way.components
+            Stage(
+                component=name,
+                state=states[name],
+                channels=tuple(left.get(name, ())),
+                t_by=_sooner(latest, times, name) if states[name] in _CHANGED else None,
+            )
+            for name in way.components
         ]
         changed = [s.component for s in stages if s.channels and s.state in (State.INJECTED, State.REACHED)]
         return Path(
@@ -151,11 +164,13 @@ class Ways:
             stopped_at=_holding(way, states, arrived) if record.outcome is Outcome.MASKED else (),
         )
 
-    def _states(self, way: Way, left: Mapping[str, float]) -> tuple[dict[str, State], set[str]]:
-        """The state of each component of a way, by the times (s) when components first left golden; and
-        which of them the fault came to, as far as is known: an unseen one if it came to what feeds it."""
-        moved = min((left[name] for name in self.processes if name in left), default=inf)
-        passed = self._passed(way, left, moved)
+    def _states(
+        self, way: Way, shown: Collection[str], left: Mapping[str, float]
+    ) -> tuple[dict[str, State], set[str]]:
+        """The state of each component of a way, by the times (s) by which components had left golden, which
+        the channels of those that are `shown` show; and which of them the fault came to, as far as is known:
+        an unseen one if it came to what feeds it."""
+        moved = self._moved(left)
         states: dict[str, State] = {}
         arrived: set[str] = set()
         for name in way.components:
@@ -165,9 +180,9 @@ class Ways:
             elif name not in self._roles:
                 states[name] = State.UNSEEN
             elif name not in left:
-                states[name] = State.PASSED if name in passed else State.HELD
-            elif name in passed or left[name] <= moved:
-                states[name] = State.REACHED
+                states[name] = State.HELD
+            elif left[name] <= moved:
+                states[name] = State.REACHED if name in shown else State.PASSED
             else:
                 back = self._fed_back(way.fed.get(name, ()), left)
                 along = min((left[f] for f in way.feeders(name) & arrived if f in left), default=inf)
@@ -177,16 +192,22 @@ class Ways:
                 arrived.add(name)
         return states, arrived
 
-    def _passed(self, way: Way, left: Mapping[str, float], moved: float) -> set[str]:
-        """The components that must have passed the fault on: what they alone lead to left golden before
-        feedback can have come there. Unknown where it is not known where the fault was injected."""
-        found: set[str] = set()
+    def _moved(self, left: Mapping[str, float]) -> float:
+        """When (s) the process left golden; infinite: never."""
+        return min((left[name] for name in self.processes if name in left), default=inf)
+
+    def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
+        """The times (s) by which components had left golden: when a channel of theirs did, or what they alone
+        feed. One without such a channel passed the fault on, if feedback cannot have come there yet. Without
+        knowing where the fault was injected nothing follows from what a component feeds."""
+        moved, times = self._moved(left), dict(left)
         for name in reversed(way.components if way.injected else ()):
             only = way.feeders(name) | way.fed.get(name, frozenset())
-            got = name in found or (name in left and left[name] <= moved)
-            if got and len(only) == 1 and name not in way.sources:
-                found |= only
-        return found
+            if name in times and len(only) == 1 and name not in way.sources:
+                (feeder,) = only
+                if feeder in left or times[name] <= moved:
+                    times[feeder] = min(times.get(feeder, inf), times[name])
+        return times
 
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
         """When (s) feedback can first have come through one of these components: when it left golden, or what
@@ -240,7 +261,12 @@ def ways_of(head: Head) -> Ways | None:
     return Ways(head["channels"], structure)
 
 
+_CHANGED = (State.REACHED, State.PASSED, State.FEEDBACK)
 _CAME = (State.INJECTED, State.REACHED, State.PASSED)
+
+
+def _sooner(some: Mapping[str, float], others: Mapping[str, float], name: str) -> float | None:
+    return some[name] if some.get(name, inf) < others.get(name, inf) else None
 
 
 def _links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:

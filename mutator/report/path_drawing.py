@@ -11,7 +11,7 @@ from mutator.report.paths import PathCounts, link_text
 from mutator.stpa.analysis import LinkModel, StructureModel
 from mutator.stpa.layout import Arrow, Box, lay_out
 
-_LINE = 14  # px, from a label to the count below it
+_LINE = 15  # px, from line to line of a count
 _WIDEST = 7.0  # px, of the line of a link that all faults got through
 _THIN = 1.8
 
@@ -40,10 +40,9 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[s
     return "\n".join((*lines, "</svg>"))
 
 
-def share_text(through: int, came: int, *, short: bool = False) -> str:
-    """What stands at a link: `12 of 40, 30 %`, or its end alone; empty where no fault came."""
-    percent = f"{100 * through / came:.0f} %" if came else ""
-    return percent if short or not came else f"{through} of {came}, {percent}"
+def share_text(through: int, came: int) -> str:
+    """How many of those that came got through: `12 of 40, 30 %`; empty where no fault came."""
+    return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 
 def _tip(name: str) -> str:
@@ -59,17 +58,14 @@ def _line(arrow: Arrow) -> str:
 
 
 def _place(arrow: Arrow, line: int = 0) -> str:
-    """Where the label of an arrow stands, or the count on the line below it: both above a level part, beside
-    an upright one."""
-    x, y = arrow.label
-    upward = len(arrow.points) == 2 and arrow.points[0][1] > arrow.points[1][1]
-    return (
-        f'x="{x:.1f}" y="{y + _LINE * (line if upward else line - 1) - 2:.1f}" text-anchor="{arrow.anchor}"'
-    )
+    """Where a line of the label of an arrow stands."""
+    x, y = arrow.label.at
+    y += (0, arrow.label.apart, arrow.label.apart + _LINE)[line]
+    return f'x="{x:.1f}" y="{y:.1f}" text-anchor="{arrow.label.anchor}"'
 
 
 def _is_short(arrow: Arrow) -> bool:
-    """Whether there is room for a percentage alone: between boxes side by side."""
+    """Whether the count needs two lines: between boxes side by side."""
     return arrow.points[0][1] == arrow.points[-1][1]
 
 
@@ -84,16 +80,18 @@ def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
 def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
     through, came = counts.through[name], counts.came[name]
     kind = "through" if through else "stopped" if came else "quiet"
-    share = share_text(through, came, short=_is_short(arrow))
+    share, short = share_text(through, came), _is_short(arrow)
+    first, _, last = share.partition(", ") if short else (share, "", "")
     width = _THIN + (_WIDEST - _THIN) * (through / came if came else 0.0)
     yield (
-        f'<a class="way is-{kind}" data-link="{escape(name)}"{" data-short" if _is_short(arrow) else ""} '
+        f'<a class="way is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_text(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
         f'<path class="hit" d="{_line(arrow)}"/><path class="line" d="{_line(arrow)}" '
         f'style="stroke-width: {width:.1f}px" marker-end="url(#ways-{kind})"/>'
         f'<text class="label" {_place(arrow)}>{escape(link.label)}</text>'
-        f'<text class="count" {_place(arrow, 1)}>{share}</text></a>'
+        f'<text class="count" {_place(arrow, 1)}>{first}</text>'
+        f'<text class="count" {_place(arrow, 2)}>{last}</text></a>'
     )
 
 

@@ -45,8 +45,9 @@ class FoundPaths:
         return ";".join(link_text(c.tail, c.tip) for c in crossings if c.passage is Passage.THROUGH)
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
-        """What the page has of the experiments `ids`: the shape of each path (-1: none), and columns of first
-        times and largest deviations, one for each channel."""
+        """What the page has of the experiments `ids`: the shape of each path (-1: none), columns of first
+        times and largest deviations, one for each channel, and by row the components that had changed before
+        their channels show it, with the times by which they had."""
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
         codes = []
@@ -63,11 +64,16 @@ class FoundPaths:
             "schema": SCHEMA,
             "components": self.components,
             "channels": [[name, unit, component, about] for name, unit, _, component, about in self.channels],
+            "by": {row: late for row, name in enumerate(ids) if (late := self._late(name))},
             "shapes": [columns[key] for key in shapes],
             "shape": codes,
             "first": [[round(one[name][0], 4) if name in one else None for one in left] for name in names],
             "largest": [[_short(one[name][1]) if name in one else None for one in left] for name in names],
         }
+
+    def _late(self, experiment_id: str) -> dict[str, float]:
+        path = self.by_id.get(experiment_id)
+        return {s.component: round(s.t_by, 4) for s in (path.stages if path else ()) if s.t_by is not None}
 
     def label(self, component: str) -> str:
         """What pages call a component."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from html import escape
 
 from mutator.stpa.analysis import Analysis, Kind
-from mutator.stpa.layout import EDGE, Arrow, Box, Layout, lay_out
+from mutator.stpa.layout import EDGE, Box, Layout, lay_out
 
 FILLS = {
     Kind.HUMAN: "#ececec",
@@ -114,12 +114,12 @@ def _box_text(box: Box) -> Iterator[str]:
 def _labels(analysis: Analysis, layout: Layout) -> Iterator[str]:
     faulty = faulty_places(analysis)
     for name, link in analysis.structure.links.items():
-        arrow: Arrow = layout.arrows[name]
-        x, y = arrow.label
-        place = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{arrow.anchor}"'
+        label = layout.arrows[name].label
+        x, y = label.at
+        place = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{label.anchor}"'
         yield f'<text class="label" {place}>{_text(link.label)}</text>'
         if name in faulty:
-            place = f'x="{x:.1f}" y="{y + 17:.1f}" text-anchor="{arrow.anchor}"'
+            place = f'x="{x:.1f}" y="{y + label.apart:.1f}" text-anchor="{label.anchor}"'
             yield f'<text class="label factor" {place}>{_text(short(faulty[name]))}</text>'
 
 

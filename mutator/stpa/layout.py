@@ -11,19 +11,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from mutator.stpa.analysis import ComponentModel, LinkModel, StructureModel
+from mutator.stpa.labels import Label, Point, place_labels
 
-PITCH = 190  # from column to column
-GAP = 66  # between boxes side by side
+PITCH = 212  # from column to column
+GAP = 88  # between boxes side by side
 MARGIN = 110  # left of the first column, for arrows that go past the rows
 EDGE = 20
 BOX_HEIGHT = 46
 LINE = 17  # one more line of text in a box
-TRACK = 30
+TRACK = 44
 CHANNEL = 64  # a channel without any track
-LABEL = 110  # about the length of a label
 APART = 24  # between arrows that run side by side
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,11 +46,10 @@ class Box:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrow:
-    """A drawn link: its corners from tail to tip, and where its label stands (`anchor` as in SVG)."""
+    """A drawn link: its corners from tail to tip, and where its label stands."""
 
     points: tuple[Point, ...]
-    label: Point
-    anchor: str
+    label: Label
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,25 +66,27 @@ def lay_out(structure: StructureModel) -> Layout:
     """Place every component and link."""
     boxes = _boxes(structure)
     ports = _ports(structure.links, boxes)
-    arrows = {}
+    points: dict[str, tuple[Point, ...]] = {}
     used: dict[int, int] = defaultdict(int)
     for name, link in structure.links.items():
         tail, tip = boxes[link.from_], boxes[link.to]
         if tail.row == tip.row:
-            arrows[name] = _sideways(tail, tip)
+            points[name] = _sideways(tail, tip)
         elif _blocked(ports[name], tail, tip, boxes.values()):
-            arrows[name] = _around(tail, tip)
+            points[name] = _around(tail, tip)
         elif ports[name][0] == ports[name][1]:
-            tips = [ports[other][1] for other, mate in structure.links.items() if mate.to == link.to]
-            arrows[name] = _straight(ports[name][0], tail, tip, tips)
+            points[name] = _straight(ports[name][0], tail, tip)
         else:
             row = min(tail.row, tip.row)
             used[row] += 1
             top = max(box.bottom for box in boxes.values() if box.row == row)
-            arrows[name] = _elbow(ports[name], tail, tip, top + used[row] * TRACK)
+            points[name] = _elbow(ports[name], tail, tip, top + used[row] * TRACK)
+    words = {name: link.label for name, link in structure.links.items()}
+    areas = [(box.x, box.y, box.x + box.width, box.bottom) for box in boxes.values()]
+    labels = place_labels(words, points, areas)
     return Layout(
         boxes=boxes,
-        arrows=arrows,
+        arrows={name: Arrow(points=points[name], label=labels[name]) for name in structure.links},
         width=max(box.x + box.width for box in boxes.values()) + EDGE,
         height=max(box.bottom for box in boxes.values()) + EDGE,
     )
@@ -210,28 +209,22 @@ def _ends(tail: Box, tip: Box) -> tuple[float, float]:
     return (tail.bottom, tip.y) if tail.row < tip.row else (tail.y, tip.bottom)
 
 
-def _straight(x: float, tail: Box, tip: Box, tips: list[float]) -> Arrow:
-    """An arrow up or down, its label near the tip, where fewest others cross, and away from other `tips`."""
+def _straight(x: float, tail: Box, tip: Box) -> tuple[Point, ...]:
     y1, y2 = _ends(tail, tip)
-    left = any(0.0 < other - x < LABEL for other in tips)
-    label = (x - 6 if left else x + 6, y2 + (26 if y2 < y1 else -16))
-    return Arrow(points=((x, y1), (x, y2)), label=label, anchor="end" if left else "start")
+    return (x, y1), (x, y2)
 
 
-def _elbow(ports: tuple[float, float], tail: Box, tip: Box, y: float) -> Arrow:
+def _elbow(ports: tuple[float, float], tail: Box, tip: Box, y: float) -> tuple[Point, ...]:
     (x1, x2), (y1, y2) = ports, _ends(tail, tip)
-    return Arrow(
-        points=((x1, y1), (x1, y), (x2, y), (x2, y2)), label=((x1 + x2) / 2.0, y - 5), anchor="middle"
-    )
+    return (x1, y1), (x1, y), (x2, y), (x2, y2)
 
 
-def _sideways(tail: Box, tip: Box) -> Arrow:
+def _sideways(tail: Box, tip: Box) -> tuple[Point, ...]:
     y = tail.y + tail.height / 2.0
     x1, x2 = (tail.x + tail.width, tip.x) if tail.x < tip.x else (tail.x, tip.x + tip.width)
-    return Arrow(points=((x1, y), (x2, y)), label=((x1 + x2) / 2.0, y - 6), anchor="middle")
+    return (x1, y), (x2, y)
 
 
-def _around(tail: Box, tip: Box) -> Arrow:
+def _around(tail: Box, tip: Box) -> tuple[Point, ...]:
     x, y = EDGE + MARGIN / 2.0, tail.y + tail.height / 2.0
-    end = tip.y if tail.row < tip.row else tip.bottom
-    return Arrow(points=((tail.x, y), (x, y), (x, end)), label=(x + 6, y - 6), anchor="start")
+    return (tail.x, y), (x, y), (x, tip.y if tail.row < tip.row else tip.bottom)

@@ -28,7 +28,7 @@ const Path = (() => {
   const seconds = (t) => `${t.toFixed(2)} s`;
   const amount = (x, unit) => `${Number.isFinite(x) ? x : "∞"}${unit === "-" ? "" : ` ${unit}`}`;
   const since = (t, begin) => (Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)} s`);
-  const first = (channels) => Math.min(...channels.map((c) => c.t));
+  const first = (channels) => Math.min(Infinity, ...channels.map((c) => c.t));
 
   /** Show the path of an experiment in `place`; `results` gives its row, and its cells by `text` and `number`. */
   async function strip(place, results) {
@@ -41,8 +41,9 @@ const Path = (() => {
       return;
     }
     const left = departures(paths, results.row), begin = results.number("t_activation");
+    const stages = shape.map(([name, state, column]) => stage(name, state, column, left.get(name) || [], paths.by[results.row]?.[name], begin));
     const boxes = [];
-    place.replaceChildren(said(results, paths), drawn(shape, paths, left, begin, boxes), table(paths, left, begin));
+    place.replaceChildren(said(results, paths), drawn(stages, paths, boxes), late(stages, paths), table(paths, left, begin));
     shown = { boxes };
     listen(place);
   }
@@ -62,35 +63,43 @@ const Path = (() => {
     return Dom.el("p", {}, far, stopped ? [" It was stopped at ", Dom.el("strong", {}, all(stopped)), "."] : "");
   }
 
+  /** A component of the path: `t` is when it changed, `by` that it did so at the latest, as what it alone feeds had. */
+  function stage(name, state, column, channels, by, begin) {
+    const own = first(channels), t = state === "injected" ? begin : by ?? own;
+    return { name, state, column, channels, own, t: Number.isNaN(t) ? Infinity : t, by: state !== "injected" && by !== undefined, begin };
+  }
+
   /** The boxes, those side by side that come equally far along the path. */
-  function drawn(shape, paths, left, begin, boxes) {
+  function drawn(stages, paths, boxes) {
     const { el } = Dom;
     const columns = [];
-    for (const stage of shape) (columns[stage[2]] ??= []).push(stage);
-    return el("div.scroll", { tabindex: 0, role: "group", "aria-label": "Path of the fault" }, el("ol.path-strip", {}, columns.map((stages) =>
-      el("li", {}, stages.map(([name, state]) => {
-        const made = box(name, state, paths, left.get(name) || [], begin);
-        boxes.push([made, state === "injected" && !Number.isNaN(begin) ? begin : ["reached", "feedback"].includes(state) ? first(left.get(name)) : Infinity]);
+    for (const one of stages) (columns[one.column] ??= []).push(one);
+    return el("div.scroll", { tabindex: 0, role: "group", "aria-label": "Path of the fault" }, el("ol.path-strip", {}, columns.map((together) =>
+      el("li", {}, together.map((one) => {
+        const made = box(one, paths);
+        boxes.push([made, one.t]);
         return made;
       })))));
   }
 
-  function box(name, state, paths, channels, begin) {
+  function box(one, paths) {
     const { el } = Dom;
-    const { sign, word, about } = STATES[state];
-    const { label, about: what } = paths.components[name] || { label: name, about: "" };
-    const changed = channels.map((c) => `${c.name}: first at ${seconds(c.t)}, largest difference ${amount(c.largest, c.unit)}`);
-    return el(`div.path-box.is-${state}`, { "data-component": name, title: [`${label}. ${what}`, about, ...changed].join("\n") },
+    const { sign, word, about } = STATES[one.state];
+    const { label, about: what } = paths.components[one.name] || { label: one.name, about: "" };
+    const changed = one.channels.map((c) => `${c.name}: first at ${seconds(c.t)}, largest difference ${amount(c.largest, c.unit)}`);
+    const why = one.by ? [`what it alone feeds had changed by ${seconds(one.t)}${one.own < Infinity ? `; its own channels show it from ${seconds(one.own)}` : ""}`] : [];
+    return el(`div.path-box.is-${one.state}`, { "data-component": one.name, title: [`${label}. ${what}`, about, ...why, ...changed].join("\n") },
       el("strong", {}, label),
       el("span.state", {}, el("span", { "aria-hidden": "true" }, `${sign} `), word),
-      times(state, channels, begin));
+      one.t === Infinity ? "" : el("span.time", {}, one.by ? "by " : "", seconds(one.t), one.state === "injected" ? "" : el("span.quiet", {}, ` ${since(one.t, one.begin)}`)));
   }
 
-  /** When it was first active, or left golden. */
-  function times(state, channels, begin) {
+  /** Why a component may come later than one behind it. */
+  function late(stages, paths) {
     const { el } = Dom;
-    if (state === "injected") return Number.isNaN(begin) ? "" : el("span.time", {}, seconds(begin));
-    return channels.length ? el("span.time", {}, seconds(first(channels)), el("span.quiet", {}, ` ${since(first(channels), begin)}`)) : "";
+    const all = stages.filter((one) => one.state === "reached" && stages.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
+    const names = all.map((one) => paths.components[one.name]?.label || one.name).join(" and ");
+    return names ? el("p.quiet", {}, `What is recorded of ${names} changed only after a component further along: the fault came there another way.`) : "";
   }
 
   /** Every channel that left golden, also of components off the path. */

@@ -24,8 +24,8 @@ const Ways = (() => {
       way.setAttribute("class", `way is-${state}`);
       line.setAttribute("marker-end", `url(#ways-${state})`);
       line.style.strokeWidth = `${THIN + (came ? ((WIDEST - THIN) * through) / came : 0)}px`;
-      const text = share(numbers);
-      way.querySelector(".count").textContent = "short" in way.dataset ? text.split(", ").at(-1) : text;
+      const [first, last = ""] = "short" in way.dataset ? share(numbers).split(", ") : [share(numbers)];
+      way.querySelectorAll(".count").forEach((line, i) => { line.textContent = i ? last : first; });
       document.querySelector(`#ways-table [data-link="${CSS.escape(way.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none came";
       filter(way);
     }

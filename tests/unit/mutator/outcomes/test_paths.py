@@ -195,6 +195,16 @@ def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
     assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
 
 
+def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
+    """The pedals get nothing but what the speed control sends: it had changed by the time they did, whenever
+    its channel shows it. What has other ways to come says nothing of its feeders."""
+    found = path("finder", gas=1.2, place=1.3, wanted=1.25)
+    assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
+    assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
+    late = path("eyes", "wheel", torque=1.0, place=1.1, gas=1.2, wanted=1.5)
+    assert {s.component: s.t_by for s in late.stages if s.t_by is not None} == {"speed": 1.2}
+
+
 @pytest.mark.parametrize(
     ("left", "state"),
     [

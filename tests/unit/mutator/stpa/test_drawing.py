@@ -62,6 +62,24 @@ def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
                         assert not together or abs(a[1 - i] - c[1 - i]) >= APART - 8, (one, other)
 
 
+def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, layout: Layout) -> None:
+    """Two lines of text at each arrow meet no box, no other arrow and no other label."""
+    areas = {}
+    for name, link in analysis.structure.links.items():
+        arrow, width = layout.arrows[name], 7.0 * len(link.label)
+        (x, y), apart = arrow.label.at, arrow.label.apart
+        left = x - {"start": 0.0, "middle": width / 2, "end": width}[arrow.label.anchor]
+        areas[name] = Box(x=left, y=y - 12, width=width, height=apart + 15, row=0, lines=())
+    for (name, area), (other, beside) in combinations(areas.items(), 2):
+        assert not meets(area, (beside.x, beside.y), (beside.x + beside.width, beside.bottom)), (name, other)
+    for name, area in areas.items():
+        for box in layout.boxes.values():
+            assert not meets(area, (box.x, box.y), (box.x + box.width, box.bottom)), name
+        for other, arrow in layout.arrows.items():
+            if other != name:
+                assert not any(meets(area, a, b) for a, b in pairwise(arrow.points)), (name, other)
+
+
 def test_places_of_faults_stand_out(analysis: Analysis) -> None:
     """The picture is well-formed, always the same, and only places with faults have the colour of faults."""
     text = draw(analysis)
