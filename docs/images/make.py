@@ -15,7 +15,7 @@ from playwright.sync_api import sync_playwright
 HERE = Path(__file__).parent
 WIDE = {"width": 1280, "height": 800}
 STEPS = 3  # of 1/20 s, that a picture of the film is later than the one before
-PICTURES, FRAME_MS, COLOURS = 120, 80, 64
+PICTURES, FRAME_MS, LAST_MS, COLOURS = 120, 80, 2000, 64
 
 
 def main() -> None:
@@ -44,7 +44,7 @@ def film(page: Any) -> None:
     """Step the replay from shortly before the activation to the drive's end; keep what is seen."""
     stage = page.locator(".stage")
     pictures = []
-    while len(pictures) < PICTURES and not "after the end" in stage.inner_text():
+    while len(pictures) < PICTURES and "after the end" not in stage.inner_text():
         pictures.append(Image.open(io.BytesIO(stage.screenshot())).convert("RGB"))
         for _ in range(STEPS):
             page.keyboard.press("ArrowRight")
@@ -56,7 +56,8 @@ def film(page: Any) -> None:
     palette = all_of_them.quantize(COLOURS, Image.Quantize.FASTOCTREE)
     small = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in small]
     path = HERE / "replay.gif"
-    small[0].save(path, save_all=True, append_images=small[1:], duration=[FRAME_MS] * (len(small) - 1) + [2000], loop=0, optimize=True)
+    times = [FRAME_MS] * (len(small) - 1) + [LAST_MS]
+    small[0].save(path, save_all=True, append_images=small[1:], duration=times, loop=0, optimize=True)
     print(path, path.stat().st_size)
 
 

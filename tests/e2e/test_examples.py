@@ -1,6 +1,7 @@
 """The examples: other people's controllers, each from its installed package. Extra `examples`."""
 
 import csv
+import re
 import sys
 from collections import Counter
 from importlib.util import find_spec
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.slow
 EXAMPLES = Path(__file__).parents[2] / "examples"
 INSTALLED = {"cartpole": "simple_pid", "highway": "highway_env", "opendbc": "opendbc"}
 ALSO = {"cartpole": "gymnasium"}
-MOST_GLUE, MOST_YAML = 25, 40  # lines
+MOST_GLUE, MOST_YAML, MOST_SCENE = 25, 40, 10  # lines
 FORKED = 0.95
 
 
@@ -88,17 +89,31 @@ def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
 
 def own_lines(folder: Path, suffix: str) -> Counter[str]:
     """Lines of the files of a kind, but for comments and empty ones."""
-    lines = (
-        line.strip() for path in sorted(folder.rglob(f"*{suffix}")) for line in path.read_text().splitlines()
-    )
+    return counted("\n".join(path.read_text() for path in sorted(folder.rglob(f"*{suffix}"))))
+
+
+def scene_lines(folder: Path) -> Counter[str]:
+    """Lines of the manifest's scene."""
+    (manifest,) = folder.glob("fault_library/targets/*.yaml")
+    (scene,) = re.findall(r"(?m)^scene:.*\n(?:[ #].*\n?)+", manifest.read_text())
+    return counted(scene)
+
+
+def counted(text: str) -> Counter[str]:
+    lines = map(str.strip, text.splitlines())
     return Counter(line for line in lines if line and not line.startswith("#"))
 
 
 @pytest.mark.parametrize(("suffix", "most"), [(".py", MOST_GLUE), (".yaml", MOST_YAML)])
 def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp_path: Path) -> None:
-    """What an example has beyond the lines that `mutator init` writes for its package is short."""
+    """What an example has beyond the lines that `mutator init` writes for its package is short; so is the
+    scene, which the results do without."""
     mutator.init_library(tmp_path / "new", target=f"installed:{INSTALLED[example]}")
     own = own_lines(EXAMPLES / example, suffix) - own_lines(tmp_path / "new", suffix)
+    if suffix == ".yaml":
+        scene = scene_lines(EXAMPLES / example)
+        assert 0 < scene.total() <= MOST_SCENE, f"{scene.total()} lines of the scene"
+        own -= scene
     assert 0 < own.total() <= most, f"{own.total()} lines"
 
 
