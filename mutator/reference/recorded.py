@@ -120,7 +120,8 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
 
 
 def _channel(channel: Channel) -> tuple[str, ...]:
-    role = f"{channel.role}, to {channel.tolerance:g}" if channel.tolerance else str(channel.role)
+    own = channel.tolerance != channel.role.tolerance
+    role = f"{channel.role}, to {channel.tolerance:g}" if own else str(channel.role)
     return f"`{channel.name}`", channel.unit, role, channel.component or "-", channel.about or "-"
 
 

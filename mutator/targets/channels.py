@@ -9,6 +9,9 @@ from pydantic import Field
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.triggers.conditions import RESERVED
 
+ROUNDING = (
+    1e-9  # of a channel's unit: what is less is left by sums in another order, no matter to any physics
+)
 SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 
@@ -18,6 +21,11 @@ class Role(StrEnum):
     ACTUATOR = "actuator"
     TRUTH = "truth"
     INTERNAL = "internal"
+
+    @property
+    def tolerance(self) -> float:
+        """By how much a channel that says nothing else may differ from golden: actuators are exact."""
+        return 0.0 if self is Role.ACTUATOR else ROUNDING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,12 +65,13 @@ class ChannelModel(StrictModel, title="A channel"):
     component: str = Field(
         "", description="The component that it belongs to, of the control structure where there is one."
     )
-    tolerance: float = Field(
-        0.0,
+    tolerance: float | None = Field(
+        None,
         ge=0.0,
         allow_inf_nan=False,
         description="By how much it may differ from golden and still count as the same. An actuator beyond "
-        "it has manifested; a fault has reached a component with a channel beyond it.",
+        "it has manifested; a fault has reached a component with a channel beyond it. Default: 0 for "
+        f"actuators, {ROUNDING:g} of the unit for others, so that rounding does not count.",
     )
     about: str = Field("", description="What it is.")
     time: str = Field(
@@ -134,5 +143,6 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
         raise source.error(
             (*keys, "time"), f"'{model.time}'", expected="none: a message has its time", remedy="leave it out"
         )
-    plain = model.model_dump(exclude={"from_"})
-    return Channel(name=name, source=model.from_, **plain)
+    plain = model.model_dump(exclude={"from_", "tolerance"})
+    tolerance = model.role.tolerance if model.tolerance is None else model.tolerance
+    return Channel(name=name, source=model.from_, tolerance=tolerance, **plain)

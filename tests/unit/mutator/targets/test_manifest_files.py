@@ -27,6 +27,16 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     assert dict(manifest.observation.expressions)["v_lead"] == "now.lead_speed"
 
 
+def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Workspace) -> None:
+    """A channel without a tolerance has the one of its role; 0 is a tolerance, too."""
+    path = toy.library / "targets" / "toy.yaml"
+    kept = "{unit: m/s, role: actuator, tolerance: 0.5}"
+    more = ("pedal: {unit: '-', role: actuator}", "wish: {unit: m}", "gap: {unit: m, tolerance: 0}")
+    path.write_text(path.read_text().replace(kept, "\n  ".join((kept, *more))))
+    found = {c.name: c.tolerance for c in toy.manifest("toy").channels}
+    assert found == {"speed": 0.5, "pedal": 0.0, "wish": 1e-9, "gap": 0.0}
+
+
 def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
     """What a target does not hold as such is reckoned from names, attributes and items that it holds."""
     path = toy.library / "targets" / "toy.yaml"
