@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,10 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.outcomes.ranking import worth
-from mutator.outcomes.reader import Results
+from mutator.outcomes.reader import row_of
+from mutator.outcomes.rows import Row
 from mutator.review.gate import FILE as REVIEWED
-from mutator.store import cleaning, digests
+from mutator.store import cleaning, digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
@@ -76,9 +78,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             with raising_disk_full(out):
                 (out / f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
-            built = results.build(out)
-            _pack_series(folders, out)
-            return built
+            return results.build(out)
         except BaseException:
             cleaning.clear(out)
             raise
@@ -212,6 +212,7 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
     for folder in folders:
         _copy_patches(folder, out)
         _copy_segments(folder, out)
+    _pack_series(folders, out)
     whole = {
         "schema": HEAD_SCHEMA,
         "choices": first.head["choices"] | {"shard": None},
@@ -234,10 +235,19 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
 
 
 def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
-    """The series of all shards, under the budget of one run."""
-    merged, shards = RunFolder(out), tuple(folder.path for folder in folders)
+    """The series of all shards, under the budget of one run. They come before the head: once that is there,
+    nothing makes them any more."""
+    shards = tuple(folder.path for folder in folders)
     if any((shard / SERIES).is_dir() for shard in shards):
-        pack(out, merged.head["plan"], worth(Results.of_run(out).rows()), merged.series_mb, others=shards)
+        first, rows = folders[0], chain.from_iterable(map(_rows, folders))
+        pack(out, first.head["plan"], worth(rows), first.series_mb, others=shards)
+
+
+def _rows(folder: RunFolder) -> Iterator[Row]:
+    records, hazards, scale = folder.records(), folder.head["hazards"], folder.scale
+    for experiment in plan_file.read_all(folder.path):
+        if (record := records.get(experiment.id)) is not None:
+            yield row_of(experiment, record, hazards, scale)
 
 
 def _copy_segments(folder: RunFolder, out: Path) -> None:

@@ -5,15 +5,18 @@ import shutil
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from mutator.campaigns.plans import Choices, freeze, make_plan
 from mutator.engines import registry
 from mutator.errors import CheckFailed, MutatorError
+from mutator.execution import merging
 from mutator.execution.merging import merge
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
+from mutator.outcomes import results
 from mutator.review import gate
 from mutator.store.patches import Patches
 from mutator.store.records import read_records
@@ -72,6 +75,21 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
     assert heads[0] == heads[1]
     same = [{k: v for k, v in stretch.items() if k != "records"} for stretch in chain(*stretches)]
     assert len(stretches[0]) == 2 and same == [same[0]] * 3
+
+
+def test_a_merged_run_folder_has_series_from_the_first(
+    runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A merge that is killed once its folder is a run folder has lost no series: nothing remakes them."""
+    seen: list[int] = []
+
+    def build(run: Path) -> Path:
+        seen.append(len(list((run / "series").iterdir())))
+        return results.build(run)
+
+    monkeypatch.setattr(merging, "results", SimpleNamespace(build=build))
+    merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
+    assert seen == [3]
 
 
 def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
