@@ -45,7 +45,7 @@ _TO_MANIFEST = (
     Column("outcome", "text", "", "what the fault did; empty unless the status is `ok`"),
     Column("activated", "flag", "", "whether an injected statement ran while the trigger held"),
     Column("t_activation", "number", "s", "when first"),
-    Column("activations", "count", "", "how often"),
+    Column("activations", "count", "", "how often in the whole run"),
     Column("manifested", "flag", "", "whether an actuator output then differed from golden"),
     Column("t_manifest", "number", "s", "when first"),
 )

@@ -2,6 +2,9 @@
 // One experiment opened beside the list: what happened, its path and replay, what was changed, how to do it again.
 
 class Experiment {
+  static NO_PICTURES = "A campaign on pictures takes some of its worst experiments by itself, as each of them has to be driven again. "
+    + "This command makes those of this one; write the report again to have them here:";
+
   /** `move(by)` goes on in the list, `place()` says where in it this is, `close()` shuts this. */
   constructor(place, table, state, facts, actions) {
     Object.assign(this, { place, table, state, facts, actions, title: document.title });
@@ -96,7 +99,7 @@ class Experiment {
   #events() {
     const { el } = Dom;
     const at = (name) => this.table.number(this.row, name), begin = at("t_activation");
-    const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in all)`],
+    const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in the whole run)`],
       ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
       ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)])]
       .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
@@ -241,7 +244,7 @@ class Experiment {
       ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden beside faulty at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
       ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden beside faulty", loading: "lazy" })
         : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden beside faulty" })),
-      el("p", {}, kept ? "More pictures, or a film:" : "Pictures and films are made on request, and are here once the report is written again:"),
+      el("p", {}, kept ? "More pictures, or a film:" : Experiment.NO_PICTURES),
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
   }
 
@@ -249,7 +252,7 @@ class Experiment {
   #moment(time) {
     const moments = { t_activation: "fault first active", t_alert: "first alert", t_hazard: "first hazard" };
     const what = Object.keys(moments).filter((name) => this.table.number(this.row, name).toFixed(2) === time).map((name) => moments[name]);
-    return [`${time} s`, ...what].join(", ");
+    return `${[`${time} s`, ...what].join(", ")} (the nearest picture there is)`;
   }
 
   #noSeries(id) {

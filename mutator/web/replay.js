@@ -114,12 +114,12 @@ const Replay = (() => {
       return `${words.join(", ")}${differ.length ? "" : ", as golden"}`;
     }
 
-    /** [kind, text] of what is so at a time: fault active, the last alert, hazards, the end. */
+    /** [kind, text] of what is so at a time: fault active, manifested, the alerts and hazards that came, the end. */
     #stateAt(t) {
       const { active, marks, tEnd } = this.series, came = marks.filter(([, at]) => at <= t + ReplayData.TINY), states = [];
       if (active && t >= active[0] - ReplayData.TINY && t <= active[1] + ReplayData.TINY) states.push(["active", "fault active"]);
       else if (active) states.push(["idle", t < active[0] ? "fault not active yet" : "fault no longer active"]);
-      for (const [kind, , label] of came) if (kind === "alert" || kind === "hazard") states.push([kind, this.#named(kind, label)]);
+      for (const [kind, , label] of came) if (kind !== "activation") states.push([kind, this.#named(kind, label)]);
       if (tEnd !== null && t > tEnd + ReplayData.TINY) states.push(["after", "after the end of the drive"]);
       return states;
     }
@@ -147,7 +147,7 @@ const Replay = (() => {
     }
 
     #drawScene(t, colours) {
-      const width = this.root.clientWidth, height = Math.round(Math.min(260, Math.max(160, width * 0.27)));
+      const width = this.root.clientWidth, height = Math.round(Math.min(260, Math.max(200, width * 0.27)));
       if (this.drawn !== width || this.colours !== colours) {
         Object.assign(this, { drawn: width, colours });
         this.context = ReplayColours.fitted(this.canvas, width, height);
@@ -161,7 +161,10 @@ const Replay = (() => {
       this.root.dataset.t = t.toFixed(3);
       const states = this.#stateAt(t), key = states.map(([, text]) => text).join("|");
       if (key !== this.stated) {
-        this.states.replaceChildren(...states.map(([kind, text]) => el(`span.chip.${kind}`, {}, text)));
+        this.states.replaceChildren(...states.map(([kind, text]) => {
+          const [name, ...about] = text.split(/(?=: )/);
+          return el(`span.chip.${kind}`, {}, name, el("span.about", {}, ...about));
+        }));
         if (isPlaying && this.stated !== undefined) this.live.textContent = key.replaceAll("|", ", ");
         this.stated = key;
       }

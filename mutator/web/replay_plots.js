@@ -82,10 +82,8 @@ class ReplayPlots {
   show(now, isPlaying) {
     if (isPlaying) this.#keepInView(this.clock.t);
     const t = this.hovered ?? this.clock.t, isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
-    if (isWritten) {
-      this.written = now;
-      this.told.textContent = `${t.toFixed(2)} s`;
-    }
+    this.told.textContent = `${t.toFixed(2)} s`;
+    if (isWritten) this.written = now;
     for (const plot of this.shown) if (plot.width) plot.look(t, this.view, isWritten);
   }
 

@@ -97,7 +97,7 @@ class ReplayScene {
   /** A mark where the followed actor was when it came: a line across, and its name at the foot. */
   #pin({ kind, x, label }, i) {
     const { context, colours, height } = this, at = this.#x(x);
-    if (at < -150 || at > this.width) return;
+    if (at < 0 || at > this.width) return; // its name goes with it, or it would be cut
     context.strokeStyle = colours[kind] ?? colours.ink;
     context.lineWidth = 1.4;
     context.setLineDash(kind === "hazard" ? [] : [4, 3]);
@@ -181,7 +181,7 @@ class ReplayScene {
     }
     const own = golden.find(({ actor }) => actor.name === this.tracks.scene.follow), here = faulty.find(({ actor }) => actor === own?.actor);
     if (!own || !here) return;
-    const x = this.#x(own.x), by = Math.abs(own.x - here.x).toFixed(0), y = this.#y(own.y) + 4;
+    const x = this.#x(own.x), by = Math.abs(own.x - here.x).toFixed(0), y = this.#y(own.y) + 46; // below the cars and their names
     if (x > width) this.#label(`golden ${by} m ahead ▶`, width - 8, y, colours.goldenText, "right");
     else if (x < 0) this.#label(`◀ golden ${by} m behind`, 8, y, colours.goldenText);
   }

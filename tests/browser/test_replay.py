@@ -183,7 +183,7 @@ def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replay
     replayed.page.click(".jump:has-text('brake_hard')")
     assert replayed.t == 3.0
     told = replayed.page.get_attribute(".timebar", "aria-valuetext")
-    assert told.startswith("3.00 s, fault active, brake_hard, brake 0.000 (golden 1.000)")
+    assert told.startswith("3.00 s, fault active, manifested, brake_hard, brake 0.000 (golden 1.000)")
     assert "gap 17.5" in told
 
 
@@ -296,6 +296,34 @@ def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
     replayed.page.wait_for_function(f"{T} > {END}")
     replayed.press(" ")
     assert not replayed.page.evaluate("player.clock.isPlaying")
+
+
+def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
+    """While it plays, the time above the plots is that of the replay; only values are written less often."""
+    replayed.show(FACTS)
+    seek(replayed, 2.2)
+    replayed.page.evaluate("""() => {
+        const read = (selector) => document.querySelector(selector).textContent;
+        window.clocks = [];
+        const draw = player.clock.draw;
+        player.clock.draw = (...given) => (draw(...given), window.clocks.push([read(".now"), read(".told")]));
+        player.clock.play();
+    }""")
+    replayed.page.wait_for_function("window.clocks.length > 8")
+    replayed.page.evaluate("player.clock.pause()")
+    times = replayed.page.evaluate("window.clocks")
+    assert len({shown for shown, _ in times}) > 4
+    assert [shown for shown, _ in times] == [told for _, told in times]
+
+
+def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
+    """The state names what came up to the time, though its place on the road is out of sight long since."""
+    replayed.show(FACTS)
+    seek(replayed, 2.02)
+    assert replayed.texts(".states .chip") == ["fault active"]
+    seek(replayed, END)
+    hit = "H1: the car hits the one ahead"
+    assert replayed.texts(".states .chip") == ["fault active", "manifested", "brake_hard", hit]
 
 
 def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) -> None:
