@@ -24,10 +24,10 @@ from mutator.outcomes.columns import is_text
 from mutator.outcomes.ranking import worst
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
-from mutator.report.answers import warning
 from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
 from mutator.report.series import sample_kept_traces, series_facts
+from mutator.report.warnings import warning
 from mutator.review.groups import Shape, shapes
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

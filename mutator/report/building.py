@@ -15,9 +15,9 @@ from mutator.report.page import Content, markdown, page_html, study_html, study_
 from mutator.report.panel import FOLDER, Panel
 from mutator.report.panels import PANELS, study_panels
 from mutator.report.panels.answers import answers_panel
-from mutator.report.panels.tables import notes
 from mutator.report.stamp import is_current, made_from, remove_stamp, write_stamp
 from mutator.report.studies import ReportedRun
+from mutator.report.words import words_of
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -87,7 +87,7 @@ def _content(run: ReportedRun) -> Content:
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
         outcomes=outcome_counts(run.rows),
         planned=_planned(run.folder),
-        notes=notes(run.folder).replace("*", ""),
+        words=words_of(run),
         study=run.study.about if run.study and run.compared else "",
         answers=answers_panel(run),
         panels=panels,
@@ -106,6 +106,6 @@ def _planned(folder: RunFolder) -> str:
     if runs == experiments:
         return f"{text}; each is a run of its own."
     return (
-        f"{text}; all of them take {runs} runs, for an experiment that is the same run in several scenarios "
-        "is run once and counted in each."
+        f"{text}, as {runs} runs: where a fault makes several scenarios the same run, it is driven once "
+        "and counted in each."
     )

@@ -8,6 +8,7 @@ from mutator.model import Outcome
 from mutator.mutants.probe import tag_words
 from mutator.report.browse import Browse
 from mutator.report.panel import Panel, rendered
+from mutator.report.words import Words
 from mutator.web import asset, plainly_embedded
 
 STYLES = ("base.css", "report.css", "replay.css", "path.css")
@@ -46,7 +47,7 @@ class Content:
     """What both forms of a report say.
 
     `alarm` stands before everything else, empty if there is none. `outcomes` counts how experiments ended,
-    `planned` says in words how many there are to be, `notes` what the words of the counts mean.
+    `planned` says in words how many there are to be, `words` what the page's words mean.
     `study` cites the study that has a page of its own, empty if there is none.
     `answers` come first, the list of experiments follows, then the other `panels`.
     """
@@ -55,7 +56,7 @@ class Content:
     alarm: str
     outcomes: Mapping[str, int]
     planned: str
-    notes: str
+    words: Words
     study: str
     answers: Panel
     panels: Sequence[Panel]
@@ -72,7 +73,9 @@ def markdown(content: Content) -> str:
         f"{counted(total, 'experiment')}: {endings}. {content.planned}",
         content.answers.markdown,
         *(panel.markdown for panel in content.panels),
-        f"Beside the published numbers: [STUDY.md](STUDY.md) ({content.study})." if content.study else "",
+        f"Compared with the published numbers: [STUDY.md](STUDY.md) ({content.study})."
+        if content.study
+        else "",
         "The table of all experiments is `results.csv`; `index.html` lists them with their diffs.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -96,7 +99,7 @@ def page_html(content: Content) -> str:
 def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
     """The page of the study as Markdown."""
     parts = (
-        f"# {content.name}, beside its study",
+        f"# {content.name}, compared with its study",
         f"{content.study}.",
         *(panel.markdown for panel in panels),
     )

@@ -87,8 +87,8 @@ class Experiment {
       section("Pictures", "pictures"),
       section("What was changed", "change"),
       section("Injected lines alone", "snippet"),
-      section("The fault's spec, its value drawn", "spec"),
-      el("section.again", {}, el("h3", {}, "Do it again"), this.#commands()),
+      section("The fault's spec, with the value of this experiment", "spec"),
+      el("section.again", {}, el("h3", {}, "Run it again"), this.#commands()),
       el("details", {}, el("summary", {}, "All results"), this.#results()));
   }
 
@@ -146,7 +146,7 @@ class Experiment {
   #commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
-    return el("div", {}, el("p", {}, "Drive it again and compare it with its record; see its diff, times and plot:"),
+    return el("div", {}, el("p", {}, "Run it again and compare it with its record; show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`),
       el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try()));
   }

@@ -27,13 +27,18 @@ class Filters {
     const options = facet.values.map((value) => {
       const box = el("input", { type: "checkbox", onchange: () => this.state.toggle(facet.name, value) });
       const count = el("span.count");
-      return { value, box, count, element: el("label.option", {}, box, el("span", {}, value), count) };
+      return { value, box, count, element: el("label.option", {}, box, el("span", {}, Filters.shown(facet, value)), count) };
     });
     const badge = el("b.badge");
     const element = el("details.facet", { "data-facet": facet.name },
       el("summary", {}, facet.title, " ", badge),
       el("fieldset", {}, el("legend.visually-hidden", {}, facet.title), options.map((o) => o.element)));
     return { facet, options, badge, element };
+  }
+
+  /** A value as people read it. */
+  static shown(facet, value) {
+    return facet.show ? facet.show(value) : value;
   }
 
   /** Show what is chosen, and the counts of `filter`. */
@@ -59,7 +64,8 @@ class Filters {
         el("span.quiet", {}, `${title}: `), value, el("span", { "aria-hidden": "true" }, " ✕"));
     const made = [];
     if (this.state.query) made.push(chip("text", this.state.query, () => this.state.set({ query: "" })));
-    for (const { name, title } of Rows.FACETS) {
+    for (const facet of Rows.FACETS) {
+      const { name, title } = facet;
       for (const value of this.state.chosen.get(name) || []) {
         made.push(chip(title.toLowerCase(), value, () => this.state.toggle(name, value)));
       }

@@ -8,27 +8,32 @@ class Grid {
 
   /** Column, title, width in px, and how a cell is filled; `narrow`: also on a telephone. */
   static COLUMNS = [
-    { name: "kind", title: "fault type", px: 196, narrow: true },
-    { name: "variant", title: "variant", px: 86 },
-    { name: "value", title: "value", px: 78, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
-    { name: "scenario", title: "scenario", px: 80, narrow: true },
-    { name: "method", title: "method", px: 74 },
-    { name: "trigger", title: "trigger", px: 86 },
-    { name: "ending", title: "outcome", px: 112, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "severity", title: "severity", px: 78, narrow: true },
-    { name: "t_activation", title: "activated", px: 86, time: true },
-    { name: "t_manifest", title: "manifested", px: 100, time: true },
+    { name: "kind", title: "fault type", px: 174, narrow: true },
+    { name: "variant", title: "variant", px: 72 },
+    { name: "value", title: "value", px: 70, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
+    { name: "scenario", title: "scenario", px: 76, narrow: true },
+    { name: "method", title: "method", px: 66 },
+    { name: "trigger", title: "trigger", px: 78 },
+    { name: "ending", title: "outcome", px: 102, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
+    { name: "severity", title: "severity", px: 100, narrow: true, cell: (t, r) => Grid.severity(t.text(r, "severity")) },
+    { name: "t_activation", title: "activated", px: 80, time: true },
+    { name: "t_manifest", title: "manifested", px: 92, time: true },
     { name: "hazards", title: "hazards", px: 72 },
-    { name: "t_hazard", title: "hazard at", px: 88, time: true },
-    { name: "alerts", title: "alerts", px: 108, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
+    { name: "t_hazard", title: "hazard at", px: 80, time: true },
+    { name: "alerts", title: "alerts", px: 90, cell: (t, r) => t.text(r, "alerts").replaceAll(";", ", ") },
     { name: "t_alert", title: "alert at", px: 70, time: true },
     { name: "reaction_time", title: "reaction", px: 74, time: true },
-    { name: "experiment_id", title: "experiment", px: 100, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
+    { name: "experiment_id", title: "id", px: 76, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
   ];
 
   /** How an experiment ended, as a word on its colour. */
   static ending(text) {
     return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
+  }
+
+  /** A class of severity, written so that nobody takes it for a scenario. */
+  static severity(text) {
+    return text ? Dom.el("span.class", { title: `severity ${text}` }, Dom.el("span.word", {}, "severity "), text) : "";
   }
 
   /** A number of whatever size in three digits; '' for none. */
@@ -96,7 +101,7 @@ class Grid {
   }
 
   #sortBy(name) {
-    const by = this.state.sort;
+    const by = this.state.order;
     this.state.set({ sort: by === name ? `-${name}` : by === `-${name}` ? "" : name });
   }
 
@@ -111,10 +116,10 @@ class Grid {
     if (opened >= 0) this.current = opened;
     this.current = Math.max(0, Math.min(this.current, rows.length - 1));
     this.element.setAttribute("aria-rowcount", String(rows.length + 1));
-    const by = this.state.sort.replace("-", "");
+    const by = this.state.order.replace("-", "");
     for (const head of this.heads) {
       const isBy = head.dataset.column === by;
-      const way = isBy ? (this.state.sort.startsWith("-") ? "descending" : "ascending") : "none";
+      const way = isBy ? (this.state.order.startsWith("-") ? "descending" : "ascending") : "none";
       head.setAttribute("aria-sort", way);
       head.querySelector(".arrow").textContent = isBy ? (way === "ascending" ? " ▲" : " ▼") : "";
     }

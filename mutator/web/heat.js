@@ -28,7 +28,7 @@ class HeatMap {
     const found = table.facets.find((f) => f.name === "severity");
     const classes = found ? found.values.filter((value) => value !== found.none).sort() : [];
     return classes.map((name) => ({
-      name: `severity-${name}`, title: `${name} or worse / activated`,
+      name: `severity-${name}`, title: `severity ${name} or worse / activated`,
       part: (row) => table.text(row, "severity") >= name, of: (row) => table.text(row, "t_activation") !== "",
     }));
   }
@@ -54,7 +54,8 @@ class HeatMap {
     ];
     if (table.columns.has("alerts")) made.push(
       { name: "alerts", title: "alerts / activated", part: isAlert, of: isActive },
-      { name: "silent", title: "hazards without an alert / hazards", part: (row) => !isAlert(row), of: isHazard },
+      { name: "silent", title: "silent hazards (no alert before) / hazards", part: (row) => table.text(row, "reaction_time") === "", of: isHazard },
+      { name: "no-alert", title: "hazards with no alert at all / hazards", part: (row) => !isAlert(row), of: isHazard },
     );
     if (table.checked.length < 2) return made;
     const each = table.checked.map((hazard) => ({

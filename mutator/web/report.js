@@ -35,14 +35,15 @@ const Report = (() => {
       if (key !== drawn) {
         drawn = key;
         const { rows, apart, counts } = table.filter(state.query, state.chosen, HeatMap.FREE);
-        const sorted = state.sort ? table.sort(rows, state.sort.replace("-", ""), state.sort.startsWith("-")) : rows;
+        const sorted = table.sort(rows, state.order.replace("-", ""), state.order.startsWith("-"));
         grid.show(sorted);
         heat.show(apart);
         filters.show(counts);
         columns.show();
-        find("found").textContent = state.isFiltered
+        const found = state.isFiltered
           ? `${rows.length.toLocaleString("en")} of ${table.count.toLocaleString("en")} experiments`
           : `${table.count.toLocaleString("en")} experiment${table.count === 1 ? "" : "s"}`;
+        find("found").textContent = [found, ...table.unknown(state)].join(". ");
         if (search.value !== state.query) search.value = state.query;
       } else grid.show(grid.rows);
       arrange();

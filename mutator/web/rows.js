@@ -11,7 +11,7 @@ const Rows = (() => {
     { name: "trigger", title: "Trigger" },
     { name: "outcome", title: "Outcome", none: "no outcome" },
     { name: "status", title: "Status" },
-    { name: "severity", title: "Severity", none: "no contact" },
+    { name: "severity", title: "Severity", none: "no contact", show: (value) => (/^S\d$/.test(value) ? `severity ${value}` : value) },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
     { name: "warning", title: "Warning", none: "no hazard" },
@@ -90,11 +90,12 @@ const Rows = (() => {
       return (row) => found.text(row).toLowerCase().includes(token);
     }
 
-    /** `smallest_ttc<1` as a function of the row; null: no comparison with a column. An empty cell fits none. */
+    /** `smallest_ttc<1` as a function of the row; null: no comparison with a column. An empty cell fits `alerts=none` only. */
     #comparison(token) {
       const [, name, sign, wanted] = COMPARISON.exec(token) || [];
       const found = this.columns.get(name), compare = COMPARED[sign];
       if (!found) return null;
+      if (sign === "=" && wanted === "none") return (row) => found.text(row) === "" || found.text(row) === "none";
       if (found.numbers) return Number.isNaN(Number(wanted)) ? null : (row) => compare(found.number(row), Number(wanted));
       return (row) => found.text(row) !== "" && compare(found.text(row).toLowerCase(), wanted);
     }
@@ -148,6 +149,21 @@ const Rows = (() => {
         }
       }
       return { rows, apart, counts: new Map(this.facets.map((f, i) => [f.name, counts[i]])) };
+    }
+
+    /** What in a state names no column or filter, and filters none of whose values these results have; in sentences. */
+    unknown({ query, chosen, unknown }) {
+      const made = unknown.map((name) => `This page has no filter "${name}"`);
+      for (const token of query.toLowerCase().split(/\s+/)) {
+        const [, name] = COMPARISON.exec(token) || [];
+        if (name && !this.columns.has(name)) made.push(`There is no column "${name}" to search`);
+      }
+      for (const [name, values] of chosen) {
+        const facet = this.facets.find((f) => f.name === name);
+        if (facet && [...values].some((value) => facet.at.has(value))) continue;
+        made.push(`No experiment has ${name} ${[...values].map((value) => `"${value}"`).join(" or ")}`);
+      }
+      return made;
     }
 
     /** `rows` by a column: words by their alphabet, numbers by size, what is empty last; equal ones as they were. */

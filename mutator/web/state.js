@@ -39,7 +39,11 @@ class State {
     this.heat = one("heat", "");
     this.columns = (given.get("cols") || []).filter(Boolean); // of the list; none: those it has by itself
     this.chosen = new Map();
-    for (const { name } of Rows.FACETS) if (given.has(name)) this.chosen.set(name, new Set(given.get(name)));
+    for (const { name, none } of Rows.FACETS) {
+      if (given.has(name)) this.chosen.set(name, new Set(given.get(name).map((value) => (value === "none" && none) || value)));
+    }
+    const known = ["e", "q", "sort", "heat", "cols", ...Rows.FACETS.map(({ name }) => name)];
+    this.unknown = [...given.keys()].filter((name) => name && !known.includes(name)); // what this page cannot show
   }
 
   /** The fragment of this state; with `experiment` of the same with that one opened. */
@@ -84,6 +88,11 @@ class State {
     this.chosen.clear();
     this.query = "";
     this.#write(false);
+  }
+
+  /** What the list is sorted by: the worst first, unless a column was chosen. */
+  get order() {
+    return this.sort || "rank";
   }
 
   get isFiltered() {

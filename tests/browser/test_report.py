@@ -133,11 +133,49 @@ def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[
     silent = [row for row in hazards if not row["reaction_time"]]
     page.page.click(".dangerous td a >> nth=0")
     page.page.wait_for_selector("#experiment .ending.hazard")
+    assert page.page.inner_text("#experiment .place") == f"1 of {len(hazards)}"
     page.page.go_back()
     page.page.click(".unwarned p a")
     assert page.page.inner_text(".unwarned p").startswith(f"{len(silent)} of {len(hazards)} hazards")
     assert page.found == f"{len(silent)} of {COUNT} experiments"
     assert len(silent) not in (0, len(hazards))
+
+
+def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
+    """Without a chosen order the list has the worst first: hazards before all that ended otherwise."""
+    endings = page.column("ending")
+    assert endings == sorted(
+        endings, key=["hazard", "crashed", "sdc", "not activated", "harness error"].index
+    )
+    page.open("cols=rank,kind")
+    assert [int(text) for text in page.column("rank")] == list(range(1, COUNT + 1))
+
+
+def test_a_link_that_asks_for_what_is_not_there_says_so(page: "Page") -> None:
+    """Neither a filter, a value nor a column that these results lack is passed over in silence."""
+    page.open("alert=none")
+    assert page.found == f'{COUNT} experiments. This page has no filter "alert"'
+    page.open("scenario=Q")
+    assert page.found == f'0 of {COUNT} experiments. No experiment has scenario "Q"'
+    page.open("q=speeed%3E3")
+    assert page.found == f'0 of {COUNT} experiments. There is no column "speeed" to search'
+
+
+def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[dict[str, str]]) -> None:
+    """`alerts=none` finds experiments without an alert, behind # and in the search."""
+    without = sum(row["alerts"] == "" for row in rows)
+    for fragment in ("alerts=none", "q=alerts%3Dnone"):
+        page.open(fragment)
+        assert page.found == f"{without} of {COUNT} experiments"
+    assert 0 < without < COUNT
+
+
+def test_the_words_of_the_page_are_explained(page: "Page") -> None:
+    """How experiments end, what is counted, when a hazard is silent, what triggers wait for."""
+    page.page.click(".words summary")
+    assert page.page.is_visible(".glossary")
+    words = {"sdc", "masked", "golden run", "silent hazard", "guided", "rank", "near"}
+    assert words <= {*page.texts(".glossary dt")}
 
 
 def test_two_keys_lead_to_the_list(page: "Page") -> None:
@@ -324,6 +362,10 @@ def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path
     context.close()
 
 
+TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility() && !h.closest("[inert]"))
+    .map((h) => h.textContent)"""
+
+
 @pytest.mark.parametrize("width", [1440, 400])
 def test_axe_finds_no_serious_fault(
     page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
@@ -336,7 +378,9 @@ def test_axe_finds_no_serious_fault(
         page.page.evaluate("document.querySelector('#grid tr[data-at]').click()")
         page.page.wait_for_selector("#experiment .diff")
         assert serious_faults(page.page) == []
+        assert page.page.evaluate(TITLES) == ["Experiment of toy"]
         page.page.keyboard.press("Escape")
+        assert page.page.evaluate(TITLES) == ["toy"]
 
 
 def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:

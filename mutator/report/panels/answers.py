@@ -5,13 +5,16 @@ import re
 from markupsafe import Markup
 
 from mutator._common.tables import Table
-from mutator.report.answers import Cell, Link, Listing, Part, answers_of
+from mutator.report.answer_parts import Cell, Link, Listing, Part
+from mutator.report.answers import answers_of
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
 _HTML = """\
 <div class="answers">
-{% for answer in answers %}
+{% for column in columns %}
+<div class="column">
+{% for answer in column %}
 <section class="answer {{ answer.name }}" aria-labelledby="answer-{{ answer.name }}">
 <h2 id="answer-{{ answer.name }}">{{ answer.title }}</h2>
 <p>{{ answer.says }}
@@ -24,18 +27,21 @@ _HTML = """\
 </section>
 {% endfor %}
 </div>
+{% endfor %}
+</div>
 """
 _BAR = '<span class="meter" style="--share: {:.3f}"></span><span class="of">{}</span>'
 
 
 def answers_panel(run: ReportedRun) -> Panel:
-    """What is dangerous, what came without a warning, what was survived, where the time went."""
+    """The answers in one panel; those with wide tables have a column of the page to themselves."""
     made = answers_of(run)
     parts = []
     for answer in made:
         tables = [_table(one).as_markdown() for one in answer.listings if one.lines]
         parts += [f"## {answer.title}", answer.says, *tables]
-    html = rendered(_HTML, answers=made, table=_html)
+    columns = [[one for one in made if one.wide], [one for one in made if not one.wide]]
+    html = rendered(_HTML, columns=columns, table=_html)
     return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
 
 

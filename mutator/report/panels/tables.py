@@ -29,7 +29,7 @@ NOTES = (
     "that could not be made, is counted apart. *Activated*: an injected statement ran while triggered. "
     "*Manifested*: an actuator output then differed from the fault-free run."
 )
-NO_ALERT = " *Hazard, no alert*: no counted alert at all."
+NO_ALERT = " *Hazard, no alert*: no counted alert at all, before or after the hazard."
 FAULT_FREE = "The golden runs: first times of alerts and hazards, and how far each plotted channel goes."
 _GROUPS = (
     ("By fault type", "fault type", by_fault_type),

@@ -4,12 +4,17 @@ import csv
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from mutator.outcomes.columns import result_columns
-from mutator.report.answers import Answer, Link, Part, answers_of, to_list
+from mutator.report.answer_parts import Answer, Link, Part, to_list
+from mutator.report.answers import answers_of
+from mutator.report.dangers import dangerous
+from mutator.report.fix_order import first_to_fix
 from mutator.report.panels.answers import answers_panel
 from mutator.report.studies import ReportedRun
+from mutator.report.warnings import NO_ALERT
 from mutator.store.run_folder import RunFolder
 
 from .made_run import HEAD, make_run
@@ -52,7 +57,7 @@ def run(tmp_path: Path) -> ReportedRun:
     lines = [
         {"schema": "timings/1", "plan": HEAD["plan"]},
         *costs,
-        costs[0] | {"experiment_id": "7" * 16, "cpu_s": 0},
+        costs[0] | {"experiment_id": "7" * 16, "cpu_s": 0, "engine": "golden"},
     ]
     (tmp_path / "timings").mkdir()
     (tmp_path / "timings" / "0001-main.jsonl").write_text("".join(f"{json.dumps(line)}\n" for line in lines))
@@ -66,7 +71,7 @@ def said(run: ReportedRun) -> dict[str, Answer]:
 
 
 def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
-    """Harder contact first, then the smaller margin; each row opens its experiment."""
+    """Harder contact first, then the smaller margin; a row opens its experiment in the list of hazards."""
     answer = said["dangerous"]
     assert (
         answer.says
@@ -74,10 +79,10 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
     )
     worst, kinds = answer.listings
     assert [line[0] for line in worst.lines] == [
-        Link("radar/chaff/x", f"e={'1' * 16}"),
-        Link("radar/chaff/x", f"e={'0' * 16}"),
-        Link("car/speed/x", f"e={'4' * 16}"),
-        Link("car/speed/x", f"e={'3' * 16}"),
+        Link("radar/chaff/x", f"e={'1' * 16}&outcome=hazard&sort=rank"),
+        Link("radar/chaff/x", f"e={'0' * 16}&outcome=hazard&sort=rank"),
+        Link("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank"),
+        Link("car/speed/x", f"e={'3' * 16}&outcome=hazard&sort=rank"),
     ]
     assert worst.heads[3:] == ("how bad", "hazard after", "alert before")
     assert [line[3:] for line in worst.lines] == [
@@ -91,31 +96,96 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
 
 
 def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> None:
-    """Three of four hazards had no alert before, one of them an alert too late."""
+    """Three of four hazards had no alert before: two none at all, one an alert too late."""
     answer = said["unwarned"]
-    assert (
-        answer.says == "3 of 4 hazards (75 %) came with no alert before; in 1 of these an alert came later."
+    assert answer.says == (
+        "3 of 4 hazards (75 %) were silent, that is, no alert came before: 2 with no alert at all, 1 with an "
+        "alert only after the hazard."
     )
+    assert [line[2] for line in answer.listings[0].lines] == ["1", "1"]
     assert [line[1] for line in answer.listings[0].lines] == [Part(2, 2, "2 of 2"), Part(1, 2, "1 of 2")]
-    assert answer.links[0].to == "warning=no%20alert,alert%20after%20the%20hazard"
+    assert [link.to for link in answer.links] == [
+        "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard",
+        "warning=no%20alert%20at%20all",
+        "warning=alert%20only%20after%20the%20hazard",
+    ]
+
+
+def test_without_severity_the_most_silent_hazards_are_fixed_first(said: dict[str, Answer]) -> None:
+    """Silent hazards count, then the shortest time to one; a link opens the fastest among the silent ones."""
+    answer = said["first"]
+    assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
+    silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
+    assert [line[:3] for line in answer.listings[0].lines] == [
+        (
+            Link("car/speed", f"kind=car%2Fspeed&{silent}"),
+            Link("2", f"kind=car%2Fspeed&{silent}&sort=rank"),
+            Link("5.00 s", f"e={'3' * 16}&kind=car%2Fspeed&{silent}&sort=rank"),
+        ),
+        (
+            Link("radar/chaff", f"kind=radar%2Fchaff&{silent}"),
+            Link("1", f"kind=radar%2Fchaff&{silent}&sort=rank"),
+            Link("3.00 s", f"e={'0' * 16}&kind=radar%2Fchaff&{silent}&sort=rank"),
+        ),
+    ]
+
+
+def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
+    """Silent hazards of a fault type, a class of severity and a time after activation, the worst first."""
+    names = ["kind", "severity", "after"]
+    frame = pd.DataFrame(rows, columns=names)
+    frame["t_hazard"] = 2 + frame["after"]
+    frame["experiment_id"] = [f"e{i}" for i in frame.index]
+    same = {"outcome": "hazard", "is_activated": True, "t_activation": 2.0, "warning": NO_ALERT}
+    told = {"scenario": "S1", "hazard_names": "H1", "warned": "none", "delta_v": "", "margin_h1": "-1"}
+    return frame.assign(fault=frame["kind"], place=frame.index, **same, **told)
+
+
+def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() -> None:
+    """One of class S3 goes before many of S1; with as many of each class the faster one goes first."""
+    many = [("a/many", "S1", 1.0)] * 5
+    some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
+    answer = first_to_fix(hazards(*some, *many), None, has_alerts=True)
+    lines = answer.listings[0].lines
+    kinds = [line[0].text for line in lines if isinstance(line[0], Link)]
+    assert kinds == ["d/both", "c/fast", "b/slow", "a/many"]
+    assert lines[0][1] == Link(
+        "1 severity S3, 1 without contact",
+        "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
+    )
+    assert "and 1 of 3 of severity S3, the highest that came" in answer.says
+
+
+def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
+    """Six contacts and four others where both are many; each list opens its own kind of hazards."""
+    frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
+    hit, missed, _ = dangerous(frame, [["margin_h1", "m", "", "lower"]], has_alerts=True).listings
+    assert (len(hit.lines), len(missed.lines)) == (6, 4)
+    assert "severity" in hit.heads and "severity" not in missed.heads
+    assert hit.lines[0][0] == Link("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")
+    assert missed.lines[0][0] == Link("b/miss", "e=e12&outcome=hazard&severity=no%20contact&sort=rank")
+    assert len(dangerous(frame[:12], [], has_alerts=True).listings[0].lines) == 10
 
 
 def test_what_was_survived_is_counted_of_what_was_activated(said: dict[str, Answer]) -> None:
-    """A fault that never became active was not survived; the weakest fault type is first."""
+    """A fault that never became active was not survived; the weakest fault type is first, and those that
+    never led to a hazard are named."""
     answer = said["survived"]
     assert answer.says == (
-        "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator, 1 did. "
+        "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
         "1 of 3 fault types (33 %) never led to one."
     )
-    assert [line[1] for line in answer.listings[0].lines][-1] == Part(1, 1, "1 of 1")
+    weak, never = answer.listings
+    assert [line[1] for line in weak.lines] == [Part(1, 3, "1 of 3"), Part(1, 3, "1 of 3")]
+    assert never.lines == [(Link("car/steer", "kind=car%2Fsteer&outcome=masked,sdc"), "1")]
 
 
 def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) -> None:
     """The costliest fault type is first; an experiment that was not driven costs nothing."""
     answer = said["time"]
     assert answer.says == (
-        "2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven; the others needed no "
-        "run of their own. Median 8.00 s, longest 64.00 s."
+        "2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 whose trigger never "
+        "held, so that the golden run's result stands. Median 8.00 s, longest 64.00 s."
     )
     [first, *_] = answer.listings[0].lines
     assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "1 min 04 s (50 %)"))
@@ -132,8 +202,9 @@ def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
     )
     panel = answers_panel(calm)
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
-    assert "0 of 0 hazards came with no alert before." in panel.markdown
+    assert "0 of 0 hazards were silent, that is, no alert came before." in panel.markdown
     assert "the worst" not in panel.markdown
+    assert "What to fix first" not in panel.markdown
 
 
 def test_a_link_names_facets_as_the_page_reads_them() -> None:

@@ -138,9 +138,7 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
 
 def test_experiments_and_runs_are_told_apart(run: Path) -> None:
     """Both numbers are there, and why they differ; a plan of before runs were shared has none of runs."""
-    assert (
-        "3 experiments are planned; all of them take 2 runs" in building.write(run, None).markdown.read_text()
-    )
+    assert "3 experiments are planned, as 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
 

@@ -1,0 +1,77 @@
+"""What answers of a report are made of: sentences, small tables, links into the list of experiments."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from urllib.parse import quote
+
+import pandas as pd
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A text that leads to a place of the page: `to` is what stands behind #."""
+
+    text: str
+    to: str
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """`part` of `of`, drawn as a bar."""
+
+    part: float
+    of: float
+    text: str
+
+
+Cell = str | Link | Part
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """A small table."""
+
+    heads: tuple[str, ...]
+    lines: Sequence[tuple[Cell, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """A question's answer: a sentence or two, tables, and links to the experiments it speaks of. `wide`: its
+    tables have many columns."""
+
+    name: str
+    title: str
+    says: str
+    listings: tuple[Listing, ...] = ()  # those without lines are not shown
+    links: tuple[Link, ...] = ()
+    wide: bool = False
+
+
+def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
+    """The fragment of the list with these filters."""
+    parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in facets.items()]
+    return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
+
+
+def share(part: int, of: int, what: str) -> str:
+    """`20 of 96 activated faults (21 %)`; in the singular where there is but one."""
+    noun = what.removesuffix("s") if of == 1 else what
+    return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
+
+
+def by_kind(part: pd.DataFrame, of: pd.DataFrame) -> list[tuple[str, int, int]]:
+    """Fault type, how many of `part`, how many of `of`; most first."""
+    parts = part["kind"].value_counts()
+    counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in of["kind"].value_counts().items()]
+    return sorted(counts, key=lambda c: (-c[1], -c[2], c[0]))
+
+
+def kind_link(kind: str, **facets: Sequence[str]) -> Link:
+    """A fault type that leads to its experiments with these values."""
+    return Link(kind, to_list({"kind": [kind], **facets}))
+
+
+def bar(part: int, of: int) -> Part:
+    """`2 of 3`."""
+    return Part(part, of, f"{part:,} of {of:,}")

@@ -1,0 +1,126 @@
+"""What is dangerous: the worst experiments with and without contact, the fault types with most hazards."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+
+from mutator.report.answer_parts import Answer, Link, Listing, bar, by_kind, kind_link, share, to_list
+
+WORST = 10  # experiments that are listed as the most dangerous, with and without contact
+CONTACTS = 6  # of these with contact, where both kinds came
+TYPES = 6  # fault types that are listed
+MARGIN = "margin_"  # how the columns of margins to a hazard begin
+SEVERITY = "severity"  # column: S0 to S3, empty without contact
+HAZARD = {"outcome": ["hazard"]}  # a filter of the list
+NO_CONTACT = "no contact"  # what the page's filter calls an empty severity
+
+
+def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_alerts: bool) -> Answer:
+    """The worst experiments, and the fault types that end in a hazard most often."""
+    active = frame[frame["is_activated"]]
+    ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
+    contact = contact_measure(frame)
+    says = f"{share(len(ranked), len(active), 'activated faults')} led to a hazard."
+    if SEVERITY in frame and len(ranked):
+        says = f"{says.removesuffix('.')}: {_classes(ranked)}."
+    elif contact:
+        hits = int((pd.to_numeric(ranked[contact]) > 0).sum())
+        says += f" {share(hits, len(ranked), 'hazards')} came with contact."
+    units = {name: unit for name, unit, *_ in metrics}
+    kinds = by_kind(ranked, active)
+    came = [kind for kind in kinds if kind[1]]
+    lines = [(kind_link(kind, outcome=["hazard"]), bar(part, of)) for kind, part, of in came[:TYPES]]
+    first = f"the first {TYPES} of {len(came)}" if len(came) > TYPES else "most hazards first"
+    heads = (f"fault types with hazards, {first}", "hazards / activated")
+    return Answer(
+        name="dangerous",
+        title="What is dangerous",
+        wide=True,
+        says=says,
+        listings=(*_worst_lists(ranked, units, has_alerts=has_alerts), Listing(heads=heads, lines=lines)),
+        links=_links(ranked),
+    )
+
+
+def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
+    """To all hazards, and to those with and without contact where both came."""
+    if ranked.empty:
+        return ()
+    made = [Link(f"All {len(ranked):,} hazards", to_list(HAZARD, "rank"))]
+    classes = sorted(filter(None, ranked[SEVERITY].unique())) if SEVERITY in ranked else []
+    if classes and (ranked[SEVERITY] == "").any():
+        made.append(Link("With contact", to_list({**HAZARD, SEVERITY: classes}, "rank")))
+        made.append(Link("Without contact", to_list({**HAZARD, SEVERITY: [NO_CONTACT]}, "rank")))
+    return tuple(made)
+
+
+def contact_measure(frame: pd.DataFrame) -> str:
+    """The column that tells how hard a contact was, the better one first; '' if the target has none."""
+    return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
+
+
+def _classes(hazards: pd.DataFrame) -> str:
+    """`2 of severity S3, 4 of severity S1, 14 without contact`."""
+    counts = hazards[SEVERITY].value_counts()
+    told = [f"{counts[name]} of severity {name}" for name in sorted(filter(None, counts.index), reverse=True)]
+    return ", ".join((*told, f"{counts.get('', 0)} without contact"))
+
+
+def _worst_lists(ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool) -> tuple[Listing, ...]:
+    """One list, or two where some hazards came with a contact that has a class, and some without: these
+    rank by margin, so they would hardly ever be among the worst of all."""
+    hit = ranked[ranked[SEVERITY] != ""] if SEVERITY in ranked else ranked
+    missed = ranked.drop(hit.index)
+    if hit.empty or missed.empty:
+        return (_worst(ranked.head(WORST), "the worst", HAZARD, units, has_alerts=has_alerts),)
+    contacts = hit.head(max(CONTACTS, WORST - len(missed)))
+    others = missed.head(WORST - len(contacts))
+    classes = sorted(hit[SEVERITY].unique())
+    shown, also = {**HAZARD, SEVERITY: classes}, {**HAZARD, SEVERITY: [NO_CONTACT]}
+    return (
+        _worst(contacts, "the worst with contact", shown, units, has_alerts=has_alerts),
+        _worst(others, "the worst without contact", also, units, has_alerts=has_alerts),
+    )
+
+
+def _worst(
+    ranked: pd.DataFrame,
+    head: str,
+    shown: Mapping[str, Sequence[str]],
+    units: Mapping[str, str],
+    *,
+    has_alerts: bool,
+) -> Listing:
+    """The experiments with what tells how bad they are; each opens in the list of all that are `shown`."""
+    contact = contact_measure(ranked)
+    heads = [head, "scenario", "hazards"]
+    columns = [ranked["scenario"], ranked["hazard_names"]]
+    if SEVERITY in ranked and (ranked[SEVERITY] != "").any():
+        heads.append("severity")
+        columns.append(("severity " + ranked[SEVERITY]).where(ranked[SEVERITY] != "", "-"))
+    if contact or any(name.startswith(MARGIN) for name in units):
+        heads.append("how bad")
+        told = [_how_bad(row, contact, units) for row in ranked.to_dict("records")]
+        columns.append(pd.Series(told, ranked.index, dtype=str))
+    heads.append("hazard after")
+    columns.append((ranked["t_hazard"] - ranked["t_activation"]).map("{:.2f} s".format))
+    if has_alerts:
+        heads.append("alert before")
+        columns.append(ranked["warned"])
+    around = to_list(shown, "rank")
+    links = [
+        Link(fault, f"e={name}&{around}")
+        for fault, name in zip(ranked["fault"], ranked["experiment_id"], strict=True)
+    ]
+    return Listing(heads=tuple(heads), lines=list(zip(links, *columns, strict=True)))
+
+
+def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
+    """`delta-v 6.70 m/s` of a contact, else the least margin to the hazards that came; '-': not known."""
+    if contact and row[contact] not in ("", "0.0"):
+        words = "delta-v" if contact == "delta_v" else "contact at"
+        return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"
+    names = [f"{MARGIN}{name.lower()}" for name in row["hazard_names"].split(", ")]
+    margins = [(float(row[name]), units[name]) for name in names if name in units and row[name] != ""]
+    return "margin {:.2f} {}".format(*min(margins)) if margins else "-"

@@ -1,0 +1,158 @@
+"""What to fix first: fault types in the order of a plain rule, with the component that lets them through.
+
+The rule: the most silent hazards (no alert before) of the highest class of severity; where these are as many,
+of the next class, and so on down to hazards without contact; then the shortest time from fault to hazard.
+Without alerts all hazards count, without severity all are of one class.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+
+import pandas as pd
+
+from mutator.outcomes.paths import Crossing, Passage, Path
+from mutator.report.answer_parts import Answer, Cell, Link, Listing, kind_link, share, to_list
+from mutator.report.dangers import NO_CONTACT, SEVERITY
+from mutator.report.paths import FoundPaths, link_text
+from mutator.report.warnings import FIRST, SILENT
+from mutator.targets.channels import Role
+
+LISTED = 5  # fault types
+
+
+def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
+    """The fault types by the rule, each with its numbers; `frame` has at least one hazard."""
+    hazards = frame[frame["outcome"] == "hazard"]
+    counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
+    if counted.empty:  # each hazard had its warning
+        counted, has_alerts = hazards, False
+    classes = _classes(counted)
+    order = _order(counted, classes)
+    what = "silent hazards" if has_alerts else "hazards"
+    heads = ["fault type", f"{what} by severity" if SEVERITY in counted else what, "fastest hazard after"]
+    heads += ["let through to an actuator by", "stopped, of those active"] if paths else []
+    only: Mapping[str, Sequence[str]] = {"warning": SILENT} if has_alerts else {"outcome": ["hazard"]}
+    lines = [
+        _line(kind, frame[frame["kind"] == kind], counted[counted["kind"] == kind], classes, only, paths)
+        for kind in order[:LISTED]
+    ]
+    return Answer(
+        name="first",
+        title="What to fix first",
+        wide=True,
+        says=_says(order, counted, classes, what),
+        listings=(Listing(heads=tuple(heads), lines=lines),),
+    )
+
+
+def _classes(hazards: pd.DataFrame) -> list[str]:
+    """The classes of severity that came, the highest first, no contact ('') last."""
+    return sorted(hazards[SEVERITY].unique(), reverse=True) if SEVERITY in hazards else [""]
+
+
+def _of_class(hazards: pd.DataFrame, name: str) -> pd.DataFrame:
+    return hazards[hazards[SEVERITY] == name] if SEVERITY in hazards else hazards
+
+
+def _after(hazards: pd.DataFrame) -> pd.Series:
+    """Times from activation to hazard, s."""
+    return hazards["t_hazard"] - hazards["t_activation"]
+
+
+def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
+    """The fault types by the rule."""
+    groups = {str(kind): group for kind, group in hazards.groupby("kind")}
+    key = {
+        kind: (*(-len(_of_class(group, name)) for name in classes), float(_after(group).min()), kind)
+        for kind, group in groups.items()
+    }
+    return sorted(groups, key=key.__getitem__)
+
+
+def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], what: str) -> str:
+    """The answer in a sentence, then the rule."""
+    mine = counted["kind"] == order[0]
+    says = f"Start with {order[0]}: {share(int(mine.sum()), len(counted), what)}"
+    if classes[0]:
+        of_class = counted[SEVERITY] == classes[0]
+        says += f", and {int((mine & of_class).sum())} of {int(of_class.sum())} of severity {classes[0]}"
+        says += ", the highest that came"
+    says += f". The rule: fault types with most {what}"
+    if len(classes) > 1:
+        says += " of the highest severity come first; where these are as many, those of the next class count"
+    says += ", then the shortest time from fault to hazard."
+    if len(order) > LISTED:
+        says += f" The table has the first {LISTED} of {len(order)} fault types."
+    return says
+
+
+def _line(
+    kind: str,
+    all_of_kind: pd.DataFrame,
+    counted: pd.DataFrame,
+    classes: Sequence[str],
+    only: Mapping[str, Sequence[str]],
+    paths: FoundPaths | None,
+) -> tuple[Cell, ...]:
+    told = [(name, len(_of_class(counted, name))) for name in classes]
+    if SEVERITY in counted:
+        named = [f"{n} severity {name}" if name else f"{n} without contact" for name, n in told if n]
+        numbers = ", ".join(named)
+    else:
+        numbers = f"{len(counted):,}"
+    after = _after(counted)
+    fastest = str(counted["experiment_id"].iloc[int(after.argmin())])
+    worst = next((name for name, n in told if n), "")
+    facets = {"kind": [kind], **only}
+    severe = {SEVERITY: [worst or NO_CONTACT]} if SEVERITY in counted else {}
+    line: list[Cell] = [
+        kind_link(kind, **only),
+        Link(numbers, to_list({**facets, **severe}, "rank")),
+        Link(f"{after.min():.2f} s", f"e={fastest}&{to_list(facets, 'rank')}"),
+    ]
+    if paths:
+        active = all_of_kind[all_of_kind["is_activated"]]["experiment_id"]
+        line += [
+            _let_through(kind, set(counted["experiment_id"]), only, paths),
+            _stopped(kind, active, paths),
+        ]
+    return tuple(line)
+
+
+def _let_through(
+    kind: str, hazards: Collection[str], only: Mapping[str, Sequence[str]], paths: FoundPaths
+) -> Cell:
+    """The component that most often let such a fault through to the actuator that changed first."""
+    passed: Counter[str] = Counter()
+    links: dict[str, set[str]] = {}
+    for name in sorted(hazards & paths.by_id.keys()):
+        if crossing := _to_actuator(paths.by_id[name], paths):
+            passed[crossing.tail] += 1
+            links.setdefault(crossing.tail, set()).add(link_text(crossing.tail, crossing.tip))
+    if not passed:
+        return "-"
+    component = min(passed, key=lambda name: (-passed[name], name))
+    to = to_list({"kind": [kind], **only, "through": sorted(links[component])}, "rank")
+    return Link(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", to)
+
+
+def _to_actuator(path: Path, paths: FoundPaths) -> Crossing | None:
+    """The link that a fault came to the first actuator by; None where it came to none."""
+    actuators = {component for _, _, role, component, _ in paths.channels if role == Role.ACTUATOR.value}
+    first = {stage.component: stage.t_first for stage in path.stages}
+    through = [c for c in path.crossings if c.tip in actuators and c.passage is Passage.THROUGH]
+    return min(through, key=lambda c: math.inf if (t := first[c.tip]) is None else t, default=None)
+
+
+def _stopped(kind: str, active: pd.Series, paths: FoundPaths) -> Cell:
+    """Where faults of the type were stopped, most first: there the others might be, too."""
+    stopped: Counter[str] = Counter()
+    for name in active:
+        if path := paths.by_id.get(name):
+            stopped.update(path.stopped_at)
+    if not stopped:
+        return f"none of {len(active):,}"
+    component = min(stopped, key=lambda name: (-stopped[name], name))
+    text = f"{paths.label(component)}: {stopped[component]:,} of {len(active):,}"
+    return Link(text, to_list({"kind": [kind], "stopped_at": [component]}))
