@@ -18,7 +18,7 @@ _RUNS = {
     "manifested": "after that an actuator output differed from the golden run",
     "fault-tolerant time": "from the activation to the first hazard",
     "margin": "how far a run stayed from a hazard, negative in it",
-    "rank": "1 is the worst: by severity, then delta-v; what has no contact by its ending, then its margin",
+    "rank": "1 is the worst: by severity, then delta-v; without contact by ending, then margin",
 }
 _ENDINGS = {
     "hazard": "a hazard came at or after the activation",
@@ -61,7 +61,7 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
     classes = scale["classes"]
     assert isinstance(classes, list)
     told = {f"severity {name}": f"delta-v from {low:.2f} m/s on: {about}" for name, low, about in classes}
-    return told | {"no contact": "no class; such hazards rank by their margin"}
+    return told | {"no contact": "no class; such hazards rank by margin, their kinds taking turns"}
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
