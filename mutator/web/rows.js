@@ -11,7 +11,7 @@ const Rows = (() => {
     { name: "trigger", title: "Trigger" },
     { name: "outcome", title: "Outcome", none: "no outcome" },
     { name: "status", title: "Status" },
-    { name: "severity", title: "Severity", none: "no contact", show: (value) => (/^S\d$/.test(value) ? `severity ${value}` : value) },
+    { name: "severity", title: "Severity", none: "no contact", show: (value) => (value === "no contact" ? `${value}, any outcome` : `severity ${value}`) },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
     { name: "warning", title: "Warning", none: "no hazard" },

@@ -1,5 +1,5 @@
 "use strict";
-// What is shown, kept in the address behind #, so that it can be shared and Back goes back:
+// What is shown, kept in the address behind #, so that it can be shared and Back works:
 // #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=warned&cols=kind,delta_v
 
 class State {

@@ -3,16 +3,21 @@
 import csv
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pandas as pd
 import pytest
 
 from mutator.outcomes.columns import result_columns
+from mutator.outcomes.paths import Crossing, Passage, Stage, State
+from mutator.outcomes.paths import Path as FaultPath
 from mutator.report.answer_parts import Answer, Link, Part, to_list
 from mutator.report.answers import answers_of
 from mutator.report.dangers import dangerous
 from mutator.report.fix_order import first_to_fix
 from mutator.report.panels.answers import answers_panel
+from mutator.report.paths import FoundPaths
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import NO_ALERT
 from mutator.store.run_folder import RunFolder
@@ -154,6 +159,42 @@ def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() 
         "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
     )
     assert "and 1 of 3 of severity S3, the highest that came" in answer.says
+
+
+CHANNELS = [
+    ["seen", "m", "internal", "eyes", ""],
+    ["gas", "-", "actuator", "pedals", ""],
+    ["turn", "-", "actuator", "wheel", ""],
+]
+
+
+def through(pedals_at: float, wheel_at: float) -> FaultPath:
+    """From the eyes by the feet to the pedals, and by the hands to the wheel."""
+    times = {"pedals": ("gas", pedals_at), "wheel": ("turn", wheel_at)}
+    stages = [
+        Stage(component=name, state=State.REACHED, channels=((*left, 1.0),)) for name, left in times.items()
+    ]
+    links = [("feet", "pedals"), ("hands", "wheel")]
+    crossings = [Crossing(link=a, tail=a, tip=b, passage=Passage.THROUGH) for a, b in links]
+    return FaultPath(stages=tuple(stages), crossings=tuple(crossings), reached="", stopped_at=())
+
+
+def test_a_fault_was_let_through_to_the_actuator_that_changed_first() -> None:
+    """What changed later is an after-effect; most of the faults decide; stops of the type are counted."""
+    by_id = {"e0": through(2.1, 2.5), "e1": through(2.1, 2.5), "e2": through(2.9, 2.5)}
+    by_id["masked"] = FaultPath(stages=(), crossings=(), reached="", stopped_at=("eyes",))
+    structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "channels": CHANNELS, "by_id": by_id}
+    frame = hazards(*[("a/b", "S1", 1.0)] * 3)
+    masked = frame[:1].assign(experiment_id="masked", outcome="masked")
+    answer = first_to_fix(
+        pd.concat([frame, masked]), cast(FoundPaths, SimpleNamespace(**structure)), has_alerts=True
+    )
+    [line] = answer.listings[0].lines
+    silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
+    assert line[3:] == (
+        Link("Feet: 2 of 3", f"kind=a%2Fb&{silent}&through=feet%E2%86%92pedals&sort=rank"),
+        Link("Eyes: 1 of 4", "kind=a%2Fb&stopped_at=eyes"),
+    )
 
 
 def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
