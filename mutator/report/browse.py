@@ -114,7 +114,7 @@ def table(
 ) -> dict[str, Any]:
     """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
     `warning`, `rank` (1: the worst), `t_hazard`, `through`. Those of alerts only for a target that has
-    `alerts`."""
+    `alerts`. `labels` are those of components."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -132,7 +132,8 @@ def table(
         columns["through"] = [paths.through(r.experiment_id) for r in rows]
     checked = sorted({name for r in rows for name in r.checked})
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]
-    return {"schema": SCHEMA, "count": len(rows), "checked": checked, "columns": made}
+    labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}
+    return {"schema": SCHEMA, "count": len(rows), "checked": checked, "labels": labels, "columns": made}
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ _THIN = 1.8
 def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
     """The SVG of a control structure; `links` are those that some fault may take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
-    layout = lay_out(structure.model_copy(update={"components": plain}))
+    layout = lay_out(structure.model_copy(update={"components": plain}), lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"
     lines = [
         f'<svg class="ways-figure" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" '
@@ -95,21 +95,22 @@ def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterat
     )
 
 
-def box_text(injected: int, stopped: int) -> str:
+def box_lines(injected: int, stopped: int, masked: int) -> tuple[str, str]:
     """What stands in a box below its name."""
     told = ((injected, "injected"), (stopped, "stopped"))
-    return ", ".join(f"{n} {what}" for n, what in told if n)
+    return ", ".join(f"{n} {what}" for n, what in told if n), f"{masked} masked" if masked else ""
 
 
 def _box(name: str, box: Box, label: str, about: str, counts: PathCounts) -> Iterator[str]:
     injected, stopped = counts.injected[name], counts.stopped[name]
+    first, last = box_lines(injected, stopped, counts.masked[name])
     has = f"{' has-injected' if injected else ''}{' has-stopped' if stopped else ''}"
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (
         f'<a class="box{has}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
         f"<title>{escape(about)}</title>"
         f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" height="{box.height:.1f}" rx="7"/>'
-        f'<text class="name" x="{middle:.1f}" y="{top - 3:.1f}" text-anchor="middle">{escape(label)}</text>'
-        f'<text class="count" x="{middle:.1f}" y="{top + 14:.1f}" text-anchor="middle">'
-        f"{box_text(injected, stopped)}</text></a>"
+        f'<text class="name" x="{middle:.1f}" y="{top - 11:.1f}" text-anchor="middle">{escape(label)}</text>'
+        f'<text class="count" x="{middle:.1f}" y="{top + 6:.1f}" text-anchor="middle">{first}</text>'
+        f'<text class="count" x="{middle:.1f}" y="{top + 23:.1f}" text-anchor="middle">{last}</text></a>'
     )

@@ -109,14 +109,17 @@ def _placed(path: Path) -> Iterator[tuple[Any, int]]:
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
     """Of the paths of some faults: at each link, how many `came` to its start (where its end is recorded) and
-    got `through`; at each component, how many were injected there, reached it, were stopped there."""
+    got `through`; at each component, how many were `injected` there, came to it and were `stopped`, and how
+    many of these were `masked` there: they changed no actuator. `ends` counts masked faults by all that
+    stopped them."""
 
     active: int = 0
     came: Counter[str] = field(default_factory=Counter)
     through: Counter[str] = field(default_factory=Counter)
     injected: Counter[str] = field(default_factory=Counter)
-    reached: Counter[str] = field(default_factory=Counter)
     stopped: Counter[str] = field(default_factory=Counter)
+    masked: Counter[str] = field(default_factory=Counter)
+    ends: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
     def add(self, path: Path) -> None:
         """Count one more path."""
@@ -124,14 +127,16 @@ class PathCounts:
         self.came.update(c.link for c in path.crossings if c.passage in (Passage.THROUGH, Passage.STOPPED))
         self.through.update(c.link for c in path.crossings if c.passage is Passage.THROUGH)
         self.injected.update(s.component for s in path.stages if s.state is State.INJECTED)
-        self.reached.update(s.component for s in path.stages if s.state is State.REACHED)
-        self.stopped.update(path.stopped_at)
+        stopped = {c.tip for c in path.crossings if c.passage is Passage.STOPPED}
+        self.stopped.update(stopped.union(path.stopped_at))
+        self.masked.update(path.stopped_at)
+        self.ends.update([path.stopped_at] if path.stopped_at else ())
 
     def plain(self) -> dict[str, Any]:
         """For the page."""
         links = {name: [self.through[name], came] for name, came in self.came.items()}
-        names = dict.fromkeys((*self.injected, *self.reached, *self.stopped))
-        components = {n: [self.injected[n], self.reached[n], self.stopped[n]] for n in names}
+        names = dict.fromkeys((*self.injected, *sorted(self.stopped)))
+        components = {n: [self.injected[n], self.stopped[n], self.masked[n]] for n in names}
         return {"active": self.active, "links": links, "components": components}
 
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 _STEP = 6  # between the places that are tried
 _BESIDE, _ACROSS = 17, 25  # from line to line, beside an arrow or with the arrow in between
 _LETTER = 7  # about the width of a letter
-_SHORTEST = 112  # room for `1092 of 1128, 97 %`
+_SHORTEST = 126  # room for `1092 of 1128, 97 %`
 _ASCENT, _DESCENT = 12, 4
 
 Point = tuple[float, float]

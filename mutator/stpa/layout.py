@@ -62,9 +62,9 @@ class Layout:
     height: float
 
 
-def lay_out(structure: StructureModel) -> Layout:
-    """Place every component and link."""
-    boxes = _boxes(structure)
+def lay_out(structure: StructureModel, lines: int = 1) -> Layout:
+    """Place every component and link; each box has room for so many `lines`, or for its own."""
+    boxes = _boxes(structure, lines)
     ports = _ports(structure.links, boxes)
     points: dict[str, tuple[Point, ...]] = {}
     used: dict[int, int] = defaultdict(int)
@@ -92,11 +92,11 @@ def lay_out(structure: StructureModel) -> Layout:
     )
 
 
-def _boxes(structure: StructureModel) -> dict[str, Box]:
+def _boxes(structure: StructureModel, lines: int) -> dict[str, Box]:
     components = structure.components
     heights: dict[int, float] = defaultdict(float)
     for component in components.values():
-        height = BOX_HEIGHT + LINE * (len(_lines(component)) - 1)
+        height = BOX_HEIGHT + LINE * (max(len(_lines(component)), lines) - 1)
         heights[component.drawn[0]] = max(heights[component.drawn[0]], height)
     tops, y = {}, float(EDGE)
     for row in sorted(heights):

@@ -4,6 +4,7 @@
 class Filters {
   constructor(place, chips, table, state) {
     this.chips = chips;
+    this.table = table;
     this.state = state;
     this.facets = table.facets.map((facet) => this.#facet(facet)).filter(Boolean);
     place.append(...this.facets.map((f) => f.element));
@@ -27,7 +28,7 @@ class Filters {
     const options = facet.values.map((value) => {
       const box = el("input", { type: "checkbox", onchange: () => this.state.toggle(facet.name, value) });
       const count = el("span.count");
-      return { value, box, count, element: el("label.option", {}, box, el("span", {}, Filters.shown(facet, value)), count) };
+      return { value, box, count, element: el("label.option", {}, box, el("span", {}, Filters.shown(facet, this.table.called(facet.name, value))), count) };
     });
     const badge = el("b.badge");
     const element = el("details.facet", { "data-facet": facet.name },
@@ -67,7 +68,7 @@ class Filters {
     for (const facet of Rows.FACETS) {
       const { name, title } = facet;
       for (const value of this.state.chosen.get(name) || []) {
-        made.push(chip(title.toLowerCase(), value, () => this.state.toggle(name, value)));
+        made.push(chip(title.toLowerCase(), this.table.called(name, value), () => this.state.toggle(name, value)));
       }
     }
     if (made.length > 1) made.push(el("button.clear", { type: "button", onclick: () => this.state.clear() }, "Clear all"));

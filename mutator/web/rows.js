@@ -19,6 +19,7 @@ const Rows = (() => {
     { name: "stopped_at", title: "Stopped at", between: ";", none: "not stopped" },
     { name: "through", title: "Got through", between: ";", none: "no link" },
   ];
+  const OF_COMPONENTS = ["reached", "stopped_at", "through"];
   const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
     "ending", "hazards", "alerts", "detail"];
 
@@ -50,6 +51,7 @@ const Rows = (() => {
     constructor(data) {
       this.count = data.count;
       this.checked = data.checked; // hazards that were looked for
+      this.labels = data.labels; // of components
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
       this.byId = null;
@@ -62,6 +64,11 @@ const Rows = (() => {
     text(row, name) {
       const found = this.columns.get(name);
       return found ? found.text(row) : "";
+    }
+
+    /** What a text of a column is called: components by their labels. */
+    called(name, text) {
+      return OF_COMPONENTS.includes(name) ? text.replace(/[^;→]+/g, (part) => this.labels[part] || part).replaceAll("→", " → ").replaceAll(";", ", ") : text;
     }
 
     number(row, name) {

@@ -4,7 +4,8 @@
 const Ways = (() => {
   const ALL = "all fault types", THIN = 1.8, WIDEST = 7;
   const share = ([through, came]) => (came ? `${through} of ${came}, ${Math.round((100 * through) / came)} %` : "");
-  const boxText = ([injected, , stopped]) => [injected && `${injected} injected`, stopped && `${stopped} stopped`].filter(Boolean).join(", ");
+  const boxLines = ([injected, stopped, masked]) => [
+    [injected && `${injected} injected`, stopped && `${stopped} stopped`].filter(Boolean).join(", "), masked ? `${masked} masked` : ""];
 
   function start() {
     const place = document.getElementById("ways"), data = document.getElementById("ways-data");
@@ -31,8 +32,9 @@ const Ways = (() => {
     }
     for (const box of place.querySelectorAll("[data-component]")) {
       const numbers = components[box.dataset.component] || [0, 0, 0];
-      box.setAttribute("class", `box${numbers[0] ? " has-injected" : ""}${numbers[2] ? " has-stopped" : ""}`);
-      box.querySelector(".count").textContent = boxText(numbers);
+      box.setAttribute("class", `box${numbers[0] ? " has-injected" : ""}${numbers[1] ? " has-stopped" : ""}`);
+      const lines = boxLines(numbers);
+      box.querySelectorAll(".count").forEach((line, i) => { line.textContent = lines[i]; });
       filter(box);
     }
   }

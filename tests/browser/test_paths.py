@@ -120,12 +120,16 @@ def test_the_control_structure_counts_and_filters(opened: "Page") -> None:
     opened.open()
     share = f"{lanes} of {lanes + held}, {100 * lanes / (lanes + held):.0f} %"
     assert opened.page.text_content(count) == share
-    assert opened.page.text_content("#ways [data-component='pedals'] .count") == f"{held} stopped"
+    assert opened.page.locator("#ways [data-component='pedals'] .count").all_text_contents() == [
+        f"{held} stopped",
+        f"{held} masked",
+    ]
     assert opened.page.text_content("#ways-table [data-link='commands'] td:last-child") == share
     opened.page.select_option("#ways-kind", "sensor/distance")
     assert opened.page.text_content(count) == f"0 of {held}, 0 %"
     opened.page.click("#ways [data-component='pedals']")
     assert opened.fragment == "stopped_at=pedals&kind=sensor%2Fdistance"
+    assert "Stopped at: Pedals" in opened.page.inner_text("body").replace("stopped at", "Stopped at")
     assert opened.found.startswith(f"{held} of ")
     opened.page.select_option("#ways-kind", "all fault types")
     opened.page.click("#ways [data-link='force'] .count")

@@ -19,8 +19,12 @@ _HTML = """\
 <p>{{ about }}</p>
 {% if figure %}
 <p class="quiet">The thicker a link, the more got through; it is dashed where none did, and thin where its
-end is not recorded. Orange boxes: injected there; green ones: stopped there. Dotted: feedback and people, on
-no path. A link filters the list to the experiments that got through it, a box to those stopped there.</p>
+end is not recorded. Dotted: feedback and people, on no path. Orange boxes: <strong>injected</strong> there.
+Green boxes: <strong>stopped</strong> are the faults that came to a component and did not get through, each
+counted once, however many links it came by; <strong>masked</strong> are those of them that changed no
+actuator, while the others got further by way of another component. A fault that two components stopped
+counts at both. A link filters the list to the experiments that got through it, a box to those masked
+there.</p>
 <div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
 {% for kind in kinds %}
 <option>{{ kind }}</option>
@@ -39,7 +43,8 @@ no path. A link filters the list to the experiments that got through it, a box t
 <td class="number">{{ share(counts[all].through[name], counts[all].came[name]) }}</td></tr>
 {% endfor %}
 </tbody></table></div></details>
-<h3>Where faults were stopped</h3>
+<h3>Where masked faults were stopped</h3>
+<p class="quiet">Each fault that changed no actuator counts once, at all the components that stopped it.</p>
 {% if stops %}
 {{ stops.as_html("counts") }}
 {% else %}
@@ -58,7 +63,7 @@ def paths_panel(run: ReportedRun) -> Panel | None:
     structure = paths.ways.structure
     stops = _stops(counts, paths)
     parts = ["## How far faults got", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
-    parts += ["### Where faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
+    parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
     html = rendered(
         _HTML,
         about=_ABOUT,
@@ -104,15 +109,19 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
 
 
 def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
-    """A line for each fault type, the total last; a column for each component that stopped a fault. None
-    where no fault was stopped."""
-    names = [name for name in paths.components if counts[ALL].stopped[name]]
-    if not names:
+    """A line for each fault type, the total last; a column for each component, or several, that stopped
+    masked faults. None where no fault was masked."""
+    ends = sorted(counts[ALL].ends, key=lambda names: (len(names), list(map(paths.label, names))))
+    if not ends:
         return None
-    heads = ["fault type", "active", *(f"stopped at {paths.label(name)}" for name in names)]
+    heads = ["fault type", "active", "masked", *(" and ".join(map(paths.label, names)) for names in ends)]
     order = [*(kind for kind in counts if kind != ALL), ALL]
     rows: list[Sequence[str]] = [
-        (kind, str(counts[kind].active), *(str(counts[kind].stopped[name]) for name in names))
+        (
+            kind,
+            *map(str, (counts[kind].active, counts[kind].ends.total())),
+            *(str(counts[kind].ends[names]) for names in ends),
+        )
         for kind in order
     ]
     return Table(heads=heads, rows=rows, right=range(1, len(heads)))

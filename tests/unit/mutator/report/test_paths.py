@@ -47,12 +47,15 @@ def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
 
 
 def test_counts_of_links_and_components() -> None:
-    """A link counts those that came to its start, unless what is behind it is not recorded."""
+    """A link counts those that came to its start, unless what is behind it is not recorded; a component those
+    that it stopped, and of these the masked ones, which count once by all that stopped them."""
     counts = PathCounts()
     counts.add(path(State.INJECTED, State.REACHED, State.REACHED))
     counts.add(path(State.INJECTED, State.HELD, State.HELD, stopped_at=("pedals",)))
     counts.add(path(State.INJECTED, State.UNSEEN, State.REACHED))
+    counts.add(path(State.INJECTED, State.REACHED, State.HELD))
     plain = counts.plain()
-    assert plain["active"] == 3
-    assert plain["links"] == {"eyes-pedals": [1, 2], "pedals-car": [2, 3]}
-    assert plain["components"] == {"eyes": [3, 0, 0], "pedals": [0, 1, 1], "car": [0, 2, 0]}
+    assert plain["active"] == 4
+    assert plain["links"] == {"eyes-pedals": [2, 3], "pedals-car": [2, 4]}
+    assert plain["components"] == {"eyes": [4, 0, 0], "car": [0, 2, 0], "pedals": [0, 1, 1]}
+    assert counts.ends == {("pedals",): 1}
