@@ -82,6 +82,7 @@ def _heat_map(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="fault_type_by_scenario",
         title="Fault type and scenario",
-        note="Runs with a hazard / activated faults. 0/0, without colour: never activated. An empty cell had no run.",
+        note="Runs with a hazard / activated faults. 0/0, without colour: never activated. "
+        "An empty cell had no run.",
         figure=heat_map.draw(frame),
     )
