@@ -396,7 +396,7 @@ class RunExperiment(ExperimentResult):
             same_as_record=same if self.record else None,
             temporary=temporary,
         )
-        if keep and trial.save_plot(self.plot_file):
+        if keep and trial.save_plot(self.plot_file) and same:  # only what the record is of
             golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
             keep_series(folder.path, manifest, golden, faulty, single.record)
         return trial

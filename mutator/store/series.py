@@ -104,7 +104,7 @@ class SeriesFolder:
     def has(self, experiment_id: str) -> bool:
         """Whether an experiment's series is there; MutatorError for a damaged index."""
         index = self.index
-        return (index is not None and experiment_id in index.entries) or self.kept(experiment_id).is_file()
+        return self.kept(experiment_id).is_file() or (index is not None and experiment_id in index.entries)
 
     def kept_ids(self) -> list[str]:
         """The experiments whose series are in files of their own."""
@@ -113,10 +113,11 @@ class SeriesFolder:
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
         """(golden, faulty) of an experiment; None where its series is not there. MutatorError where it is
         damaged."""
+        if (path := self.kept(experiment_id)).exists():  # driven again, maybe since the others are damaged
+            return read_kept(path)
         index = self.index
         if index is None or experiment_id not in index.entries:
-            path = self.kept(experiment_id)
-            return read_kept(path) if path.exists() else None
+            return None
         key = index.golden_of[experiment_id]
         if key not in self._goldens:
             self._goldens[key] = decode(self.entry(index.goldens[key]))

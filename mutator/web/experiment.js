@@ -186,9 +186,8 @@ class Experiment {
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
     this.#pictures(id, media && media[id]);
     const place = this.#content("replay");
-    if (series instanceof Error) place.replaceChildren(Dom.el("p", { role: "alert" }, series.message));
-    else if (series) Replay.show(place, series, this.facts);
-    else this.#noSeries(id);
+    if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
+    else this.#noSeries(id, series);
   }
 
   /** How far the fault came; `Path` gets the results of this experiment as `text(name)` and `number(name)`. */
@@ -255,7 +254,8 @@ class Experiment {
     return `${[`${time} s`, ...what].join(", ")} (the nearest picture there is)`;
   }
 
-  #noSeries(id) {
+  /** Why there is no replay, and how to have one; `error`: why the series that is there cannot be read. */
+  #noSeries(id, error) {
     const { el } = Dom;
     const place = this.#content("replay");
     const said = el("p", { role: "status" });
@@ -265,7 +265,8 @@ class Experiment {
       if (!series || series instanceof Error) said.textContent = series ? series.message : "There is no series of it yet.";
       else Replay.show(place, series, this.facts);
     };
-    place.replaceChildren(el("p", {}, "The channels of this experiment are not in the run folder: it did not end well, there was no room for them, or it ran with an older version. This command drives it again:"),
+    const why = "The channels of this experiment are not in the run folder: it did not end well, there was no room for them, or it ran with an older version.";
+    place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command drives it again:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
       el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " once it has run."), said);
   }

@@ -164,9 +164,13 @@ const SeriesFile = (() => {
 
   async function found(id, isNew) {
     const there = JSON.parse(document.getElementById("facts").textContent).series; // what is not there is not asked for
+    if (isNew || there.kept.includes(id)) { // driven again for it, maybe since the others are damaged
+      const own = await readKept(id);
+      if (own) return own;
+    }
     if (there.packed) index ??= readIndex();
     const place = (await index)?.of.get(id);
-    if (!place) return isNew || there.kept.includes(id) ? readKept(id) : null;
+    if (!place) return null;
     const { places } = await index, [entry, reference] = place;
     if (!goldens.has(reference)) goldens.set(reference, bytesOf(places[reference]).then((bytes) => decoded(bytes, null)));
     const golden = await goldens.get(reference);

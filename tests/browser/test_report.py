@@ -217,6 +217,21 @@ def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: l
     assert "--trace" in page.page.inner_text("#experiment .replay .command")
 
 
+def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_again(
+    page: "Page", run: Path
+) -> None:
+    """The opened experiment says what is damaged, and how to have its replay all the same."""
+    name = SeriesFolder(run).kept_ids()[0]
+    page.page.evaluate(
+        "() => { SeriesFile.load = () => Promise.reject(new Error('series/x.js is damaged')); }"
+    )
+    page.page.evaluate("id => (location.hash = `e=${id}`)", name)
+    page.page.wait_for_selector("#experiment .replay [role=alert]")
+    said = page.page.inner_text("#experiment .replay")
+    assert "series/x.js is damaged" in said
+    assert f"mutator rerun {name} --trace --run {run}" in said
+
+
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
     """Its text is the counts, which no filter for results changes; pressed again it lets go."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'

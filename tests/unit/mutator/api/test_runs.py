@@ -13,9 +13,10 @@ import pandas as pd
 import pytest
 
 import mutator
+from mutator.api import runs
 from mutator.api.runs import Run
 from mutator.errors import MutatorError
-from mutator.execution.single_run import run_single
+from mutator.execution.single_run import rerun, run_single
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.reader import Results
 from mutator.store import plan_file
@@ -23,6 +24,7 @@ from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder
 from mutator.workspace import Workspace
 
 LANE = 'fault_type == "lane" and method == "random"'
@@ -177,15 +179,22 @@ def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
 
 
 def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
-    """A re-run says whether its record is the campaign's, and leaves nothing behind unless asked to."""
+    """A re-run says whether its record is the campaign's, and leaves nothing behind unless asked to. The series
+    of another one is not kept."""
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
     assert len(trial.traces().faulty) == 120
     assert not (driven.path / "traces").exists()
     assert not experiment.is_drawn
+    kept = SeriesFolder(driven.path).kept(experiment.id)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runs, "rerun", lambda *where, **more: (rerun(*where, **more)[0], False))
+        assert experiment.rerun(keep=True).same_as_record is False
+    assert not kept.exists()
     experiment.rerun(keep=True)
     assert experiment.is_drawn
+    assert kept.exists()
 
 
 def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

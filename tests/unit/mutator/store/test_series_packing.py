@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.store.series import SeriesFolder
+from mutator.store.series import SeriesFolder, write_kept
 from mutator.store.series_format import Series, encode
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack, segments
 
@@ -135,7 +135,8 @@ def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
 
 
 def test_a_damaged_chunk_is_said_to_be_and_never_shown(tmp_path: Path) -> None:
-    """Its experiments are read from no other place; the index likewise."""
+    """Its experiments are read again once they were driven again, each from a file of its own; the index
+    likewise."""
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
@@ -148,3 +149,7 @@ def test_a_damaged_chunk_is_said_to_be_and_never_shown(tmp_path: Path) -> None:
     (tmp_path / "series" / "index.js").write_bytes(data)
     with pytest.raises(MutatorError, match="damaged"):
         SeriesFolder(tmp_path).read(IDS[0])
+    write_kept(SeriesFolder(tmp_path).kept(IDS[0]), MADE[IDS[0]].golden, MADE[IDS[0]].faulty)
+    found = SeriesFolder(tmp_path).read(IDS[0])
+    assert found is not None
+    assert found[1].about == {"n": 0}
