@@ -179,8 +179,8 @@ def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
 
 
 def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
-    """A re-run says whether its record is the campaign's, and leaves nothing behind unless asked to. The series
-    of another one is not kept."""
+    """A re-run says whether its record is the campaign's, and leaves nothing behind unless asked to. The
+    series of another one is not kept."""
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
