@@ -1,9 +1,9 @@
 """The path of a fault: from the components that it was injected into, along the control structure, to the
 controlled process.
 
-Feedback is no part of the path, so links out of the process and those of people are left out. A component of
-the path that left golden only after the process had is taken for one that the feedback changed, where
-feedback can have come to it, and did so no later than the fault along the path.
+Feedback is no part of the path, so links out of the process and those of people are left out, and those that
+are not studied. A component of the path that left golden only after the process had is taken for one that the
+feedback changed, where feedback can have come to it, and did so no later than the fault along the path.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -270,9 +270,9 @@ def _sooner(some: Mapping[str, float], others: Mapping[str, float], name: str) -
 
 
 def _links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
-    """The ends of each link that is not from or to people."""
+    """The ends of each link that is studied, and not from or to people."""
     people = {name for name, one in structure.components.items() if one.kind is Kind.HUMAN}
-    ends = ((name, (link.from_, link.to)) for name, link in structure.links.items())
+    ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
     return {name: pair for name, pair in ends if not people.intersection(pair)}
 
 

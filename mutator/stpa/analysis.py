@@ -74,7 +74,7 @@ class LinkModel(StrictModel, title="A link"):
     from_: str = Field(alias="from", description="The component it comes from.")
     to: str = Field(description="The component it goes to.")
     label: str = Field(description="What it carries.")
-    studied: bool = Field(True, description="`false`: it is drawn dashed.")
+    studied: bool = Field(True, description="`false`: it is drawn dashed, and no part of fault paths.")
 
 
 class ActionModel(StrictModel, title="A control action"):

@@ -170,6 +170,16 @@ def test_feedback_is_no_path() -> None:
     assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
 
 
+def test_links_that_are_not_studied_are_no_path() -> None:
+    """A fault of the speed control does not come to the wheel control by a link that nobody looks at."""
+    ends = {"from": "speed", "to": "wheel", "label": ""}
+    links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
+    for studied, names in ((True, {"wheel", "rack"}), (False, set())):
+        structure = replace_links({**links, "engaged": {**ends, "studied": studied}})
+        found = states(path("speed", ways=Ways(CHANNELS, structure), wanted=1.1, gas=1.1))
+        assert found.keys() - {"speed", "pedals", "car"} == names
+
+
 def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
     """The speed control left golden after the car had, and something off the path leads to it: so it and what
     it alone leads to have only been fed back to, while a branch that came first was reached."""
