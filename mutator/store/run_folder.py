@@ -47,6 +47,7 @@ from mutator.targets.severity import Scale
 SERIES_MB = 500  # of a run, unless it was planned with another number
 _LOOKS = 3  # at a folder whose owner writes while it is looked at
 SCRATCH = "work"
+_TABLES = ("results", "propagation", "timings")
 CONTENT = (  # all that may be in a run folder; * stands for any text, folders included
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *(
@@ -63,7 +64,8 @@ CONTENT = (  # all that may be in a run folder; * stands for any text, folders i
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
     *("exports/mutation-elements.json", "exports/junit.xml"),
-    *("exports/*.csv", "exports/*.parquet", "exports/mcap/*.mcap"),
+    *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet")),
+    "exports/mcap/*.mcap",
     *("damaged/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 
