@@ -1,6 +1,5 @@
 """Writes a run in the format that is asked for."""
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,11 +61,7 @@ def _content(folder: RunFolder, format: Format, workspace: Workspace | None, par
     if parts.table is Table.RESULTS:
         return table.csv() if format is Format.CSV else table.parquet()
     is_timings = parts.table is Table.TIMINGS
-    data = table.timings_parquet() if is_timings else table.propagation_parquet()
-    return data if format is Format.PARQUET else _csv_of(data)
-
-
-def _csv_of(parquet: bytes) -> bytes:
-    import pandas as pd
-
-    return pd.read_parquet(io.BytesIO(parquet)).to_csv(index=False, lineterminator="\n").encode()
+    if format is Format.PARQUET:
+        return table.timings_parquet() if is_timings else table.propagation_parquet()
+    frame = table.timings() if is_timings else table.propagation()
+    return frame.to_csv(index=False, lineterminator="\n").encode()

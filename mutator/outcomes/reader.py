@@ -155,6 +155,12 @@ class Results:
             )
         return self._read(path)
 
+    def timings(self) -> "pd.DataFrame":
+        """A frame of timings.parquet: a row for each experiment that ran."""
+        import pandas as pd
+
+        return pd.read_parquet(io.BytesIO(self.timings_parquet()))
+
     def timings_parquet(self) -> bytes:
         """The bytes of timings.parquet."""
         return self._read(self.path.with_name(results.TIMINGS_PARQUET))

@@ -209,15 +209,19 @@ def _id_problems(
             )
         elif status != Status.HARNESS_ERROR.value:
             if patches is not None:
-                yield from patch_problems(patches, name, str(data.get("patch", "")))
+                known = str(data.get("patch", ""))
+                yield from patch_problems(patches, name, known, segment.path.stem)
             content = hash(segment.body(number))
             if name in done:
                 yield second_record(segment.path, number, name, same=done[name] == content)
             done[name] = content
 
 
-def patch_problems(patches: Patches, experiment_id: str, known: str) -> Iterator[MutatorError]:
-    """A stored patch that is missing, or not the one whose digest the record has; empty for no mutant."""
+def patch_problems(
+    patches: Patches, experiment_id: str, known: str, worker: str = ""
+) -> Iterator[MutatorError]:
+    """A stored patch that is missing, or not the one whose digest `known` the record of `worker` has; empty
+    for no mutant."""
     if not known:
         return
     data = patches.read(experiment_id)
@@ -227,7 +231,7 @@ def patch_problems(patches: Patches, experiment_id: str, known: str) -> Iterator
             f"another patch of {experiment_id} than was run: SHA-256 {found[:16]}"
             if found
             else f"no patch of {experiment_id}",
-            where=patches.file(experiment_id),
+            where=patches.file(experiment_id, worker),
             expected=f"SHA-256 {known[:16]}, as the record says",
             remedy=_remedy(patches.run, ""),
         )

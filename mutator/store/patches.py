@@ -102,13 +102,18 @@ class Patches:
         except zlib.error:  # the whole patch is lost
             return None
 
-    def file(self, experiment_id: str) -> Path:
-        """The file that has it, or that would have it if it were there."""
+    def file(self, experiment_id: str, worker: str = "") -> Path:
+        """The file that has it, or that would have it if it were there: a damaged one, else that of the
+        `worker` whose record names it, if that is known."""
         place = self._places.get(experiment_id)
         if place is not None:
             return place.path
         path = self.old_file(experiment_id)
-        return path if path.exists() else self.run / FOLDER
+        if path.exists():
+            return path
+        damaged = (one for one in self.files() if not one.is_file() or read_blocks(one).damaged)
+        lost = self.run / FOLDER / f"{worker}{SUFFIX}" if worker else self.run / FOLDER
+        return next(damaged, lost)
 
     def old_file(self, experiment_id: str) -> Path:
         """Where folders of earlier schemas have it."""

@@ -1,0 +1,41 @@
+"""Packed patches: which file a lost one is looked for in."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.store.patches import Patches, PatchWriter
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """A run folder with the patch of an experiment from each of two workers."""
+    for worker, name in (("0001-gw0", "a" * 16), ("0001-gw1", "b" * 16)):
+        writer = PatchWriter(tmp_path, worker)
+        writer.append(name, f"patch of {name}\n".encode())
+        writer.close()
+    return tmp_path
+
+
+def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
+    """A patch that is there has a file, whatever its record says of the worker."""
+    assert Patches(run).file("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
+
+
+def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
+    """A flipped byte loses a patch, and the file that it is in is named."""
+    path = run / "patches" / "0001-gw1.blocks"
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+    patches = Patches(run)
+    assert patches.read("b" * 16) is None
+    assert patches.file("b" * 16) == path
+
+
+def test_a_lost_file_is_that_of_the_worker(run: Path) -> None:
+    """Where a whole file is gone, the record says which it was; without a record there is the folder."""
+    path = run / "patches" / "0001-gw1.blocks"
+    path.unlink()
+    assert Patches(run).file("b" * 16, "0001-gw1") == path
+    assert Patches(run).file("b" * 16) == run / "patches"
