@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from mutator.api.mutant_files import MutantSet
     from mutator.api.mutants import BuiltMutant, build_mutant
     from mutator.api.reviews import ReviewedGroups, load_review
-    from mutator.api.runs import Run, RunExperiment, load_run, merge_runs
+    from mutator.api.run_experiments import RunExperiment
+    from mutator.api.runs import Run, load_run, merge_runs
     from mutator.api.trials import Trial, try_fault
     from mutator.campaigns.plans import Choices, Plan
     from mutator.comparison.comparison import Gate
@@ -63,7 +64,8 @@ _HOMES = {
     "mutator.api.mutant_files": ("MutantSet",),
     "mutator.api.mutants": ("BuiltMutant", "build_mutant"),
     "mutator.api.reviews": ("ReviewedGroups", "load_review"),
-    "mutator.api.runs": ("Run", "RunExperiment", "load_run", "merge_runs"),
+    "mutator.api.run_experiments": ("RunExperiment",),
+    "mutator.api.runs": ("Run", "load_run", "merge_runs"),
     "mutator.api.trials": ("Trial", "try_fault"),
     "mutator.campaigns.plans": ("Choices", "Plan"),
     "mutator.comparison.comparison": ("Gate",),

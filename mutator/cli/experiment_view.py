@@ -12,7 +12,7 @@ from mutator.mutants.readable_diffs import readable
 
 if TYPE_CHECKING:
     from mutator.api.experiment_results import ExperimentResult
-    from mutator.api.runs import RunExperiment
+    from mutator.api.run_experiments import RunExperiment
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
     from mutator.outcomes.paths import Stage

@@ -14,7 +14,7 @@ from mutator.cli.options import ExperimentId, Json, Place, Run, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.api.runs import RunExperiment
+    from mutator.api.run_experiments import RunExperiment
 
 DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import mutator
-from mutator.api import runs
+from mutator.api import run_experiments
 from mutator.api.runs import Run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun, run_single
@@ -189,7 +189,7 @@ def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
     assert not experiment.is_drawn
     kept = SeriesFolder(driven.path).kept(experiment.id)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runs, "rerun", lambda *where, **more: (rerun(*where, **more)[0], False))
+        patch.setattr(run_experiments, "rerun", lambda *where, **more: (rerun(*where, **more)[0], False))
         assert experiment.rerun(keep=True).same_as_record is False
     assert not kept.exists()
     experiment.rerun(keep=True)

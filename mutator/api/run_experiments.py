@@ -1,0 +1,141 @@
+"""An experiment of a run folder: its traces, its patch, how far its fault got; driven again when asked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from mutator._common.files import ScratchFolder
+from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
+from mutator.api.mutants import built
+from mutator.api.run_contents import RunContents, from_here
+from mutator.api.trials import Trial, trial_of
+from mutator.errors import MutatorError
+from mutator.execution.single_run import rerun
+from mutator.outcomes.golden import Trace, load_trace
+from mutator.outcomes.paths import Path as FaultPath
+from mutator.outcomes.sampling import keep_series
+from mutator.report.film import Shot, film_experiment
+from mutator.store.series import SeriesFolder
+from mutator.store.stretches import Stretch
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class RunExperiment(ExperimentResult):
+    """An experiment of a run."""
+
+    run: RunContents
+
+    @cached_property
+    def patch(self) -> str:
+        """The whole patch, probe included: the kept one, or made now when it has not run yet."""
+        kept = self.run.folder.read_patch(self.id, self.record)
+        if kept is not None:
+            return kept.decode("utf-8", "surrogateescape")
+        return built(self.run.bench, self.fault, self.experiment.trigger).patch
+
+    @property
+    def scale(self) -> Scale | None:
+        """The scale of severity that the run was planned with."""
+        return self.run.folder.scale
+
+    def traces(self, *, exact: bool = False) -> TraceFrames:
+        """Golden and faulty run as pandas frames.
+
+        They are the experiment's series: the manifest's channels, at most 20 values a second (10 of what the
+        controller believes), to six digits; a value is the newest one at its time, so what lasts for
+        less may be missed. With `exact` it is driven again, which takes as long as one run: all channels in
+        every step. So is one that has no series (left out under the budget, or of an earlier version), whose
+        series is then kept. MutatorError when it has not run yet, and, where it is driven, when target,
+        templates or scenario have changed since, or another result comes out than the campaign's.
+        """
+        if exact:
+            trial = self.rerun(keep=True)
+            if trial.same_as_record is False:
+                raise MutatorError(
+                    f"{self.id} driven again is not what the campaign found", where=self.run.path
+                )
+            return trial.traces()
+        if self.record is None:
+            raise self.not_run()
+        golden, faulty = self.run.traces.sampled(self.id, drive=True)
+        manifest = self._target()
+        return TraceFrames(golden=trace_frame(golden, manifest), faulty=trace_frame(faulty, manifest))
+
+    def rerun(self, *, keep: bool = False) -> Trial:
+        """Drive it again; `Trial.same_as_record` says whether the record is the campaign's.
+
+        With `keep` its trace, its series and its plot stay in the run folder. MutatorError
+        when target, templates or scenario have changed since.
+        """
+        run, folder = self.run, self.run.folder
+        temporary = None if keep else ScratchFolder("mutator-rerun-")
+        out = temporary.path / self.id if temporary else None
+        single, same = rerun(run.workspace, folder.path, self.id, out=out)
+        manifest = run.bench.manifest
+        trial = trial_of(
+            single,
+            manifest,
+            scale=self.scale,
+            same_as_record=same if self.record else None,
+            temporary=temporary,
+        )
+        if keep and trial.save_plot(self.plot_file) and same:  # only what the record is of
+            golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
+            keep_series(folder.path, manifest, golden, faulty, single.record)
+        return trial
+
+    def film(self, shots: Sequence[Shot]) -> bool:
+        """Drive golden and faulty run again and write videos or stills of them; is the record the campaign's?
+
+        MutatorError for a target that cannot be filmed, and a faulty run that left no film.
+        """
+        run, facts = self.run, describe(self.experiment)
+        trigger = facts["trigger"].removesuffix(": True")
+        title = f"{facts['fault']}   {facts['scenario']}   {trigger}"
+        return film_experiment(run.workspace, run.bench.manifest, run.path, self.id, title, shots)
+
+    @property
+    def stretch(self) -> Stretch | None:
+        """What it was run with; None before it was run."""
+        return self.run.folder.stretch_of(self.id)
+
+    @property
+    def plot_file(self) -> Path:
+        """Where the run folder keeps its plot."""
+        return self.run.path / "plots" / f"{self.id}.svg"
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the run folder has its plot and its series."""
+        return self.plot_file.exists() and SeriesFolder(self.run.path).has(self.id)
+
+    def not_run(self) -> MutatorError:
+        """What to say of an experiment that is only planned."""
+        campaign, out = self.run.folder.head["campaign"], from_here(self.run.path)
+        return MutatorError(
+            f"experiment {self.id} has not run yet",
+            where=self.run.path,
+            remedy=f"run it: `mutator run {campaign} --out {out}`",
+        )
+
+    @property
+    def fault_path(self) -> FaultPath | None:
+        """How far its fault got along the control structure; None where that is not known, and for a fault
+        that was never active or a run without an outcome."""
+        ways = self.run.ways
+        return ways.path(self.experiment, self.record) if ways and self.record else None
+
+    def _channels(self) -> Sequence[Sequence[str]]:
+        channels: Sequence[Sequence[str]] = self.run.folder.head.get("channels", ())
+        return channels
+
+    def _target(self) -> TargetManifest:
+        return self.run.bench.manifest
+
+    def _load_traces(self) -> tuple[Trace, Trace]:
+        if self.record is None:
+            raise self.not_run()
+        return self.run.traces.of(self.id)
