@@ -18,7 +18,8 @@ from pathlib import Path
 from time import process_time
 
 from mutator._common.hashing import digest
-from mutator.campaigns.plans import Plan, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Plan, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes import results

@@ -16,7 +16,8 @@ from time import process_time
 from typing import Any
 
 from mutator._common.files import write_json
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.execution.running import run_campaign

@@ -22,7 +22,8 @@ import numpy as np
 from growth import record
 from markupsafe import Markup
 
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.readable_diffs import readable

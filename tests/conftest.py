@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.campaigns.provenance import add_stretch
 from mutator.model import (
     Activation,

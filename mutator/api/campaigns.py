@@ -6,7 +6,8 @@ from pathlib import Path
 from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.campaigns.plans import Choices, Plan, freeze, load_plan, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, Plan, load_plan, make_plan
 from mutator.engines.forkable import not_forked
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary

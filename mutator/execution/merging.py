@@ -13,7 +13,7 @@ from mutator._common.files import json_bytes, raising_disk_full, read_json, writ
 from mutator._common.hashing import plain
 from mutator._common.locks import owned
 from mutator._common.text import counted
-from mutator.campaigns.plans import make_run_folder
+from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Record, Status

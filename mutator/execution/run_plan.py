@@ -5,7 +5,8 @@ from pathlib import Path
 
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
-from mutator.campaigns.plans import Choices, freeze_owned, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_owned
+from mutator.campaigns.plans import Choices, load_plan, make_plan
 from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.review import gate

@@ -20,7 +20,8 @@ from mutator._common.files import DiskFull, is_half_written, remove_folder
 from mutator._common.interrupts import terminable
 from mutator._common.locks import owned, wait_for_workers
 from mutator.campaigns.chunks import Pending, pending
-from mutator.campaigns.plans import Choices, make_run_folder
+from mutator.campaigns.freezing import make_run_folder
+from mutator.campaigns.plans import Choices
 from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base

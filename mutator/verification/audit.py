@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from mutator._common.files import read_json
 from mutator._common.hashing import digest, plain
-from mutator.campaigns.plans import CSV, load_plan, plan_csv, plan_digest
+from mutator.campaigns.freezing import CSV, plan_csv
+from mutator.campaigns.plans import load_plan, plan_digest
 from mutator.campaigns.provenance import sources
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file

@@ -13,7 +13,8 @@ from typing import Any
 from mutator._common.files import make_folder, raising_disk_full, write_atomic
 from mutator._common.locks import owned
 from mutator._common.text import counted
-from mutator.campaigns.plans import CSV, load_plan, plan_csv
+from mutator.campaigns.freezing import CSV, plan_csv
+from mutator.campaigns.plans import load_plan
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.store import digests, integrity

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes import results

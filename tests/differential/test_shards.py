@@ -9,7 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines import registry
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import merging

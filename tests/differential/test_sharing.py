@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import freeze, load_plan, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import machine
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.store.check_results import SCHEMA

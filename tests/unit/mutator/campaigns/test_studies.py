@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import studies
-from mutator.campaigns.plans import freeze, load_plan, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import load_plan, make_plan
 from mutator.campaigns.studies import find_study, study_names
 from mutator.errors import MutatorError
 from mutator.report import building

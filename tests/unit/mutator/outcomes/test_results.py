@@ -11,7 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from mutator._common.files import write_atomic
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.outcomes import results

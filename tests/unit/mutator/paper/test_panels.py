@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.model import Status
 from mutator.paper.panels import observations_panel
 from mutator.paper.published import load_paper

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.results import build
 from mutator.report import building, engines, stamp

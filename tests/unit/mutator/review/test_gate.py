@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, Plan, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, Plan, make_plan
 from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.review import gate

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.store.cleaning import clean, finish_deletion
 from mutator.store.run_folder import CONTENT

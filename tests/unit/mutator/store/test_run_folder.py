@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common import locks
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.store.cleaning import clean
 from mutator.store.run_folder import RunFolder

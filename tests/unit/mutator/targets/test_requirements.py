@@ -7,7 +7,8 @@ import pytest
 
 import mutator
 from mutator.api.trials import try_fault
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.store.run_folder import RunFolder
 from mutator.verification import preflight_cache

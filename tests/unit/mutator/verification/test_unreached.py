@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.campaigns.plans import freeze, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment, Trigger
 from mutator.triggers.kinds import at_time
 from mutator.verification.preflight import run_checks, unreached_triggers
