@@ -7,6 +7,7 @@ import re
 import stat
 import sys
 import tempfile
+import threading
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -172,7 +173,7 @@ def write_atomic(path: Path, data: bytes) -> None:
     """Write the whole file or leave the old one; DiskFull if there is no room, MutatorError for a folder."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary = path.with_name(f".{path.name}.{threading.get_native_id()}")
     with raising_disk_full(path):
         try:
             with temporary.open("wb") as file:

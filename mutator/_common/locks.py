@@ -51,6 +51,17 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         os.close(fd)
 
 
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Wait until nobody else works in an existing folder, then keep others waiting. Nothing is written."""
+    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(fd)
+
+
 def register_worker(run: Path) -> int:
     """Register this process as a worker in `run`, for as long as the returned descriptor is open."""
     with raising_disk_full(run):

@@ -1,11 +1,14 @@
 """One experiment outside a campaign, with everything kept: what `try`, `show` and `rerun --trace` need."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import mkdtemp
 
-from mutator._common.files import make_folder, raising_disk_full, remove_folder
+from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
+from mutator._common.locks import alone_in
 from mutator.campaigns.provenance import check_sources, sources
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
@@ -48,7 +51,7 @@ def run_single(
     """
     check_requirements(manifest)
     make_folder(out)
-    with _engine(manifest, out, limits or Limits()) as engine:
+    with alone_in(out), _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
         goldens = Goldens(manifest, lambda scenario, changes: reference)
         runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
@@ -127,20 +130,27 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
             where=job.scenario,
             remedy="mend the target or the scenario first",
         )
-    remove_folder(place)
-    execution.out.rename(place)
+    _replace(execution.out, place)
     return place
 
 
 def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
     """The runs with their output moved to `out`/faulty and their diff beside it."""
     for finished in runs:
-        place = out / "faulty"
-        remove_folder(place)
-        if finished.out is not None and finished.out.is_dir():  # a run may delete it
-            finished.out.rename(place)
-        else:
-            place.mkdir()
+        left = finished.out
+        if left is None or not left.is_dir():  # a run may delete it
+            left = out / "work" / "nothing"
+            left.mkdir()
+        _replace(left, out / "faulty")
         if finished.mutant is not None:
-            (out / "mutant.patch").write_bytes(finished.mutant.patch_bytes)
+            write_atomic(out / "mutant.patch", finished.mutant.patch_bytes)
         yield finished
+
+
+def _replace(new: Path, place: Path) -> None:
+    """Put a folder in another's place, in which somebody may be reading."""
+    aside = Path(mkdtemp(dir=new.parent))
+    if os.path.lexists(place):
+        place.rename(aside / place.name)
+    new.rename(place)
+    remove_folder(aside)

@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,19 @@ def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Monke
         write_atomic(path, b"new")
     assert error.value.exit_code == EXIT_HARNESS_ERRORS
     assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_several_write_one_file_at_once(tmp_path: Path) -> None:
+    """Threads, like processes: who reads meanwhile gets what one of them wrote, and nothing is left over."""
+    path = tmp_path / "file"
+    texts = [bytes([number]) * 100_000 for number in range(4)]
+    write_atomic(path, texts[0])
+    with ThreadPoolExecutor(4) as pool:
+        writers = [pool.submit(write_atomic, path, text) for text in texts * 20]
+        while not all(writer.done() for writer in writers):
+            assert path.read_bytes() in texts
+        assert [writer.result() for writer in writers] == [None] * 80
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -1,8 +1,11 @@
 """Runs in notebooks."""
 
 import dataclasses
+import os
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from html import unescape
 from pathlib import Path
@@ -195,6 +198,28 @@ def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
     experiment.rerun(keep=True)
     assert experiment.is_drawn
     assert kept.exists()
+
+
+def test_two_processes_may_want_one_series(driven: Run) -> None:
+    """Both drive the experiment, one after the other, and each has the whole series."""
+    [name] = driven.results.index
+    library = driven.workspace.library
+    look = (
+        "import mutator, sys\n"
+        "run = mutator.load_run(sys.argv[1])\n"
+        "print(len(run.experiment(sys.argv[2]).traces().faulty))"
+    )
+    words = [sys.executable, "-c", look, str(driven.path), name]
+    environment = {**os.environ, "MUTATOR_ROOT": str(library.parent)}
+    both = [
+        subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        for _ in range(2)
+    ]
+    assert [one.communicate(timeout=120)[0] for one in both] == ["120\n"] * 2
+    assert sorted(path.name for path in (driven.path / "traces" / name).iterdir()) == [
+        "faulty",
+        "mutant.patch",
+    ]
 
 
 def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
