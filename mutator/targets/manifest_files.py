@@ -8,11 +8,11 @@ from pydantic import Field
 from mutator._common.shipped import SHIPPED_TARGET
 from mutator.config.yaml_files import Source, StrictModel, load, read
 from mutator.targets.channels import ChannelModel, TraceModel, read_channels
+from mutator.targets.commands import ChangeModel, EntryModel, FilmModel, check_commands, read_film
 from mutator.targets.environment import check_environment
 from mutator.targets.judging import HazardModel, MetricModel, read_hazards, read_metrics
-from mutator.targets.manifest import Film, TargetManifest
+from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import ObservationModel, read_observation
-from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
 from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene import SceneModel, read_scene
@@ -21,57 +21,6 @@ from mutator.targets.upgrade import NEW, OLD, Upgrade, upgraded, upgraded_text
 from mutator.triggers import stl
 
 SCHEMA = NEW
-
-
-class _ChangeModel(StrictModel, title="A change"):
-    """A change is a list of further arguments, or this, where it makes scenarios the same run."""
-
-    args: list[str] = Field(description="Further arguments.")
-    same_in: list[str] = Field(
-        min_length=2, description="Scenarios that the change makes the same run: it is driven once."
-    )
-
-
-class _EntryModel(StrictModel, title="The entry"):
-    """Anywhere in an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for
-    trace and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable
-    or damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
-
-    module: str = Field(description="Run as `python -m`, from the root.")
-    args: list[str] = Field(
-        default_factory=lambda: ["--scenario", "{scenario}", "--seed", "{seed}", "--out", "{out}"],
-        description="Its arguments; without them `--scenario {scenario} --seed {seed} --out {out}`.",
-    )
-    stepwise: str | None = Field(
-        None,
-        description="A function of the module (or `Class.method`) that takes these arguments and gives a run "
-        "that is driven step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
-        "need.",
-    )
-    independent: list[str] = Field(
-        default_factory=list,
-        description="More arguments, of a run that takes nothing from what other runs left behind: those of "
-        "the equivalence check, and of mutants of a file in `reads_itself`.",
-    )
-    changes: dict[str, list[str] | _ChangeModel] = Field(
-        default_factory=dict, description="Name of a change of the scenario -> its arguments."
-    )
-
-
-class _FilmModel(StrictModel, title="Films"):
-    """What `mutator show --video` and `--still` need. In `run`, `{film}` is the folder for the film. In
-    `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of what happened,
-    `{out}` the file to write, and `{t}` the time in s of a still picture."""
-
-    run: list[str] = Field(description="More arguments of the entry, which make a run leave a film.")
-    module: str = Field(description="Run as `python -m` to show two films.")
-    args: list[str] = Field(description="Its arguments.")
-    still: list[str] = Field(description="More of them for a still picture.")
-    pictures: list[str] = Field(
-        default_factory=list,
-        description="Changes with which the controller sees the camera's pictures: when a run is done, the "
-        "worst of its experiments with one of these get stills by themselves.",
-    )
 
 
 class ManifestModel(StrictModel, title="The file"):
@@ -128,7 +77,7 @@ class ManifestModel(StrictModel, title="The file"):
         allow_inf_nan=False,
         description="When `mutator try` arms triggers, where nothing else is said.",
     )
-    entry: _EntryModel = Field(description="How a run is started.")
+    entry: EntryModel = Field(description="How a run is started.")
     trace: TraceModel | None = Field(None, description="The numbers that a run records.")
     record: str | None = Field(
         None,
@@ -152,7 +101,7 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=list,
         description="Names of the alerts that count; others that a record has are left out.",
     )
-    film: _FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
+    film: FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
 
 
 def upgrade_manifest(path: Path) -> Upgrade | None:
@@ -179,8 +128,8 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
             f"{INSTALLED}NAME",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
-    _check_names(model, source)
-    _check_placeholders(model, source)
+    check_commands(model.entry, model.film, source)
+    _check_record(model, source)
     _check_events(model, source)
     check_environment(model.env, source)
     packages = read_packages(model.package, model.packages, source)
@@ -209,7 +158,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         independent=tuple(model.entry.independent),
         reads_itself=tuple(model.reads_itself),
         changes={n: tuple(c if isinstance(c, list) else c.args) for n, c in changes.items()},
-        same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, _ChangeModel)},
+        same_in={n: tuple(c.same_in) for n, c in changes.items() if isinstance(c, ChangeModel)},
         step_s=model.step_s,
         armed_after_s=model.armed_after_s,
         trace_file=trace.file,
@@ -223,27 +172,11 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         scene=None if model.scene is None else read_scene(model.scene, known, source),
         alerts=tuple(model.alerts),
         source=source,
-        film=_film(model.film),
+        film=read_film(model.film),
     )
 
 
-def _check_names(model: ManifestModel, source: Source) -> None:
-    for key, command in (("entry", model.entry), ("film", model.film)):
-        if command and not all(part.isidentifier() for part in command.module.split(".")):
-            raise source.error(
-                (key, "module"),
-                f"'{command.module}'",
-                expected="a dotted module name",
-                remedy="write it as after `python -m`: package.module",
-            )
-    stepwise = model.entry.stepwise
-    if stepwise is not None and not all(part.isidentifier() for part in stepwise.split(".")):
-        raise source.error(
-            ("entry", "stepwise"),
-            f"'{stepwise}'",
-            expected="a function of the entry module",
-            remedy="write its name alone, as `open_run` or `Drive.open`",
-        )
+def _check_record(model: ManifestModel, source: Source) -> None:
     if model.record is not None and Path(model.record).name != model.record:
         raise source.error(
             ("record",),
@@ -251,34 +184,6 @@ def _check_names(model: ManifestModel, source: Source) -> None:
             expected="a bare file name, made in {out}",
             remedy="leave out the folder",
         )
-
-
-def _check_placeholders(model: ManifestModel, source: Source) -> None:
-    entry = ("entry",)
-    check_placeholders(model.entry.args, OF_RUNS, source, (*entry, "args"))
-    check_placeholders(model.entry.independent, OF_RUNS, source, (*entry, "independent"))
-    for name, change in model.entry.changes.items():
-        keys = (*entry, "changes", name)
-        if isinstance(change, list):
-            check_placeholders(change, OF_RUNS, source, keys)
-        else:
-            check_placeholders(change.args, OF_RUNS, source, (*keys, "args"))
-    if (film := model.film) is not None:
-        _check_pictures(film.pictures, model.entry.changes, source)
-        check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))
-        check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
-        check_placeholders(film.still, OF_FILMS, source, ("film", "still"))
-
-
-def _check_pictures(pictures: Collection[str], changes: Collection[str], source: Source) -> None:
-    for i, name in enumerate(pictures):
-        if name not in changes:
-            raise source.error(
-                ("film", "pictures", i),
-                f"'{name}'",
-                expected=f"one of the entry's changes: {', '.join(changes) or 'none'}",
-                remedy="correct the name",
-            )
 
 
 def _check_recorded(source: Source, hidden: Collection[str]) -> None:
@@ -311,15 +216,3 @@ def _check_events(model: ManifestModel, source: Source) -> None:
                     remedy="rename it",
                 )
             seen.add(name.lower())
-
-
-def _film(model: _FilmModel | None) -> Film | None:
-    if model is None:
-        return None
-    return Film(
-        run_args=tuple(model.run),
-        module=model.module,
-        args=tuple(model.args),
-        still_args=tuple(model.still),
-        pictures=tuple(model.pictures),
-    )

@@ -1,0 +1,122 @@
+"""How a target is run and filmed, as its manifest says it: modules, arguments, changes of a scenario."""
+
+from collections.abc import Collection
+
+from pydantic import Field
+
+from mutator.config.yaml_files import Source, StrictModel
+from mutator.targets.manifest import Film
+from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
+
+
+class ChangeModel(StrictModel, title="A change"):
+    """A change is a list of further arguments, or this, where it makes scenarios the same run."""
+
+    args: list[str] = Field(description="Further arguments.")
+    same_in: list[str] = Field(
+        min_length=2, description="Scenarios that the change makes the same run: it is driven once."
+    )
+
+
+class EntryModel(StrictModel, title="The entry"):
+    """Anywhere in an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for
+    trace and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable
+    or damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
+
+    module: str = Field(description="Run as `python -m`, from the root.")
+    args: list[str] = Field(
+        default_factory=lambda: ["--scenario", "{scenario}", "--seed", "{seed}", "--out", "{out}"],
+        description="Its arguments; without them `--scenario {scenario} --seed {seed} --out {out}`.",
+    )
+    stepwise: str | None = Field(
+        None,
+        description="A function of the module (or `Class.method`) that takes these arguments and gives a run "
+        "that is driven step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
+        "need.",
+    )
+    independent: list[str] = Field(
+        default_factory=list,
+        description="More arguments, of a run that takes nothing from what other runs left behind: those of "
+        "the equivalence check, and of mutants of a file in `reads_itself`.",
+    )
+    changes: dict[str, list[str] | ChangeModel] = Field(
+        default_factory=dict, description="Name of a change of the scenario -> its arguments."
+    )
+
+
+class FilmModel(StrictModel, title="Films"):
+    """What `mutator show --video` and `--still` need. In `run`, `{film}` is the folder for the film. In
+    `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of what happened,
+    `{out}` the file to write, and `{t}` the time in s of a still picture."""
+
+    run: list[str] = Field(description="More arguments of the entry, which make a run leave a film.")
+    module: str = Field(description="Run as `python -m` to show two films.")
+    args: list[str] = Field(description="Its arguments.")
+    still: list[str] = Field(description="More of them for a still picture.")
+    pictures: list[str] = Field(
+        default_factory=list,
+        description="Changes with which the controller sees the camera's pictures: when a run is done, the "
+        "worst of its experiments with one of these get stills by themselves.",
+    )
+
+
+def check_commands(entry: EntryModel, film: FilmModel | None, source: Source) -> None:
+    """MutatorError with the line of a module, a placeholder or a change that will not do."""
+    for key, command in (("entry", entry), ("film", film)):
+        if command and not all(part.isidentifier() for part in command.module.split(".")):
+            raise source.error(
+                (key, "module"),
+                f"'{command.module}'",
+                expected="a dotted module name",
+                remedy="write it as after `python -m`: package.module",
+            )
+    stepwise = entry.stepwise
+    if stepwise is not None and not all(part.isidentifier() for part in stepwise.split(".")):
+        raise source.error(
+            ("entry", "stepwise"),
+            f"'{stepwise}'",
+            expected="a function of the entry module",
+            remedy="write its name alone, as `open_run` or `Drive.open`",
+        )
+    _check_runs(entry, source)
+    if film is not None:
+        _check_films(film, entry.changes, source)
+
+
+def _check_runs(entry: EntryModel, source: Source) -> None:
+    keys = ("entry",)
+    check_placeholders(entry.args, OF_RUNS, source, (*keys, "args"))
+    check_placeholders(entry.independent, OF_RUNS, source, (*keys, "independent"))
+    for name, change in entry.changes.items():
+        place = (*keys, "changes", name)
+        if isinstance(change, list):
+            check_placeholders(change, OF_RUNS, source, place)
+        else:
+            check_placeholders(change.args, OF_RUNS, source, (*place, "args"))
+
+
+def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> None:
+    for i, name in enumerate(film.pictures):
+        if name not in changes:
+            raise source.error(
+                ("film", "pictures", i),
+                f"'{name}'",
+                expected=f"one of the entry's changes: {', '.join(changes) or 'none'}",
+                remedy="correct the name",
+            )
+    check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))
+    check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
+    check_placeholders(film.still, OF_FILMS, source, ("film", "still"))
+
+
+def read_film(model: FilmModel | None) -> Film | None:
+    """The film of a manifest; None where there is none."""
+    if model is None:
+        return None
+    return Film(
+        run_args=tuple(model.run),
+        module=model.module,
+        args=tuple(model.args),
+        still_args=tuple(model.still),
+        pictures=tuple(model.pictures),
+    )
