@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from mutator._common.tables import Table
-from mutator.campaigns import campaign_files
+from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.faults import specs
 from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
@@ -62,7 +62,7 @@ def campaigns(workspace: Workspace) -> str:
         "Its experiments are all combinations of the selected faults, scenarios, methods and "
         "contexts, of which a "
         "`sample` takes some.\nThe same file and options make the same plan everywhere.\n",
-        *sections("campaign.md", campaign_files.CampaignModel),
+        *sections("campaign.md", campaign_model.CampaignModel),
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.campaigns import campaign_files
+from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
 from mutator.faults import fault_models, readings
@@ -50,7 +50,7 @@ class Format:
 
 _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
-    (campaign_files.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
+    (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
     (severity.ScaleModel, severity.SCHEMA, "severity/*.yaml"),
     (context_tables.HazardsModel, context_tables.HAZARDS_SCHEMA, "stpa/hazards.yaml"),

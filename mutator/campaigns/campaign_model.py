@@ -1,0 +1,120 @@
+"""The shape of a campaign file, as it is written."""
+
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+
+from mutator.campaigns.trigger_choice import (
+    EVERY_READING,
+    MOST,
+    Triggers,
+    by_reading,
+    or_by_reading,
+)
+from mutator.config.yaml_files import StrictModel
+from mutator.model import AfterHazard, Method
+
+
+class _SelectionModel(StrictModel, title="A selection"):
+    """Faults of the library, by the names of their specs, or of a spec file."""
+
+    spec: str = Field(
+        description="A glob over `<module>/<fault_type>/<variant>`: `sensor/*`, `sensor/speed/low`; or a "
+        "spec file that is not in the library, by its path from the folder of the campaign: `my_fault.yaml`."
+    )
+    values: int | None = Field(
+        None, ge=1, description="How many of each variant's values, spread evenly; without it, all."
+    )
+
+
+_NAMES = {"type": "array", "items": {"type": "string"}}
+
+
+class _CanaryModel(StrictModel, title="The canary"):
+    """A fault known to be harmful. It must reach its hazard, or the campaign does not start."""
+
+    spec: str = Field(
+        description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken, "
+        "then the others until one does harm."
+    )
+    scenario: str = Field(description="The scenario.")
+    hazard: str = Field(description="The hazard that must come.")
+    at_s: float = Field(ge=0.0, allow_inf_nan=False, description="From when on the fault is active.")
+
+
+class _LimitsModel(StrictModel, title="Limits"):
+    """What one run may use before it is stopped."""
+
+    cpu_s: int = Field(default=60, ge=1, le=MOST, description="Seconds of CPU.")
+    wall_s: int = Field(default=300, ge=1, le=MOST, description="Seconds of wall time.")
+    memory_mb: int = Field(default=4096, ge=256, le=MOST, description="MiB of address space.")
+    steps: int = Field(default=20_000, ge=1, le=MOST, description="Steps of simulation.")
+    disk_mb: int = Field(
+        default=1024,
+        ge=1,
+        le=MOST,
+        description="MiB in its output folder and TMPDIR together, and in any single file that it writes.",
+    )
+
+
+class CampaignModel(StrictModel, title="The file"):
+    """What is run, and what each run may use."""
+
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="Its name: small letters, digits and `_`.")
+    about: str = Field(description="What it is for.")
+    study: str | None = Field(
+        None, description="The [study](../how-to/add-a-study.md) that its reports compare the results with."
+    )
+    target: str = Field(description="The target, by the name of its manifest.")
+    scenarios: list[str] = Field(min_length=1, description="Names of scenarios, each once.")
+    setting: Annotated[
+        dict[str, list[str]], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_NAMES))
+    ] = Field(
+        {EVERY_READING: []},
+        description="Changes of the manifest that every run is made with, fault-free ones included: one "
+        "list, or one for each reading by its name.",
+    )
+    faults: list[_SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
+    reading: str | None = Field(
+        None,
+        description="One of the library's [readings](fault-spec.md#readings); without it, the first. "
+        "`--reading` overrides it.",
+    )
+    methods: list[Annotated[Method, Field(strict=False)]] = Field(
+        default_factory=lambda: [Method.GUIDED],
+        min_length=1,
+        description="`guided`, `random` or both; without it, `guided`.",
+    )
+    triggers: Triggers = Field(description="When faults become active.")
+    sample: int | None = Field(
+        None,
+        ge=1,
+        description="How many experiments are taken, each variant as often as another; without it, all.",
+    )
+    proportional: bool = Field(
+        False,
+        description="The sample takes each fault type in each scenario in proportion to its number, guided "
+        "and random ones in pairs.",
+    )
+    seed: int = Field(ge=0, lt=2**63, description="The seed of all that is drawn; `--seed` overrides it.")
+    canary: _CanaryModel = Field(description="The check that a known fault does harm.")
+    after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
+        AfterHazard.GO_ON,
+        description="`stop` ends each faulty run at its first [terminal hazard](../explanation/verdicts.md"
+        "#the-end-of-the-drive), which saves time; later hazards and alerts are then not seen.",
+    )
+    limits: _LimitsModel = Field(_LimitsModel(), description="What one run may use.")
+    chunk: int = Field(
+        20,
+        ge=1,
+        le=1000,
+        description="How many experiments make a unit of work, which a worker takes at a time.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "CampaignModel":
+        if self.proportional and self.sample is None:
+            raise ValueError("proportional without sample: say how many")
+        if Method.RANDOM in self.methods and self.triggers.random_until_s is None:
+            raise ValueError("`random_until_s` in `triggers` for random times")
+        return self
