@@ -1,8 +1,7 @@
 """The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
 
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,40 +11,30 @@ from mutator._common.files import (
     json_bytes,
     raising_disk_full,
     read_json,
-    remove_folder,
     write_atomic,
 )
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
 from mutator.campaigns.shared_runs import same_in
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Experiment
 from mutator.mutants.building import InvalidMutant, build
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.digests import Digest
-from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
-from mutator.verification import canary, preflight_cache, unreached
+from mutator.verification import preflight_cache, unreached
 from mutator.verification.preflight_rules import (
     CheckRun,
     digest_of,
     judge_golden,
     judge_null,
     judge_same,
-    look,
 )
+from mutator.verification.preflight_runs import AGAIN, GOLDEN, NULL, CheckDriver, Notify, Runs, golden_keys
 from mutator.workspace import Workspace
-
-_OTHER_HASH_SEED = 4242
-_GOLDEN, _AGAIN, _NULL, _CANARY = "golden", "golden again", "null mutant", "canary"
-
-Notify = Callable[[Progress], None]
 
 
 def run_checks(
@@ -86,7 +75,7 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
 
 def are_there(folder: RunFolder) -> bool:
     """Whether a run folder holds results of checks and all golden runs."""
-    places = (folder.golden(scenario, tuple(changes)) for scenario, changes in folder.head["goldens"])
+    places = (folder.golden(*key) for key in golden_keys(folder))
     goldens = (place / name for place in places for name in folder.head["golden_files"])
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
@@ -106,10 +95,7 @@ class _Checks:
         self.kept = _kept(folder)
         self.manifest: TargetManifest = workspace.manifest(head["target"])
         self.models = workspace.fault_models()
-        self.keys = [(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
-        self.seed: int = head["seed"]
-        self.canary: Experiment = folder.canary
-        self.hazard: str = head["canary_hazard"]
+        self.keys = golden_keys(folder)
         now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
         self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
@@ -117,9 +103,9 @@ class _Checks:
             now,
             machine.surroundings(),
             head["goldens"],
-            self.seed,
-            self.canary.id,
-            self.hazard,
+            head["seed"],
+            folder.canary.id,
+            head["canary_hazard"],
             head["limits"],
         ]
         self.digest = digest([*content, places])
@@ -158,11 +144,14 @@ class _Checks:
         if not anchors.passed:  # seconds saved, not minutes spent
             yield anchors
             return
-        runs = self._run_all(workers, notify)
-        results = [anchors, *self._judge(runs)]
-        goldens = {golden_key(*key): runs[_GOLDEN, key].digest for key in self.keys}
+        driver = CheckDriver(
+            workspace=self.workspace, folder=self.folder, manifest=self.manifest, kept=self.kept
+        )
+        runs, canary_verdict = driver.drive(workers, notify)
+        results = [anchors, *self._judge(runs), _result("canary", *canary_verdict)]
+        goldens = {golden_key(*key): runs[GOLDEN, key].digest for key in self.keys}
         self._check_same_as_before(goldens)
-        cpu = [runs[_GOLDEN, key].cpu_s for key in self.keys]
+        cpu = [runs[GOLDEN, key].cpu_s for key in self.keys]
         checks = {
             "schema": SCHEMA,
             "digest": self.digest,
@@ -203,89 +192,28 @@ class _Checks:
                 remedy="go back to those of before, which run.json has, or run into another folder",
             )
 
-    def _run_all(self, workers: int, notify: Notify) -> dict[tuple[str, Any], CheckRun]:
-        """Every run of every check, `workers` at a time."""
-        work = self.folder.work / "checks"
-        for scratch in (work, self.kept):
-            remove_folder(scratch)
-        work.mkdir(parents=True)
-        base = prepare_base(self.manifest, self.folder.base)
-        engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
-        pool = ThreadPoolExecutor(max(1, workers))
-        try:
-            judged = pool.submit(self._judge_canary, engine)
-            futures = {name: pool.submit(self._run, engine, name, job) for name, job in self._jobs().items()}
-            nulls = [future for name, future in futures.items() if name[0] == _NULL]
-            _follow("checks", [judged, *nulls], notify)
-            _follow("golden", [future for name, future in futures.items() if name[0] != _NULL], notify)
-            self._judged_canary = judged.result()
-            return {name: future.result() for name, future in futures.items()}
-        finally:
-            pool.shutdown(cancel_futures=True)
-            remove_folder(work)
-
-    def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
-        """As `canary.judge`."""
-
-        def run(experiment: Experiment) -> CheckRun:
-            return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
-
-        return canary.judge(canary.tries(self.workspace, self.manifest, self.canary), run, self.hazard)
-
-    def _jobs(self) -> dict[tuple[str, Any], Job]:
-        jobs: dict[tuple[str, Any], Job] = {}
-        null = build(self.manifest, self.models, None, always())
-        for key in self.keys:
-            scenario, changes = key
-            common: dict[str, Any] = {
-                "scenario": self.workspace.scenario(scenario),
-                "seed": self.seed,
-                "changes": changes,
-            }
-            name = golden_key(*key)
-            jobs[_NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
-            jobs[_GOLDEN, key] = Job(name=f"a-{name}", **common)
-            jobs[_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
-        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != _NULL))  # the checks first
-
-    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
-        scratch = engine.work / job.name
-        try:
-            execution = engine.execute(job, scratch)
-            run = look(self.manifest, execution)
-            if name[0] == _NULL:
-                unreached.write_observed(self.kept, golden_key(*name[1]), execution.watched.get("seen", ()))
-            if name[0] == _GOLDEN and not run.problem:
-                place = self.kept / "golden" / golden_key(*name[1])
-                place.parent.mkdir(parents=True, exist_ok=True)
-                execution.out.rename(place)
-            return run
-        finally:
-            remove_folder(scratch)
-
-    def _packages(self, runs: Mapping[tuple[str, Any], CheckRun]) -> list[str]:
+    def _packages(self, runs: Runs) -> list[str]:
         """What the golden runs loaded that is neither the target's nor the standard library's."""
-        loaded = {module for key in self.keys for module in runs[_GOLDEN, key].modules}
+        loaded = {module for key in self.keys for module in runs[GOLDEN, key].modules}
         own = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
         return list(machine.packages_of(loaded - own))
 
-    def _judge(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
+    def _judge(self, runs: Runs) -> Iterator[CheckResult]:
         for key in self.keys:
-            first, again, null = (runs[name, key] for name in (_GOLDEN, _AGAIN, _NULL))
+            first, again, null = (runs[name, key] for name in (GOLDEN, AGAIN, NULL))
             detail = judge_golden(first, again)
             yield _result(f"golden {golden_key(*key)}", detail, "the same bytes twice")
             if not first.problem:
                 detail = judge_null(first, null)
                 yield _result(f"null mutant {golden_key(*key)}", detail, "the same bytes as golden")
         yield from self._judge_same(runs)
-        yield _result("canary", *self._judged_canary)
 
-    def _judge_same(self, runs: dict[tuple[str, Any], CheckRun]) -> Iterator[CheckResult]:
+    def _judge_same(self, runs: Runs) -> Iterator[CheckResult]:
         """Scenarios that a change makes the same, as the manifest has it, drive to the same bytes."""
         same: dict[tuple[str, ...], dict[str, CheckRun]] = {}
         for scenario, changes in self.keys:
             if scenario in same_in(self.manifest, changes):
-                same.setdefault(changes, {})[scenario] = runs[_GOLDEN, (scenario, changes)]
+                same.setdefault(changes, {})[scenario] = runs[GOLDEN, (scenario, changes)]
         for changes, goldens in same.items():
             yield _result(f"same {'+'.join((*goldens, *changes))}", judge_same(goldens), "one run for all")
 
@@ -301,15 +229,6 @@ class _Checks:
                 problems.setdefault(str(err), []).append(fault.spec)
         text = "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
         return _result("anchors", text, f"{len(self.variants)} variants found their statements")
-
-
-def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
-    """Wait for what is under way, and tell how much of it is done."""
-    pace = Pace(stage, len(futures))
-    notify(pace.at(0))
-    for done, future in enumerate(as_completed(futures), 1):
-        future.result()
-        notify(pace.at(done))
 
 
 def _result(name: str, problem: str, found: str) -> CheckResult:

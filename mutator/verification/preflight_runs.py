@@ -1,0 +1,112 @@
+"""The runs of the checks before a campaign: golden runs, each twice, null mutants, the canary."""
+
+from collections.abc import Callable, Collection
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import remove_folder
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.model import Experiment
+from mutator.mutants.building import build
+from mutator.store.progress import Pace, Progress
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import always
+from mutator.verification import canary, unreached
+from mutator.verification.preflight_rules import CheckRun, look
+from mutator.workspace import Workspace
+
+GOLDEN, AGAIN, NULL = "golden", "golden again", "null mutant"
+_CANARY = "canary"
+_OTHER_HASH_SEED = 4242
+
+Notify = Callable[[Progress], None]
+Runs = dict[tuple[str, Any], CheckRun]  # by kind of run, and (scenario, changes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckDriver:
+    """Drives what the checks of a run folder judge. Golden runs, and what they observed, stay in `kept`."""
+
+    workspace: Workspace
+    folder: RunFolder
+    manifest: TargetManifest
+    kept: Path
+
+    def drive(self, workers: int, notify: Notify) -> tuple[Runs, tuple[str, str]]:
+        """Every run of every check, `workers` at a time, and what `canary.judge` says of the canary."""
+        work = self.folder.work / "checks"
+        for scratch in (work, self.kept):
+            remove_folder(scratch)
+        work.mkdir(parents=True)
+        base = prepare_base(self.manifest, self.folder.base)
+        engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
+        pool = ThreadPoolExecutor(max(1, workers))
+        try:
+            judged = pool.submit(self._judge_canary, engine)
+            futures = {name: pool.submit(self._run, engine, name, job) for name, job in self._jobs().items()}
+            nulls = [future for name, future in futures.items() if name[0] == NULL]
+            _follow("checks", [judged, *nulls], notify)
+            _follow("golden", [future for name, future in futures.items() if name[0] != NULL], notify)
+            canary_verdict = judged.result()
+            return {name: future.result() for name, future in futures.items()}, canary_verdict
+        finally:
+            pool.shutdown(cancel_futures=True)
+            remove_folder(work)
+
+    def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
+        """As `canary.judge`."""
+
+        def run(experiment: Experiment) -> CheckRun:
+            return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
+
+        hazard: str = self.folder.head["canary_hazard"]
+        return canary.judge(canary.tries(self.workspace, self.manifest, self.folder.canary), run, hazard)
+
+    def _jobs(self) -> dict[tuple[str, Any], Job]:
+        jobs: dict[tuple[str, Any], Job] = {}
+        null = build(self.manifest, self.workspace.fault_models(), None, always())
+        for key in golden_keys(self.folder):
+            scenario, changes = key
+            common: dict[str, Any] = {
+                "scenario": self.workspace.scenario(scenario),
+                "seed": self.folder.head["seed"],
+                "changes": changes,
+            }
+            name = golden_key(*key)
+            jobs[NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
+            jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
+            jobs[AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
+        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != NULL))  # the checks first
+
+    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
+        scratch = engine.work / job.name
+        try:
+            execution = engine.execute(job, scratch)
+            run = look(self.manifest, execution)
+            if name[0] == NULL:
+                unreached.write_observed(self.kept, golden_key(*name[1]), execution.watched.get("seen", ()))
+            if name[0] == GOLDEN and not run.problem:
+                place = self.kept / "golden" / golden_key(*name[1])
+                place.parent.mkdir(parents=True, exist_ok=True)
+                execution.out.rename(place)
+            return run
+        finally:
+            remove_folder(scratch)
+
+
+def golden_keys(folder: RunFolder) -> list[tuple[str, tuple[str, ...]]]:
+    """(scenario, changes) of the golden runs that a run folder needs."""
+    return [(scenario, tuple(changes)) for scenario, changes in folder.head["goldens"]]
+
+
+def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
+    """Wait for what is under way, and tell how much of it is done."""
+    pace = Pace(stage, len(futures))
+    notify(pace.at(0))
+    for done, future in enumerate(as_completed(futures), 1):
+        future.result()
+        notify(pace.at(done))
