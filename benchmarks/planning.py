@@ -25,7 +25,7 @@ from mutator.model import Experiment, Outcome, Record, Status
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder, golden_key
-from mutator.verification import preflight, preflight_cache
+from mutator.verification import preflight, preflight_cache, preflight_rules
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -75,7 +75,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
         out.mkdir(parents=True)
         for name in (looked_at.manifest.trace_file, looked_at.manifest.record_file):
             (out / name).write_bytes(bytes(500_000))
-        goldens[golden_key(*key)] = preflight._digest_of(looked_at.manifest, out)
+        goldens[golden_key(*key)] = preflight_rules.digest_of(looked_at.manifest, out)
     said = {"schema": preflight.SCHEMA, "digest": looked_at.digest, "results": []}
     write_json(folder.path / preflight.FILE, said | {"goldens": goldens, "run_cpu_s": 1.0})
     preflight_cache.store(preflight_cache.entry(looked_at.digest), folder.path, preflight.FILE)
