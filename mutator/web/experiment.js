@@ -21,6 +21,7 @@ class Experiment {
     const id = this.state.experiment, row = id ? this.table.find(id) : -1;
     if (!id) {
       this.place.hidden = true;
+      this.place.replaceChildren(); // or its replay would play on
       this.row = -1;
       document.title = this.title;
       return;

@@ -31,8 +31,8 @@ class ReplayClock {
   }
 
   pause() {
+    if (!this.isPlaying) return; // a replay that has left the page pauses with each frame: the last one must not ask for another
     this.isPlaying = false;
-    clearInterval(this.#timer);
     this.#ask();
   }
 
@@ -70,6 +70,7 @@ class ReplayClock {
 
   /** For those whom motion harms: a picture twice a second, and nothing that glides. */
   #goOnCalmly() {
+    clearInterval(this.#timer); // of a pause a moment ago
     this.#timer = setInterval(() => {
       if (!this.isPlaying) return clearInterval(this.#timer);
       this.#advance(performance.now());

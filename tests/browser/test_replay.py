@@ -345,3 +345,19 @@ def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> Non
     steps = page.page.evaluate("[...new Set(told)]")
     assert len(steps) <= 5
     assert all(b - a > 0.4 for a, b in pairwise(steps[1:]))
+
+
+def test_a_replay_that_has_left_the_page_draws_no_more(replayed: Replayed) -> None:
+    """However many were opened before, playing or not, none of them asks for another frame."""
+    for _ in range(3):
+        replayed.show(FACTS)
+        replayed.page.click(".replay-player .play")
+        replayed.settle()
+    replayed.show(FACTS)
+    replayed.settle()
+    count = """() => new Promise((resolve) => {
+        const real = requestAnimationFrame, asked = [];
+        window.requestAnimationFrame = (draw) => { asked.push(draw); return real(draw); };
+        setTimeout(() => { window.requestAnimationFrame = real; resolve(asked.length); }, 300);
+    })"""
+    assert replayed.page.evaluate(count) == 0
