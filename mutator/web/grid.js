@@ -13,7 +13,7 @@ class Grid {
     { name: "value", title: "value", px: 70, cell: (t, r) => `${t.text(r, "value")} ${t.text(r, "unit")}`.replace(/ -?$/, "") },
     { name: "scenario", title: "scenario", px: 76, narrow: true },
     { name: "method", title: "method", px: 66 },
-    { name: "trigger", title: "trigger", px: 78 },
+    { name: "trigger", title: "trigger", px: 92 },
     { name: "ending", title: "outcome", px: 102, narrow: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
     { name: "severity", title: "severity", px: 100, narrow: true, cell: (t, r) => Grid.severity(t.text(r, "severity")) },
     { name: "t_activation", title: "activated", px: 80, time: true },
@@ -43,7 +43,6 @@ class Grid {
 
   constructor(place, table, state, metrics = []) {
     this.place = place;
-    place.style.setProperty("--rows", table.count); // a short table has a low window
     this.table = table;
     this.state = state;
     this.rows = [];
@@ -105,16 +104,19 @@ class Grid {
     this.state.set({ sort: by === name ? `-${name}` : by === `-${name}` ? "" : name });
   }
 
-  /** Show these rows; `experiment` has the keyboard, if it is among them. */
+  /** Show these rows, others than before from the first on; the opened experiment has the keyboard, if it is among them. */
   show(rows) {
+    const areOthers = rows !== this.rows;
     this.rows = rows;
+    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // few rows have a low window
     if (this.state.columns.join() !== this.chosen) {
       this.#choose();
       this.#build();
     }
-    const opened = this.state.experiment ? this.rows.indexOf(this.table.find(this.state.experiment)) : -1;
-    if (opened >= 0) this.current = opened;
-    this.current = Math.max(0, Math.min(this.current, rows.length - 1));
+    this.opened = this.state.experiment ? this.table.find(this.state.experiment) : -1;
+    const opened = this.rows.indexOf(this.opened);
+    if (opened >= 0 || areOthers) this.current = Math.max(0, opened);
+    if (areOthers) this.place.scrollTop = 0;
     this.element.setAttribute("aria-rowcount", String(rows.length + 1));
     const by = this.state.order.replace("-", "");
     for (const head of this.heads) {
@@ -123,7 +125,8 @@ class Grid {
       head.setAttribute("aria-sort", way);
       head.querySelector(".arrow").textContent = isBy ? (way === "ascending" ? " ▲" : " ▼") : "";
     }
-    this.draw();
+    if (areOthers && opened >= 0) this.reveal();
+    else this.draw();
   }
 
   #soon() {
@@ -166,14 +169,13 @@ class Grid {
     for (let at = first; at < last; at++) shown.push(this.#row(at));
     this.body.replaceChildren(...[space(first), ...shown, this.isOnPaper ? null : space(more)].filter(Boolean));
     if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: this.columns.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
-    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, "No experiment fits these filters.")));
+    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, this.table.count ? "No experiment fits these filters." : "No experiment has run yet.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
   }
 
   #row(at) {
     const { el } = Dom;
-    const row = this.rows[at], id = this.table.text(row, "experiment_id");
-    const isCurrent = at === this.current, isOpen = id === this.state.experiment;
+    const row = this.rows[at], isCurrent = at === this.current, isOpen = row === this.opened;
     const cells = this.columns.map((column) => {
       const classes = `td.${Grid.#classes(column)}`;
       if (column.isNumber) return el(classes, {}, Grid.number(this.table.number(row, column.name)));

@@ -1,0 +1,59 @@
+"""The window of the list of experiments: its height, and the rows in it after a filter."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .conftest import Page
+
+COPIES = 60  # of each row: a list that is much longer than its window
+LONG = """(copies) => {
+    const read = Packed.read;
+    Packed.read = async (name) => {
+        const data = await read(name);
+        if (name !== "table") return data;
+        const grown = (values) => Array.from({ length: copies }, () => values).flat();
+        for (const column of data.columns) {
+            for (const key of ["numbers", "codes", "texts"]) column[key] &&= grown(column[key]);
+        }
+        data.count *= copies;
+        return data;
+    };
+    document.getElementById("facets").replaceChildren();
+    for (const old of document.querySelectorAll(".find .facet, .find .copy")) old.remove();
+    return Report.start();
+}"""
+WINDOW = "document.getElementById('grid')"
+
+
+def height(page: "Page") -> float:
+    return float(page.page.evaluate(f"{WINDOW}.clientHeight"))
+
+
+def test_a_filter_that_leaves_few_rows_leaves_a_low_window(page: "Page") -> None:
+    """No box stands empty beneath them; without the filter it is as high as before."""
+    before = height(page)
+    page.page.fill("#search", "crashed")
+    page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length < 3")
+    assert height(page) < before / 3
+    assert page.page.evaluate(f"{WINDOW}.scrollHeight <= {WINDOW}.clientHeight")
+    page.page.fill("#search", "")
+    page.wait_for_rows(24)
+    assert height(page) == before
+
+
+def test_other_rows_are_shown_from_the_first_on(page: "Page") -> None:
+    """Wherever the list stood, a filter shows the worst of what it leaves."""
+    page.page.evaluate(LONG, COPIES)
+    page.page.evaluate(f"{WINDOW}.scrollTop = 1e6")
+    page.page.wait_for_function("!document.querySelector('#grid tr[data-at=\"0\"]')")
+    page.page.click('.tiles a:has-text("hazard")')
+    page.page.wait_for_selector('#grid tr[data-at="0"]')
+    assert page.page.evaluate(f"{WINDOW}.scrollTop") == 0
+
+
+def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: "Page") -> None:
+    """As it is when the whole id is in the address."""
+    name = page.page.inner_text("#grid tr[data-at='0'] code")
+    page.open(f"e={name[:6]}")
+    page.page.wait_for_selector("#experiment h2")
+    assert page.texts("#grid tr.open code") == [name]
