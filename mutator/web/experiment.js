@@ -50,6 +50,10 @@ class Experiment {
     return this.table.text(this.row, name);
   }
 
+  get #endedWell() {
+    return this.text("status") === "ok";
+  }
+
   #buttons() {
     const { el } = Dom;
     const button = (text, name, todo) => el("button", { type: "button", "aria-label": name, title: name, onclick: todo }, text);
@@ -104,13 +108,20 @@ class Experiment {
       ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
       ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)])]
       .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
-    if (!happened.length) return el("p", {}, "The fault was never active, so nothing happened.");
+    if (!happened.length) return el("p", {}, Experiment.#nothing(this.text("status"), this.text("outcome")));
     const reaction = at("reaction_time");
     return el("div", {}, el("table.events", {}, el("thead", {}, el("tr", {}, ["time [s]", "from activation [s]", "what"].map((t) => el("th", { scope: "col" }, t)))),
       el("tbody", {}, happened.map(([t, what]) => el("tr", {}, el("td.time", {}, t.toFixed(2)),
         el("td.time", {}, Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)}`), el("td", {}, what))))),
       Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time, from the first alert to the first hazard: ${reaction.toFixed(2)} s.`),
       this.#severity(), this.#metrics());
+  }
+
+  /** Why no event is known. */
+  static #nothing(status, outcome) {
+    if (status === "invalid_mutant") return "The mutant could not be made, which says nothing about the fault.";
+    if (status === "harness_error") return "The harness failed, which says nothing about the fault.";
+    return outcome === "not_activated" ? "The fault was never active, so nothing happened." : "No event of it was recorded.";
   }
 
   /** A hazard with its meaning, where the manifest gives one. */
@@ -233,8 +244,8 @@ class Experiment {
   #pictures(id, kept) {
     const { el } = Dom;
     const place = this.#content("pictures");
-    if (!kept && !this.facts.filmed) {
-      place.parentElement.remove(); // a target without films
+    if (!kept && !(this.facts.filmed && this.#endedWell)) {
+      place.parentElement.remove(); // a target without films, or a run that left none of its channels
       return;
     }
     const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");
@@ -259,6 +270,10 @@ class Experiment {
   #noSeries(id, error) {
     const { el } = Dom;
     const place = this.#content("replay");
+    if (!this.#endedWell) {
+      place.replaceChildren(el("p", {}, "It did not end well, so there are no channels of it."));
+      return;
+    }
     const said = el("p", { role: "status" });
     const load = async () => {
       const series = await SeriesFile.load(id, { isNew: true }).catch((error) => error);
@@ -266,7 +281,7 @@ class Experiment {
       if (!series || series instanceof Error) said.textContent = series ? series.message : "There is no series of it yet.";
       else Replay.show(place, series, this.facts);
     };
-    const why = "The channels of this experiment are not in the run folder: it did not end well, there was no room for them, or it ran with an older version.";
+    const why = "The channels of this experiment are not in the run folder: there was no room for them, or it ran with an older version.";
     place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command drives it again:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
       el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " once it has run."), said);

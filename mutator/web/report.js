@@ -116,7 +116,7 @@ const Report = (() => {
       const { target, key } = event;
       const isTyping = target.matches("input[type=search], select, textarea");
       const isRow = target.matches("#grid tr") || target === find("grid");
-      const isPanel = target.closest("#experiment") && !target.closest("button, a, summary, .scroll");
+      const isPanel = target.closest("#experiment") && !target.closest("button, a, summary, pre, code, video, .scroll"); // these need the arrows
       if (key === "Escape" && isTyping) target.blur();
       else if (key === "Escape" && experiment.isOpen) close();
       else if (!isTyping && keys[key]) keys[key]();
