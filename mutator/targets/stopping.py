@@ -1,19 +1,20 @@
 """How a run is ended at its first terminal hazard: the manifest's conditions as code for its process."""
 
 import ast
+from inspect import getsource
 
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
 from mutator.targets.judging import Hazard
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import TIME, names_in, parse, to_code
+from mutator.triggers.conditions import TIME, divide, names_in, parse, to_code
 
 _REMEDY = "leave `after_hazard` out of the campaign, so that runs go on"
 
 
 def stop_source(manifest: TargetManifest) -> str:
     """Source of a function `over(recorded)`: whether a terminal hazard holds in a step, of which `recorded`
-    has the numbers by their names in the trace. `math` and `_div` must be there.
+    has the numbers by their names in the trace. `math` must be there, and `min` and `max` that pass on NaN.
 
     MutatorError at what cannot be told of one step alone: a hazard that must last or asks for the steps
     before, one that the record or temporal logic tells, a channel that is not there in each step; and for a
@@ -38,7 +39,9 @@ def stop_source(manifest: TargetManifest) -> str:
             lines.append(f"    {channel.name} = float(recorded[{channel.in_trace!r}])")
     lines += [f"    {v.name} = {to_code(v.text, number=True)}" for v in derived if v.name in needed]
     holds = " or ".join(f"({to_code(text)})" for text in conditions)
-    return "\n".join(["def over(recorded):", *lines, f"    return {holds}", ""])
+    return "\n".join(
+        [getsource(divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
+    )
 
 
 def _condition(manifest: TargetManifest, hazard: Hazard) -> str:

@@ -5,13 +5,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 
-def divide(a: float, b: float) -> float:
-    """a / b as IEEE 754 has it, never an exception."""
-    if b:
-        return a / b
-    return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
-
-
 def drive(run: Any, source: str | None) -> bool:
     """Make the steps of a run; was it stopped? `source` has the function that says after each whether the
     drive is over (None: it never is)."""
@@ -30,8 +23,18 @@ def drive(run: Any, source: str | None) -> bool:
 
 def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
     """The function `over` of the source."""
-    names = {"abs": abs, "min": min, "max": max, "float": float}
-    space: dict[str, Any] = {"__builtins__": names, "math": math, "_div": divide}
+    names = {"abs": abs, "min": least, "max": greatest, "float": float}
+    space: dict[str, Any] = {"__builtins__": names, "math": math}
     exec(source, space)
     over: Callable[[Mapping[str, float]], bool] = space["over"]
     return over
+
+
+def least(*values: float) -> float:
+    """The least number; NaN if one of them is, as over a trace. Python's own depends on their order."""
+    return math.nan if any(map(math.isnan, values)) else min(values)
+
+
+def greatest(*values: float) -> float:
+    """The greatest number, likewise."""
+    return math.nan if any(map(math.isnan, values)) else max(values)

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Stat
 from mutator.mutants.building import build
 from mutator.outcomes.golden import until
 from mutator.targets.stopping import stop_source
+from mutator.triggers import over_time
 from mutator.triggers.kinds import always, at_time
 
 from ..fork_on_toy import Edit, Fork
@@ -160,6 +162,21 @@ def test_when_a_drive_is_over(stopping: Fork, gap: float, speed: float, over: bo
     """Any terminal condition ends it, of channels as the trace calls them and of what follows from them."""
     source = stop_source(stopping.toy.manifest("toycar"))
     assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
+
+
+@pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
+def test_a_drive_is_over_where_its_trace_says_so(stopping: Fork, edit: Edit, terminal: str) -> None:
+    """What ends a run is what it is judged by, wherever a number is none."""
+    edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
+    manifest = stopping.toy.manifest("toycar")
+    over = compiled(stop_source(manifest))
+    for numbers in product((math.nan, 30.0, 50.0, 100.0), repeat=3):
+        t, gap, speed = ([number] for number in numbers)
+        values = {"t": t, "d_rel": gap, "near": gap, "speed": speed}
+        trace = {name: np.array(value) for name, value in values.items()}
+        judged = [r.when if r.terminal == "True" else r.terminal for r in manifest.rules if r.terminal]
+        expected = any(over_time.holds(text, trace)[0] for text in judged)
+        assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 
 
 def test_a_run_that_does_not_tell_what_it_recorded_is_no_crash(stopping: Fork, edit: Edit) -> None:
