@@ -2,7 +2,9 @@
 
 A file for each experiment: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each value that is
 kept, `/events` with one for each thing that happened. Messages are JSON and have schemas; log times are
-simulated time in ns. What a run folder has is written: nothing is driven.
+simulated time in ns. They cannot be below 0: where the run begins before, they count from its first message,
+and the metadata `times` has that message's simulated time. What a run folder has is written: nothing is
+driven.
 """
 
 import io
@@ -197,9 +199,14 @@ class _Written:
             self._add(number, t, {"kind": kind, "name": name, "t": t})
 
     def finish(self) -> bytes:
+        first = min((time for time, *_ in self._messages), default=0)
+        if first < 0:
+            self.metadata("times", {"first_s": f"{first / 1e9:.9g}"})
+        zero = min(0, first)
         for sequence, (time, channel, message) in enumerate(sorted(self._messages, key=lambda m: m[:2])):
             data = json.dumps(message).encode()
-            self._writer.add_message(channel, time, data, publish_time=time, sequence=sequence)
+            at = time - zero
+            self._writer.add_message(channel, at, data, publish_time=at, sequence=sequence)
         self._writer.finish()  # type: ignore[no-untyped-call]
         return self._data.getvalue()
 

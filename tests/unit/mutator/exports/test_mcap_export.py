@@ -2,8 +2,10 @@
 
 import json
 import math
+import shutil
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +128,26 @@ def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
         (500, "last_active", ""),
         (500, "hazard", "H1"),
     ]
+
+
+def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -> None:
+    """Log times have no sign: all move together, and the metadata say by how much."""
+    copy, name = tmp_path / "run", hazardous(run)[0]
+    shutil.copytree(run, copy)
+    early = replace(GOLDEN, t=GOLDEN.t - 0.5)
+    write_kept(SeriesFolder(copy).kept(name), encode(early), encode(replace(FAULTY, t=FAULTY.t - 0.5), early))
+    only = f'experiment_id == "{name}"'
+    [file] = export(copy, Format.MCAP, tmp_path / "out", parts=Parts(only=only)).iterdir()
+    times = defaultdict(list)
+    with file.open("rb") as opened:
+        reader = make_reader(opened)
+        for _, channel, message in reader.iter_messages():
+            times[channel.topic].append(message.log_time)
+        facts = {record.name: record.metadata for record in reader.iter_metadata()}
+    ms = 1_000_000
+    assert times["/golden/gap"] == [0, 500 * ms, 1000 * ms]
+    assert times["/events"][0] == 750 * ms  # the activation, at 0.25 s
+    assert facts["times"] == {"first_s": "-0.5"}
 
 
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
