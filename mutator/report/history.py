@@ -3,6 +3,7 @@
 Written as HISTORY.md and history.html into that folder; nothing in the run folders is written.
 """
 
+import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +24,16 @@ from mutator.store.run_folder import RunFolder
 from mutator.web import asset
 
 FILES = ("HISTORY.md", "history.html")
-_HEADS = ("run", "date", "commit", "experiments", "hazards", "by severity", "without a warning", "CPU time")
+_HEADS = (
+    "run",
+    "date (UTC)",
+    "commit",
+    "experiments",
+    "hazards",
+    "by severity",
+    "without a warning",
+    "CPU time",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,7 +152,7 @@ def _steps(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
 
 
 def _command(before: PastRun, after: PastRun) -> str:
-    return f"mutator compare {before.folder.path} {after.folder.path}"
+    return shlex.join(["mutator", "compare", str(before.folder.path), str(after.folder.path)])
 
 
 def _markdown(runs: Sequence[PastRun], left_out: Sequence[str]) -> str:

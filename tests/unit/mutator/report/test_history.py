@@ -42,6 +42,16 @@ def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
     assert "| 1970-01-01 02:00 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
 
 
+def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
+    """A name with a space is quoted."""
+    (folder / "before").rename(folder / "the night before")
+    written = write_history(folder)
+    assert (
+        f"`mutator compare '{folder / 'the night before'}' {folder / 'after'}`"
+        in written.markdown.read_text()
+    )
+
+
 def test_a_folder_without_results_is_named(folder: Path) -> None:
     """It is no reason to show nothing, and it is not passed over."""
     written = write_history(folder)
