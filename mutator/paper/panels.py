@@ -34,7 +34,7 @@ _HTML = """\
 </pre></details>
 </details>
 {% endfor %}
-<p>{{ rules }}</p>
+<p>{{ rules | marked }}</p>
 """
 
 

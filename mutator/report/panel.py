@@ -1,5 +1,6 @@
 """Panels: the parts that a report consists of, each said once in Markdown and once in HTML."""
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,11 +24,20 @@ class Panel:
 
 
 def rendered(template: str, **values: Any) -> "Markup":
-    """HTML of a Jinja template; every value that is not Markup is escaped."""
+    """HTML of a Jinja template; every value that is not Markup is escaped. `marked` filters notes."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["marked"] = marked
     return Markup(environment.from_string(template).render(**values))
+
+
+def marked(text: str) -> "Markup":
+    """HTML of a note in Markdown that has `code` and *stress*."""
+    from markupsafe import Markup, escape
+
+    html = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)))
+    return Markup(re.sub(r"\*(?=\S)([^*]+)(?<=\S)\*", r"<em>\1</em>", html))

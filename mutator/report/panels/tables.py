@@ -57,7 +57,7 @@ _HTML = """\
 {% for sheet in sheets %}
 <details class="table">
 <summary><h3>{{ sheet.title }}</h3></summary>
-<p>{{ sheet.note }}</p>
+<p>{{ sheet.note | marked }}</p>
 {{ sheet.table().as_html() }}
 </details>
 {% endfor %}

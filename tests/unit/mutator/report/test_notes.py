@@ -1,0 +1,11 @@
+"""Notes of a report's panels as HTML."""
+
+from mutator.report.panel import marked
+
+
+def test_a_note_is_escaped_and_its_marks_are_elements() -> None:
+    """Code and stress; an asterisk by itself stays one, and so does what is no mark."""
+    assert marked("*above x* and `any`, marked with *.") == (
+        "<em>above x</em> and <code>any</code>, marked with *."
+    )
+    assert marked("2 * 3 * 4 < `<b>`") == "2 * 3 * 4 &lt; <code>&lt;b&gt;</code>"
