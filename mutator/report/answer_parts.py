@@ -60,6 +60,11 @@ def share(part: int, of: int, what: str) -> str:
     return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
 
 
+def were(count: int) -> str:
+    """The verb of so many."""
+    return "was" if count == 1 else "were"
+
+
 def by_kind(part: pd.DataFrame, of: pd.DataFrame) -> list[tuple[str, int, int]]:
     """Fault type, how many of `part`, how many of `of`; most first."""
     parts = part["kind"].value_counts()

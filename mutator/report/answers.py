@@ -22,6 +22,7 @@ from mutator.report.answer_parts import (
     kind_link,
     share,
     to_list,
+    were,
 )
 from mutator.report.dangers import dangerous
 from mutator.report.fix_order import first_to_fix
@@ -73,7 +74,8 @@ def unwarned(frame: pd.DataFrame) -> Answer:
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
-    says = f"{share(len(silent), len(hazards), 'hazards')} were silent, that is, no alert came before"
+    says = f"{share(len(silent), len(hazards), 'hazards')} {were(len(silent))} silent, that is, no alert "
+    says += "came before"
     says += (
         f": {never:,} with no alert at all, {late:,} with an alert only after the hazard."
         if never or late
@@ -94,7 +96,9 @@ def unwarned(frame: pd.DataFrame) -> Answer:
     return Answer(
         name="unwarned",
         title="What came without a warning",
-        says=says + _more(sum(part > 0 for _, part, _ in kinds), "fault types with silent hazards"),
+        says="No hazard came."
+        if hazards.empty
+        else says + _more(sum(part > 0 for _, part, _ in kinds), "fault types with silent hazards"),
         listings=(Listing(heads=heads, lines=lines),),
         links=tuple(
             Link(text, to_list({"warning": values}))
@@ -114,27 +118,30 @@ def survived(frame: pd.DataFrame) -> Answer:
     active = frame[frame["is_activated"]]
     fine = active[active["outcome"].isin(["masked", "sdc"])]
     moved = int(fine["is_manifested"].sum())
+    broken = len(active) - len(fine) - int((active["outcome"] == "hazard").sum())
     says = f"{share(len(fine), len(active), 'activated faults')} led to no hazard: "
     says += f"{len(fine) - moved:,} changed no actuator (masked), {moved:,} did (sdc)."
+    says += f" {broken:,} ended the program or kept it from ending." if broken else ""
     kinds = by_kind(fine, active)
     whole = [(kind, of) for kind, part, of in kinds if part == of]
-    says += f" {share(len(whole), len(kinds), 'fault types')} never led to one."
+    says += f" {share(len(whole), len(kinds), 'fault types')} never led to {'either' if broken else 'one'}."
     weak = sorted((k for k in kinds if k[1] < k[2]), key=lambda k: (k[1] / k[2], -k[2], k[0]))
-    says += _more(len(weak), "fault types that led to a hazard")
+    says += _more(len(weak), "fault types that did")
     ends = {"outcome": ["masked", "sdc"]}
     least = [(kind_link(kind, **ends), bar(part, of)) for kind, part, of in weak[:TYPES]]
     never = [(kind_link(kind, **ends), f"{of:,}") for kind, of in whole]
     return Answer(
         name="survived",
         title="What the controller survived",
-        says=says,
+        says="No fault was activated." if active.empty else says,
         listings=(
             Listing(heads=("fault type, least survived first", "no hazard / activated"), lines=least),
             Listing(heads=("never led to a hazard", "activated"), lines=never),
         ),
-        links=(
-            Link("Masked", to_list({"outcome": ["masked"]})),
-            Link("Changed an actuator, no hazard", to_list({"outcome": ["sdc"]})),
+        links=tuple(
+            Link(text, to_list({"outcome": [outcome]}))
+            for text, outcome in (("Masked", "masked"), ("Changed an actuator, no hazard", "sdc"))
+            if (fine["outcome"] == outcome).any()
         ),
     )
 
@@ -144,10 +151,11 @@ def time_spent(frame: pd.DataFrame, timings: Mapping[str, Mapping[str, object]])
     cpu = frame["experiment_id"].map({name: float(str(line["cpu_s"])) for name, line in timings.items()})
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = len({line["worker"] for line in timings.values()})
-    says = f"{duration(total)} of CPU time, by {counted(workers, 'worker')}: "
-    says += f"{share(ran, len(frame), 'experiments')} were driven{_undriven(frame, cpu, timings)}."
+    says = f"The experiments took {duration(total)} of CPU time, by {counted(workers, 'worker')}: "
+    says += f"{share(ran, len(frame), 'experiments')} {were(ran)} driven{_undriven(frame, cpu, timings)}."
     if ran:
         says += f" Median {cpu[cpu > 0].median():.2f} s, longest {cpu.max():.2f} s."
+    says += " No times are kept of checks, golden runs and proof."
     costs = cpu.groupby(frame["kind"]).sum().sort_values(ascending=False, kind="stable")
     lines = [
         (kind_link(str(kind)), Part(float(s), total, f"{duration(float(s))} ({100 * s / total:.0f} %)"))

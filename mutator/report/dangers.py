@@ -37,7 +37,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
         name="dangerous",
         title="What is dangerous",
         wide=True,
-        says=says,
+        says="No fault was activated." if active.empty else says,
         listings=(*_worst_lists(ranked, units, has_alerts=has_alerts), Listing(heads=heads, lines=lines)),
         links=_links(ranked),
     )

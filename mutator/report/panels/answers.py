@@ -54,7 +54,7 @@ def _html(listing: Listing) -> Markup:
     """The same with links and bars. Where a screen is too narrow for the heads, cells say what they are."""
     rows = [
         [
-            _labelled(head, _cell(cell)) if i else _cell(cell)
+            _labelled(head, cell) if i else _cell(cell)
             for i, (head, cell) in enumerate(zip(listing.heads, line, strict=True))
         ]
         for line in listing.lines
@@ -62,8 +62,10 @@ def _html(listing: Listing) -> Markup:
     return Table(heads=listing.heads, rows=rows).as_html("plain")
 
 
-def _labelled(head: str, cell: str) -> str:
-    return Markup('<span class="label">{} </span>{}').format(head, cell)
+def _labelled(head: str, cell: Cell) -> str:
+    if isinstance(cell, str) and cell.startswith(f"{head} "):  # severity S2
+        return cell
+    return Markup('<span class="label">{} </span>{}').format(head, _cell(cell))
 
 
 def _cell(cell: Cell) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -225,27 +226,59 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
     """The costliest fault type is first; an experiment that was not driven costs nothing."""
     answer = said["time"]
     assert answer.says == (
-        "2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 whose trigger never "
-        "held, so that the golden run's result stands. Median 8.00 s, longest 64.00 s."
+        "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 "
+        "whose trigger never held, so that the golden run's result stands. Median 8.00 s, longest 64.00 s. "
+        "No times are kept of checks, golden runs and proof."
     )
     [first, *_] = answer.listings[0].lines
     assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "1 min 04 s (50 %)"))
 
 
+def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
+    """The same run with these experiments alone."""
+    return replace(
+        run,
+        rows=tuple(row for row in run.rows if row.experiment_id in names),
+        frame=run.frame[run.frame["experiment_id"].isin(names)].reset_index(drop=True),
+    )
+
+
 def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
     """No empty table, and no share of nothing."""
-    fine = [row for row in run.rows if not row.hazards]
-    frame = run.frame[run.frame["outcome"] != "hazard"].reset_index(drop=True)
-    calm = ReportedRun(
-        **{name: getattr(run, name) for name in ("folder", "workspace", "engines", "study")},
-        rows=tuple(fine),
-        frame=frame,
-    )
-    panel = answers_panel(calm)
+    panel = answers_panel(part_of(run, {row.experiment_id for row in run.rows if not row.hazards}))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
-    assert "0 of 0 hazards were silent, that is, no alert came before." in panel.markdown
+    assert "## What came without a warning\n\nNo hazard came." in panel.markdown
     assert "the worst" not in panel.markdown
     assert "What to fix first" not in panel.markdown
+
+
+def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None:
+    """Nothing was dangerous, and nothing survived; no link leads to an empty list."""
+    idle = part_of(run, {row.experiment_id for row in run.rows if row.t_activation is None})
+    found = {answer.name: answer for answer in answers_of(idle)}
+    assert found["dangerous"].says == found["survived"].says == "No fault was activated."
+    assert not any(answer.links for answer in found.values())
+    assert found["time"].says.startswith(
+        "The experiments took 0 s of CPU time, by 2 workers: 0 of 1 experiment (0 %) were driven"
+    )
+
+
+def test_a_crash_is_not_survived(run: ReportedRun) -> None:
+    """It is no hazard either: it is counted apart."""
+    frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
+    found = {answer.name: answer for answer in answers_of(replace(run, frame=frame))}
+    assert found["survived"].says == (
+        "2 of 7 activated faults (29 %) led to no hazard: 1 changed no actuator (masked), 1 did (sdc). "
+        "1 ended the program or kept it from ending. 0 of 3 fault types (0 %) never led to either."
+    )
+
+
+def test_one_is_singular(run: ReportedRun) -> None:
+    """One hazard was silent, one experiment was driven."""
+    found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
+    assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
+    found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}
+    assert "1 of 1 experiment (100 %) was driven" in found["time"].says
 
 
 def test_a_link_names_facets_as_the_page_reads_them() -> None:
