@@ -105,7 +105,7 @@ def verify(
         facts["expected"] = expect
         checks.append(Check(what="seal as expected", count=1, differences=() if seal == expect else (wrong,)))
     damaged = any(check.differences for check in checks)
-    repaired = put_aside(folder) if repair and damaged else []
+    repaired = put_aside(folder, found) if repair and damaged else []
     return Audit(run=folder.path, facts=facts, checks=tuple(checks), seal=seal, repaired=tuple(repaired))
 
 

@@ -109,8 +109,8 @@ class RunExperiment(ExperimentResult):
 
     @property
     def is_drawn(self) -> bool:
-        """Whether the run folder has its plot and its series."""
-        return self.plot_file.exists() and SeriesFolder(self.run.path).has(self.id)
+        """Whether the run folder has its plot and its series, and that is not damaged."""
+        return self.plot_file.exists() and SeriesFolder(self.run.path).is_readable(self.id)
 
     def not_run(self) -> MutatorError:
         """What to say of an experiment that is only planned."""

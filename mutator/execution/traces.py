@@ -11,7 +11,7 @@ from mutator.outcomes.golden import Trace, load_trace, trace_digest
 from mutator.outcomes.sampling import keep_series, sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder
+from mutator.store.series import SeriesFolder, making_again
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -75,7 +75,7 @@ class Traces:
             raise MutatorError(
                 f"no series of {experiment_id}",
                 where=self.folder.path,
-                remedy=f"drive it again: `mutator rerun {experiment_id} --trace --run {self.folder.path}`",
+                remedy=f"drive it again: {making_again(self.folder.path, experiment_id)}",
             )
         return sampled_traces(*found, self.manifest.time_channel)
 

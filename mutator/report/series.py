@@ -21,11 +21,11 @@ def series_facts(folder: RunFolder) -> dict[str, Any]:
 
 
 def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
-    """Make the series of each experiment whose trace is kept, and that has none."""
+    """Make the series of each experiment whose trace is kept, and that has none, or a damaged one."""
     traces, series = Traces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
         with suppress(
             MutatorError, KeyError
         ):  # the sources have changed, say, or the trace is of another state
-            if not series.has(name) and traces.is_kept(name):
+            if not series.is_readable(name) and traces.is_kept(name):
                 keep_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))

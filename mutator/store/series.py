@@ -103,8 +103,16 @@ class SeriesFolder:
 
     def has(self, experiment_id: str) -> bool:
         """Whether an experiment's series is there; MutatorError for a damaged index."""
-        index = self.index
-        return self.kept(experiment_id).is_file() or (index is not None and experiment_id in index.entries)
+        if self.kept(experiment_id).is_file():
+            return True
+        return self.index is not None and experiment_id in self.index.entries
+
+    def is_readable(self, experiment_id: str) -> bool:
+        """Whether an experiment's series is there and not damaged."""
+        try:
+            return self.read(experiment_id) is not None
+        except MutatorError:
+            return False
 
     def kept_ids(self) -> list[str]:
         """The experiments whose series are in files of their own."""
@@ -112,7 +120,15 @@ class SeriesFolder:
 
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
         """(golden, faulty) of an experiment; None where its series is not there. MutatorError where it is
-        damaged."""
+        damaged, with the command that makes it anew."""
+        try:
+            return self._read(experiment_id)
+        except MutatorError as err:
+            remedy = f"drive it again: {making_again(self.path.parent, experiment_id)}"
+            where = err.where or self.path
+            raise MutatorError(err.got, where=where, expected=err.expected, remedy=remedy) from None
+
+    def _read(self, experiment_id: str) -> tuple[Series, Series] | None:
         if (path := self.kept(experiment_id)).exists():  # driven again, maybe since the others are damaged
             return read_kept(path)
         index = self.index
@@ -129,29 +145,47 @@ class SeriesFolder:
         assert self.index is not None
         name, at = self.index.places[number]
         if self._chunk[0] != name:
-            path = self.path / f"{name}.js"
-            data = read_script(path)
-            if name_of(data) != name:
-                raise MutatorError("damaged", where=path, expected="the content that its name stands for")
-            self._chunk = (name, data)
+            self._chunk = (name, self.chunk(name))
         return self._chunk[1][at : at + self.index.sizes[number]]
+
+    def chunk(self, name: str) -> bytes:
+        """The bytes of a chunk; MutatorError for one that is missing or damaged."""
+        path = self.path / f"{name}.js"
+        data = read_script(path)
+        if name_of(data) != name:
+            raise MutatorError("damaged", where=path, expected="the content that its name stands for")
+        return data
 
     def kept(self, experiment_id: str) -> Path:
         """Where the series of an experiment is that was driven again for it."""
         return self.path / KEPT / f"{experiment_id}.js"
 
 
+def making_again(run: Path, experiment_id: str = "ID") -> str:
+    """The command that makes the series of an experiment anew."""
+    return f"`mutator rerun {experiment_id} --trace --run {run}`"
+
+
+def putting_aside(run: Path) -> str:
+    """What to do about a damaged file of series."""
+    aside = f"`mutator verify {run} --repair` puts it aside"
+    return f"{aside}; {making_again(run)} makes the series of an experiment"
+
+
 def read_index(path: Path) -> Index:
     """An index; MutatorError for a damaged one."""
+    remedy = putting_aside(path.parent.parent)
     try:
         data = json.loads(gzip.decompress(read_script(path)))
         if data["schema"] != SCHEMA:
-            raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA)
-        return Index.of(data)
-    except (ValueError, LookupError, TypeError, OSError, EOFError, zlib.error) as err:
-        raise MutatorError(
-            f"a damaged index ({err})", where=path, remedy="delete the folder `series`"
-        ) from None
+            raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
+        index = Index.of(data)
+        for number in (*index.goldens.values(), *index.entries.values()):
+            if number not in range(len(index.places)):
+                raise ValueError(f"no entry {number}")
+        return index
+    except (ValueError, LookupError, TypeError, AttributeError, OSError, EOFError, zlib.error) as err:
+        raise MutatorError(f"a damaged index ({err})", where=path, remedy=remedy) from None
 
 
 def write_index(path: Path, index: Index) -> None:
@@ -171,8 +205,8 @@ def read_kept(path: Path) -> tuple[Series, Series]:
     data = read_script(path)
     try:
         (length,) = _LENGTH.unpack_from(data)
-    except struct.error:
+        at = _LENGTH.size
+        golden = decode(data[at : at + length])
+        return golden, decode(data[at + length :], golden)
+    except (struct.error, MutatorError):
         raise MutatorError("damaged", where=path, expected="the series of two runs") from None
-    at = _LENGTH.size
-    golden = decode(data[at : at + length])
-    return golden, decode(data[at + length :], golden)

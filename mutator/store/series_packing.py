@@ -46,6 +46,11 @@ class SeriesWriter:
             self._known.add(one.key)
         self._blocks.append(EXPERIMENT, f"{experiment_id} {one.key}", one.faulty)
 
+    def sync(self) -> None:
+        """Make sure that what was appended survives a power cut."""
+        if self._blocks is not None:
+            self._blocks.sync()
+
     def close(self) -> None:
         if self._blocks is not None:
             self._blocks.close()
@@ -84,7 +89,8 @@ def segments(run: Path) -> list[Path]:
 def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
     """Pack the series of a run folder, and those of the run folders `others`.
 
-    `worth` has every experiment that ended well. Killed at any time, it can be done again.
+    `worth` has every experiment that ended well. What is damaged is left out. Killed at any time, it can be
+    done again.
     """
     appended = segments(run)
     if not appended and not others:
@@ -96,10 +102,26 @@ def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Pa
             found.add(_appended(path))
     with raising_disk_full(run):
         (run / FOLDER).mkdir(exist_ok=True)
-    index = _written(run / FOLDER, plan, found, worth, budget_mb)
-    known = {name for name, _ in index.chunks} | {INDEX}
-    for path in [*appended, *(path for path in (run / FOLDER).glob("*.js") if path.stem not in known)]:
+    index = _written(run / FOLDER, plan, found, worth, budget_mb, len(worth))
+    _remove_others(run, index)
+    for path in appended:
         path.unlink()
+
+
+def pack_again(run: Path, index: Index) -> None:
+    """Pack anew what `index` has, but for what is damaged or missing. What workers appended stays."""
+    worth = {name: place for place, name in enumerate(index.entries)}
+    found = _packed(SeriesFolder(run))
+    ended = len(worth) + index.left_out
+    _remove_others(run, _written(run / FOLDER, index.plan, found, worth, index.budget_mb, ended))
+
+
+def _remove_others(run: Path, index: Index) -> None:
+    """Remove chunks that the index does not name any more."""
+    known = {name for name, _ in index.chunks} | {INDEX}
+    for path in (run / FOLDER).glob("*.js"):
+        if path.stem not in known:
+            path.unlink()
 
 
 def _packed(folder: SeriesFolder) -> _Found:
@@ -160,8 +182,8 @@ def _reader(path: Path, offset: int, length: int) -> Read:
     return read
 
 
-def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: int) -> Index:
-    """Write the chunks, then the index."""
+def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: int, ended: int) -> Index:
+    """Write the chunks, then the index; so many experiments `ended` well."""
     kept = _kept(found, worth, budget_mb * _MB)
     golden_of = {name: found.experiments[name][0] for name in kept}
     goldens = {name: found.goldens[name] for name in sorted({*golden_of.values()})}
@@ -176,7 +198,7 @@ def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: in
         goldens={name: numbers[entry.digest] for name, entry in goldens.items()},
         entries={name: later[found.experiments[name][1].digest] for name in kept},
         golden_of=golden_of,
-        left_out=len(worth) - len(kept),
+        left_out=ended - len(kept),
         budget_mb=budget_mb,
     )
     write_index(folder / f"{INDEX}.js", index)

@@ -7,7 +7,7 @@ character a byte; the page loads it as `x-user-defined`, the encoding in which e
 import re
 from pathlib import Path
 
-from mutator._common.files import write_atomic
+from mutator._common.files import no_pipe, write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
@@ -38,7 +38,7 @@ def write_script(path: Path, data: bytes) -> None:
 def read_script(path: Path) -> bytes:
     """What a script hands to the page; MutatorError for one that is missing or no such script."""
     try:
-        text = path.read_bytes()
+        text = no_pipe(path).read_bytes()
     except OSError as err:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path) from None
     call = _CALL.match(text)

@@ -6,6 +6,7 @@ proof, tables. Each step lists every difference that it finds.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from mutator._common.files import read_json
 from mutator._common.hashing import digest, plain
@@ -14,6 +15,7 @@ from mutator.campaigns.plans import load_plan, plan_digest
 from mutator.campaigns.provenance import sources
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
+from mutator.store.blocks import read_blocks
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest
@@ -21,6 +23,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.targets.manifest import TargetManifest
 from mutator.verification.audited_records import mutants, proof, recorded, verdicts
+from mutator.verification.audited_series import series
 from mutator.verification.audited_tables import tables
 from mutator.verification.seal import golden_digests, not_verifiable
 from mutator.workspace import Workspace
@@ -83,6 +86,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
         Check.of(
             "records of the proof that are those of the run", len(proven), proof(folder, records, proven)
         ),
+        Check.of("series that are as they were written", *series(folder)),
         Check.of("tables that follow from the records", *tables(folder)),
     ]
     return checks
@@ -100,6 +104,14 @@ def _content(folder: RunFolder) -> Problems:
     if not folder.verifiable:
         yield MutatorError(not_verifiable(folder), where=folder.path / HEAD, expected="a run of this version")
     yield from folder.problems()
+    for path in filter(Path.is_file, folder.patches.files()):
+        if read_blocks(path).damaged:
+            yield MutatorError(
+                "damaged blocks",
+                where=path,
+                expected="patches as they were appended",
+                remedy=f"`mutator verify {folder.path} --repair` puts them aside",
+            )
 
 
 def _plan(folder: RunFolder) -> Problems:

@@ -7,6 +7,7 @@ it is: only a copy of the folder has it.
 import os
 import shutil
 from collections.abc import Collection, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +26,17 @@ from mutator.store.patches import rewrite
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.verification.audited_records import recorded
+from mutator.verification.repaired_series import repair_series
+from mutator.workspace import Workspace
 
 ASIDE = "damaged"  # folder of what was put aside
 SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
 _Change = tuple[str, bytes | None, str]  # a file, what it becomes (None: it goes), and that in words
 
 
-def repair(folder: RunFolder) -> list[str]:
-    """Put damaged files, lines and patches of a run folder into `damaged/`; what was done, a sentence each.
+def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
+    """Put damaged files, lines, patches and series of a run folder into `damaged/`; what was done, a sentence
+    each. With a `workspace` the series of golden runs are made anew.
 
     MutatorError while a command works in the folder, for one of an earlier schema, and for a damaged plan.
     """
@@ -50,10 +54,13 @@ def repair(folder: RunFolder) -> list[str]:
         changes = [*_files(folder, ledger), *_segments(folder, ledger, lost)]
         for name, *_ in changes:
             _put_aside(folder.path, name)
-        _drop_patches(folder, lost)
+        blocks = _drop_patches(folder, lost)
         if changes or renewed:
             _carry_out(folder.path, changes, ledger)
-    return [*renewed, *(said for *_, said in changes), *(f"patch of {one} put aside" for one in lost)]
+        put_aside = partial(_put_aside, folder.path)
+        series = [*repair_series(folder, workspace, put_aside)]
+    patches = [*blocks, *(f"patch of {one} put aside" for one in lost)]
+    return [*renewed, *(said for *_, said in changes), *patches, *series]
 
 
 def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
@@ -97,24 +104,29 @@ def _lost_patches(folder: RunFolder) -> list[str]:
     return lost
 
 
-def _drop_patches(folder: RunFolder, lost: Collection[str]) -> None:
-    """Put aside the files of these patches; the other patches in them stay."""
-    run, patches = folder.path, folder.patches
+def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
+    """Put aside the files of these patches, and those with damaged blocks, of which it tells; the other
+    patches in them stay."""
+    run, patches, said = folder.path, folder.patches, []
     for one in lost:
         old = patches.old_file(one)
         _put_aside(run, old.relative_to(run).as_posix())
         old.unlink(missing_ok=True)
-    for path in patches.files() if lost else ():
+    for path in patches.files():
+        name = path.relative_to(run).as_posix()
         if not path.is_file():
-            _put_aside(run, path.relative_to(run).as_posix())
+            _put_aside(run, name)
             continue
         found = read_blocks(path)
         names = dict.fromkeys(block.key for block in found.blocks)
         if not found.damaged and not names.keys() & set(lost):
             continue
-        _put_aside(run, path.relative_to(run).as_posix())
-        kept = ((name, patches.read(name)) for name in names if name not in lost)
-        rewrite(path, [(name, data) for name, data in kept if data is not None])
+        _put_aside(run, name)
+        if found.damaged:
+            said.append(f"{name}: damaged blocks put aside")
+        kept = ((one, patches.read(one)) for one in names if one not in lost)
+        rewrite(path, [(one, data) for one, data in kept if data is not None])
+    return said
 
 
 def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:

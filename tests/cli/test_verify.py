@@ -8,6 +8,9 @@ from typing import Any
 
 import pytest
 
+from mutator.errors import MutatorError
+from mutator.store.series import Index, SeriesFolder
+
 Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 
 
@@ -75,6 +78,90 @@ def test_a_damaged_run_is_repaired_and_run_again(cli: Cli, sealed: str) -> None:
     again = cli("run", "small", "--out", "run", "-n", "0")
     assert again.code == 0, again.err
     assert f"seal: {sealed}" in again.out
+    assert cli("verify", "run", "--expect", sealed).code == 0
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def packed() -> Index:
+    index = SeriesFolder(Path("run")).index
+    assert index is not None
+    return index
+
+
+def chunks() -> dict[str, str]:
+    """The files of packed series: those of golden runs, those of experiments, and the index."""
+    (goldens, _), (experiments, _) = packed().chunks
+    return {"goldens": f"{goldens}.js", "experiments": f"{experiments}.js", "index": "index.js"}
+
+
+@pytest.mark.parametrize("become", [flip, Path.unlink], ids=["damaged", "missing"])
+@pytest.mark.parametrize("what", ["goldens", "experiments", "index"])
+def test_damaged_series_are_told_put_aside_and_made_again(
+    cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
+) -> None:
+    """An audit names the file and what brings its series back: `rerun --trace` does, before and after a
+    repair, which leaves nothing to complain of. The chunk of the golden runs is made again at once."""
+    before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
+    name, *others = packed().entries
+    became = Path("run/series") / chunks()[what]
+    become(became)
+    found = cli("verify", "run")
+    assert found.code == 1 and "1 difference" in found.out
+    told = " ".join(found.out.split())
+    assert f"- series/{became.name}: " in told and "--repair` puts it aside" in told
+    assert "`mutator rerun ID --trace" in told
+    if what != "index":
+        assert f"the series of {name} and {len(others)} more cannot be read" in told
+    made = cli("rerun", name, "--trace", "--run", "run")
+    assert made.code == 0, made.err
+    whole = SeriesFolder(Path("run")).read(name)
+    assert whole is not None
+    if what != "index" or become is flip:
+        with pytest.raises(MutatorError, match=f"drive it again: `mutator rerun {others[0]} --trace"):
+            SeriesFolder(Path("run")).read(others[0])
+    repaired = cli("verify", "run", "--repair")
+    assert repaired.code == 1 and f"repaired: series/{became.name}" in repaired.out
+    assert (Path("run/damaged/series") / became.name).exists() == (become is flip)
+    assert cli("verify", "run", "--expect", sealed).code == 0
+    assert SeriesFolder(Path("run")).read(name) is not None
+    if what == "goldens":
+        after = {path.name: path.read_bytes() for path in Path("run/series").glob("*.js")}
+        assert after == before
+    else:
+        assert SeriesFolder(Path("run")).read(others[0]) is None
+        assert cli("rerun", others[0], "--trace", "--run", "run").code == 0
+        assert SeriesFolder(Path("run")).read(others[0]) is not None
+
+
+def test_a_damaged_series_of_one_experiment_is_told(cli: Cli, sealed: str) -> None:
+    """With the command that makes it anew, which does. A plot that is drawn hides it from nobody."""
+    name = next(iter(packed().entries))
+    assert cli("show", name, "--run", "run").code == 0
+    kept = SeriesFolder(Path("run")).kept(name)
+    assert cli("rerun", name, "--trace", "--run", "run").code == 0
+    data = kept.read_bytes()
+    flip(kept)
+    found = cli("verify", "run")
+    assert found.code == 1 and f"- series/kept/{name}.js: damaged; " in found.out
+    assert f"`mutator rerun {name} --trace" in found.out
+    assert cli("show", name, "--run", "run").code == 0
+    assert kept.read_bytes() == data
+    assert cli("verify", "run").code == 0
+
+
+def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
+    """Also where every patch is there: of two blocks of an experiment the first one does not count."""
+    [patches] = Path("run/patches").iterdir()
+    data = patches.read_bytes()
+    patches.write_bytes(data[:40] + b"?" + data[41:] + data)
+    found = cli("verify", "run", "--repair")
+    assert found.code == 1 and f"- patches/{patches.name}: damaged blocks; " in found.out
+    assert f"repaired: patches/{patches.name}: damaged blocks put aside" in found.out
     assert cli("verify", "run", "--expect", sealed).code == 0
 
 

@@ -18,7 +18,8 @@ from mutator.errors import MutatorError
 from .damages import contents
 
 AUDITED = re.compile(
-    r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/"
+    r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/|"
+    r"series/[0-9a-f]{16}\.js$"
 )
 TABLES = (
     "results.csv",

@@ -1,0 +1,71 @@
+"""What an audit finds out of series: are their files what was written? No result depends on them."""
+
+from collections.abc import Iterator
+
+from mutator.errors import MutatorError
+from mutator.store.blocks import read_blocks
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import INDEX, Index, SeriesFolder, making_again, putting_aside, read_kept
+from mutator.store.series_packing import segments
+
+
+def series(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
+    """How many files of series there are, and what is wrong with them: one that is damaged, or missing
+    although others need it. A folder without any is whole."""
+    there = SeriesFolder(folder.path)
+    return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there)
+
+
+def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
+    run = folder.path
+    yield from _packed(folder, there)
+    for name in there.kept_ids():
+        try:
+            read_kept(there.kept(name))
+        except MutatorError as err:
+            yield _told(err, err.got, f"{making_again(run, name)} makes it anew")
+    for path in segments(run):
+        if read_blocks(path).damaged:
+            yield MutatorError(
+                "damaged blocks", where=path, expected="as they were appended", remedy=putting_aside(run)
+            )
+
+
+def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
+    """What is wrong with the index and the chunks."""
+    run, path = folder.path, there.path / f"{INDEX}.js"
+    try:
+        index = there.index
+    except MutatorError as err:
+        yield err
+        return
+    if index is None:
+        if any(there.path.glob("*.js")) and not segments(run):  # else a kill came before it was written
+            what = "the index of the chunks beside it"
+            yield MutatorError("missing", where=path, expected=what, remedy=putting_aside(run))
+        return
+    if index.plan != folder.head["plan"]:
+        got, expected = f"series of plan {index.plan[:16]}", folder.head["plan"][:16]
+        yield MutatorError(got, where=path, expected=expected, remedy=putting_aside(run))
+        return
+    for name, _ in index.chunks:
+        try:
+            there.chunk(name)
+        except MutatorError as err:
+            ids = _users(index, name)
+            more = f" and {len(ids) - 1} more" if len(ids) > 1 else ""
+            got = f"{err.got}; the series of {ids[0]}{more} cannot be read" if ids else err.got
+            yield _told(err, got, putting_aside(run))
+
+
+def _told(err: MutatorError, got: str, remedy: str) -> MutatorError:
+    return MutatorError(got, where=err.where, expected=err.expected, remedy=remedy)
+
+
+def _users(index: Index, chunk: str) -> list[str]:
+    """The experiments that a chunk is needed for: it has their series, or that of their golden run."""
+    inside = {number for number, (name, _) in enumerate(index.places) if name == chunk}
+    goldens = {key for key, number in index.goldens.items() if number in inside}
+    return [
+        name for name, number in index.entries.items() if number in inside or index.golden_of[name] in goldens
+    ]

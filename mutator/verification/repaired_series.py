@@ -1,0 +1,62 @@
+"""Puts aside what is damaged of the series of a run folder, so that the rest can be read.
+
+A chunk of golden runs is made anew of these, where that gives the bytes that it had. The series of an
+experiment comes back when it is driven again.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from mutator.errors import MutatorError
+from mutator.outcomes.judging import load_channels
+from mutator.outcomes.sampling import Sampler
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import INDEX, Index, SeriesFolder, making_again
+from mutator.store.series_packing import SUFFIX, pack_again
+from mutator.store.series_script import name_of, write_script
+from mutator.verification.audited_series import series
+from mutator.workspace import Workspace
+
+
+def repair_series(
+    folder: RunFolder, workspace: Workspace | None, put_aside: Callable[[str], None]
+) -> Iterator[str]:
+    """Do that; what was done, a sentence each. `put_aside` copies the file of a name in the run folder.
+    Without a `workspace` no golden run can be read."""
+    run, there = folder.path, SeriesFolder(folder.path)
+    paths = {Path(problem.where) for problem in series(folder)[1] if problem.where}
+    index = None
+    if there.path / f"{INDEX}.js" in paths:  # nothing says what is in the chunks
+        paths |= {*there.path.glob("*.js")}
+    elif paths:
+        index = there.index
+    for path in sorted(paths):
+        name = path.relative_to(run).as_posix()
+        found = "put aside" if os.path.lexists(path) else "is gone"
+        put_aside(name)
+        if path.suffix == SUFFIX:
+            yield f"{name}: damaged blocks put aside; `mutator run` packs the others"
+        elif index and (data := _golden_chunk(folder, workspace, index, path.stem)):
+            write_script(path, data)
+            yield f"{name} made anew from the golden runs"
+        else:
+            path.unlink(missing_ok=True)
+            yield f"{name} {found}: {making_again(run)} makes the series of an experiment"
+    if index:
+        pack_again(run, index)
+
+
+def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
+    """The content of a chunk of golden runs, made anew; None where that is not possible any more."""
+    keys = {number: key for key, number in index.goldens.items()}
+    numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
+    if workspace is None or not keys.keys() >= {*numbers}:
+        return None
+    try:
+        manifest = workspace.manifest(folder.head["target"])
+        goldens = [load_channels(manifest, folder.path / "golden" / keys[number]) for number in numbers]
+    except MutatorError:
+        return None
+    data = b"".join(Sampler(manifest, golden).encoded for golden in goldens)
+    return data if name_of(data) == name else None
