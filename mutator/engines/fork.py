@@ -2,7 +2,8 @@
 
 Same results as the reference engine's, byte for byte, or the reference engine is what runs: for mutants that
 cannot be put into a loaded program, and again for runs that did not end well, so the words about these are
-its own. `warm` forks before the first step of every run.
+its own. `warm` forks before the first step of every run, as this does of those that end at a terminal hazard
+where that is in their golden run, too.
 """
 
 import marshal
@@ -118,15 +119,20 @@ class ForkEngine:
             raise Refused("no experiment")
         swap = plan_swap(self._manifest, job.files, str(self._running().tree))
         if self._warm:
-            first = self._running().first
-            first.load(_needed(swap), self._patience_s)
-            return self._become(first, job, folder, swap, _FROM_THE_START)
-        if job.stop and job.golden_ends:
-            raise Refused("a terminal hazard ends its golden run")
-        start = first_active(swap.probe, self._observed(job, job.golden))
+            return self._from_the_start(job, folder, swap)
+        seen = self._observed(job, job.golden)
+        if job.stop and job.golden_ends:  # maybe before the fault is first active: there is no fork of that
+            return self._from_the_start(job, folder, swap)
+        start = first_active(swap.probe, seen)
         if start is None:
             return _golden(job, job.golden)
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
+
+    def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
+        """Have a fork of the loaded target drive the whole run."""
+        first = self._running().first
+        first.load(_needed(swap), self._patience_s)
+        return self._become(first, job, folder, swap, _FROM_THE_START)
 
     def _running(self) -> Pool:
         if self._pool is None:

@@ -12,7 +12,7 @@ import pytest
 from mutator.campaigns.plans import make_plan
 from mutator.engines.fork import ForkEngine
 from mutator.engines.in_target.stop import compiled
-from mutator.engines.jobs import Engine
+from mutator.engines.jobs import Engine, RunMode
 from mutator.errors import MutatorError
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
@@ -70,7 +70,8 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
     runner = Runner(manifest, fork.models, engine, goldens, fork.toy.scenario)
     finished: Finished
     (finished,) = runner.run([experiment])
-    assert finished.mode is not None
+    if engine is fork.engine and finished.record.status is Status.OK:
+        assert finished.mode in (RunMode.FORK, RunMode.GOLDEN), finished.why
     return finished.record
 
 
@@ -110,6 +111,21 @@ def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
     assert (reference.outcome, reference.activation) == (Outcome.NOT_ACTIVATED, None)
     whole = drive(stopping, stopping.engine, AfterHazard.GO_ON, at)
     assert (whole.activation is not None) == (at == 2.0)
+
+
+@pytest.mark.parametrize(("terminal", "outcome"), [("t > 3.0", Outcome.SDC), ("t > 9.0", Outcome.HAZARD)])
+def test_a_drive_that_ends_after_the_fault_where_golden_ends(
+    stopping: Fork, edit: Edit, terminal: str, outcome: Outcome
+) -> None:
+    """The fork engine drives it, and gives the record of the reference engine: the fault did something by
+    then, or ended the drive itself."""
+    edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
+    reference, forked = (
+        drive(stopping, one, AfterHazard.STOP) for one in (stopping.engine.reference, stopping.engine)
+    )
+    assert reference == forked
+    assert (reference.outcome, reference.activation is not None) == (outcome, True)
+    assert reference.t_end is not None
 
 
 @pytest.mark.parametrize(
