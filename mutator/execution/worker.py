@@ -63,7 +63,7 @@ class Worker:
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
         self._head = {"schema": SCHEMA, "plan": plan}
-        self._records = LineWriter(self._file("records"), self._head)
+        self._records = LineWriter(self._file("records"), self._head, self._sync_blocks)
         self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
@@ -105,7 +105,7 @@ class Worker:
     def close(self) -> None:
         """End the engine; sync and close this worker's files."""
         self._runner.engine.close()
-        for writer in (self._patches, self._records, self._timings, self._proofs, self._series):
+        for writer in (self._patches, self._series, self._records, self._timings, self._proofs):
             if writer is not None:
                 writer.close()
 
@@ -152,6 +152,12 @@ class Worker:
             }
         )
         self._records.append(asdict(finished.record))
+
+    def _sync_blocks(self) -> None:
+        """Before records: a record that survives a power cut names a patch that does."""
+        self._patches.sync()
+        if self._series is not None:
+            self._series.sync()
 
     def _file(self, kind: str) -> Path:
         return self.folder.path / kind / f"{self._name}.jsonl"

@@ -71,8 +71,9 @@ class BlockWriter:
 
     def sync(self) -> None:
         """Make sure that what was appended survives a power cut."""
-        with raising_disk_full(self.path):
-            os.fsync(self._fd)
+        if self._unsynced:
+            with raising_disk_full(self.path):
+                os.fsync(self._fd)
         self._unsynced, self._synced_at = 0, time.monotonic()
 
     def close(self) -> None:

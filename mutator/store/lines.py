@@ -8,7 +8,7 @@ doubled or moved is found by its number, and the lines after it still verify.
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -28,12 +28,14 @@ _BODY = len(_KEY) + _WIDTH + len(_AFTER)
 class LineWriter:
     """Appends JSON lines to a new file of its own: whole lines, checksummed, synced in batches.
 
-    `head`, with the schema, is the first line; the file's name joins it. A line that does not fit on the disk
-    is taken back, so the file stays readable; DiskFull is raised.
+    `head`, with the schema, is the first line; the file's name joins it. `first` is called before each sync,
+    to sync what the lines refer to. A line that does not fit on the disk is taken back, so the file stays
+    readable; DiskFull is raised.
     """
 
-    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, head: Mapping[str, Any], first: Callable[[], None] = lambda: None) -> None:
         self.path = path
+        self._first = first
         self._unsynced = 0
         self._synced_at = time.monotonic()
         with raising_disk_full(path):
@@ -62,6 +64,7 @@ class LineWriter:
 
     def sync(self) -> None:
         """Make sure that what was appended survives a power cut."""
+        self._first()
         with raising_disk_full(self.path):
             os.fsync(self._fd)
         self._unsynced = 0

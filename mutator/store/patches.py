@@ -52,6 +52,11 @@ class PatchWriter:
         kind, content = self._packer.block(data)
         self._blocks.append(kind, experiment_id, content)
 
+    def sync(self) -> None:
+        """Make sure that what was appended survives a power cut."""
+        if self._blocks is not None:
+            self._blocks.sync()
+
     def close(self) -> None:
         if self._blocks is not None:
             self._blocks.close()

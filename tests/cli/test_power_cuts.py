@@ -1,0 +1,129 @@
+"""Power cuts: the disk has what was synced, and of the rest any part."""
+
+import os
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.execution.session import Session
+from mutator.outcomes.ranking import worth
+from mutator.outcomes.reader import Results
+from mutator.store import blocks, lines
+from mutator.store.blocks import read_blocks
+from mutator.store.lines import read_segment
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder
+from mutator.store.series_packing import pack, segments
+
+Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "reference")
+
+
+@pytest.fixture
+def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A run folder whose experiments have run, and whose command came no further."""
+
+    def end(self: Session) -> None:
+        raise MutatorError("the power is cut")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "finish", end)
+        assert "the power is cut" in cli(*WORDS).err
+    return Path("run").resolve()
+
+
+def last_block(path: Path) -> int:
+    """Where the last block of a file begins."""
+    data = path.read_bytes()
+    return data.rindex(b"FIB1", 0, read_blocks(path).blocks[-1].offset)
+
+
+def test_records_are_synced_after_what_they_refer_to(
+    cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whenever records are, the patch and the series of each are on the disk."""
+    synced: dict[str, int] = {}
+    looks = []
+    fsync = os.fsync
+
+    def look(fd: int) -> None:
+        fsync(fd)
+        path = Path(f"/proc/self/fd/{fd}").readlink()
+        synced[f"{path.parent.name}{path.suffix}"] = path.stat().st_size
+        if path.parent.name != "records":
+            return
+        segment = read_segment(path)
+        names = {segment.content(number)["experiment_id"] for number in segment.lines if number > 1}
+        for kind in ("patches", "series"):
+            there = path.parents[1] / kind / f"{path.stem}.blocks"
+            size = synced.get(f"{kind}.blocks", 0)
+            found = read_blocks(there).blocks if size else ()
+            kept = {one.key.split()[0] for one in found if one.offset + len(one.data) <= size}
+            assert names <= kept
+        looks.append(len(names))
+
+    monkeypatch.setattr(os, "fsync", look)
+    monkeypatch.setattr(lines, "_BATCH", 2)
+    for module in (lines, blocks):
+        monkeypatch.setattr(module, "_BATCH_S", 1e9)
+    ran = cli(*WORDS)
+    assert ran.code == 0, ran.err
+    assert looks[0] == 1 and max(looks) == 4
+
+
+@pytest.mark.parametrize("rest", ["cut off", "zeros"])
+def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, rest: str) -> None:
+    """However much of the block is there: the folder is not believed, the answer says what mends it, and the
+    run then comes to the result that it would have had."""
+    shutil.copytree(cut, "whole")
+    whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
+    assert whole.code == 0, whole.err
+    seal = re.search(r"^seal: (\w+)$", whole.out, re.MULTILINE)
+    assert seal
+    [path] = (cut / "patches").iterdir()
+    data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
+    for length in range(last_block(path), len(data)):
+        path.write_bytes(data[:length].ljust(len(data) if rest == "zeros" else 0, b"\0"))
+        if path.read_bytes() == data:  # it ends with zeros
+            continue
+        with pytest.raises(MutatorError, match=f"no patch of {name}.*--repair") as told:
+            RunFolder.open(cut)
+        assert told.value.where == str(path)
+    refused = cli(*WORDS)
+    assert refused.code == 2 and f"no patch of {name}" in refused.err and "--repair" in refused.err
+    assert cli("verify", "run").code == 1
+    repaired = cli("verify", "run", "--repair")
+    assert f"repaired: patch of {name} put aside" in repaired.out
+    again = cli(*WORDS)
+    assert again.code == 0, again.err
+    assert "1 now" in again.out and f"seal: {seal[1]}" in again.out
+    assert cli("verify", "run").code == 0
+
+
+def test_a_record_without_its_series_has_none(cli: Cli, cut: Path) -> None:
+    """However much of the block is there, nothing else is shown in its place: the others keep theirs, the
+    run ends as it would have, and the experiment gets it by being driven again."""
+    [path] = segments(cut)
+    data = path.read_bytes()
+    names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]
+    places = {one: place for place, one in enumerate(names)}
+    for length in (*range(last_block(path), len(data), 7), len(data) - 1):
+        run = Path(shutil.copytree(cut / "series", Path("cut") / "series")).parent
+        (run / "series" / path.name).write_bytes(data[:length])
+        pack(run, "p", places, 500)
+        there = SeriesFolder(run)
+        assert [name for name in names if there.is_readable(name)] == names[:-1]
+        assert there.read(names[-1]) is None
+        shutil.rmtree(run)
+    path.write_bytes(data[: last_block(path) + 30])
+    ran = cli(*WORDS)
+    assert ran.code == 0, ran.err
+    assert [one for one in worth(Results.of_run(cut).rows()) if not SeriesFolder(cut).has(one)] == names[-1:]
+    assert cli("verify", "run").code == 0
+    assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0
+    assert SeriesFolder(cut).is_readable(names[-1])
