@@ -43,6 +43,12 @@ def export(
     folder = RunFolder.open(run)
     if parts.only is not None and format is not Format.MCAP:
         raise MutatorError(f"only, for {format.value}", argument="only", remedy="leave `only` out")
+    if parts.table is not Table.RESULTS and format not in (Format.CSV, Format.PARQUET):
+        raise MutatorError(f"a table, for {format.value}", argument="table", remedy="leave `table` out")
+    if parts.failures and format is not Format.JUNIT:
+        raise MutatorError(
+            f"failures, for {format.value}", argument="failures", remedy="leave `failures` out"
+        )
     place = out or folder.path / FOLDER / FILES.get(format, f"{parts.table.value}.{format.value}")
     if format is Format.MCAP:
         return mcap_export.write_experiments(folder, place, workspace, parts.only)

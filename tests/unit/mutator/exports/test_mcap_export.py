@@ -172,10 +172,20 @@ def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> Non
     assert not (tmp_path / "none").exists()
 
 
-def test_other_formats_take_no_filter(run: Path, tmp_path: Path) -> None:
-    """A filter that would have no effect is refused."""
-    with pytest.raises(MutatorError, match="leave `only` out"):
-        export(run, Format.CSV, tmp_path / "x.csv", parts=Parts(only='scenario == "A"'))
+@pytest.mark.parametrize(
+    ("format", "parts", "name"),
+    [
+        (Format.CSV, Parts(only='scenario == "A"'), "only"),
+        (Format.MCAP, Parts(table=Table.TIMINGS), "table"),
+        (Format.CSV, Parts(failures=["hazard"]), "failures"),
+    ],
+)
+def test_what_a_format_has_no_use_for_is_refused(
+    run: Path, tmp_path: Path, format: Format, parts: Parts, name: str
+) -> None:
+    """An option without effect would promise something."""
+    with pytest.raises(MutatorError, match=f"leave `{name}` out"):
+        export(run, format, tmp_path / "x", parts=parts)
 
 
 def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
