@@ -106,7 +106,7 @@ class Grid {
 
   /** Show these rows, others than before from the first on; the opened experiment has the keyboard, if it is among them. */
   show(rows) {
-    const areOthers = rows !== this.rows;
+    const areOthers = rows.length !== this.rows.length || rows.some((row, at) => row !== this.rows[at]);
     this.rows = rows;
     this.place.style.setProperty("--rows", Math.max(1, rows.length)); // few rows have a low window
     if (this.state.columns.join() !== this.chosen) {

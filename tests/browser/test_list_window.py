@@ -57,3 +57,12 @@ def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: 
     page.open(f"e={name[:6]}")
     page.page.wait_for_selector("#experiment h2")
     assert page.texts("#grid tr.open code") == [name]
+
+
+def test_the_same_rows_stay_where_they_are(page: "Page") -> None:
+    """Another measure of the map, or other columns, move the list nowhere."""
+    page.page.evaluate(LONG, COPIES)
+    page.page.evaluate(f"{WINDOW}.scrollTop = 9000")
+    page.page.select_option("#measure", "activated")
+    page.page.wait_for_function("location.hash.includes('heat=activated')")
+    assert page.page.evaluate(f"{WINDOW}.scrollTop") == 9000
