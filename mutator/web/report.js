@@ -13,20 +13,47 @@ const Report = (() => {
     return /^[\w./-]+$/.test(found[1]) ? found[1] : `'${found[1].replaceAll("'", "'\\''")}'`;
   }
 
+  /** Make the parts of the page and tie them to its state. */
   async function start() {
     const data = await Packed.read("table");
     const given = JSON.parse(find("facts").textContent);
-    const facts = { ...given, run: runFolder };
-    const table = new Rows.Table(data);
-    let drawn = null;
-    const state = new State(() => update());
+    const table = new Rows.Table(data), state = new State(() => view.update()), search = find("search");
     const heat = new HeatMap(find("heat"), find("measure"), table, state, given.metrics);
     const filters = new Filters(find("facets"), find("chips"), table, state);
     const grid = new Grid(find("grid"), table, state, given.metrics);
-    const columns = new Columns(find("search").parentElement, grid, state);
-    const actions = { move: (by) => grid.move(by), close, place: () => grid.placeOf(state.experiment) };
-    const experiment = new Experiment(find("experiment"), table, state, facts, actions);
-    const search = find("search"), wide = matchMedia(WIDE);
+    const columns = new Columns(search.parentElement, grid, state);
+    const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
+    const experiment = new Experiment(find("experiment"), table, state, { ...given, run: runFolder }, actions);
+    const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment });
+    searching(search, state);
+    keyboard({ grid, experiment, search, close: view.close });
+    links(grid, () => state.experiment && view.close());
+    matchMedia(WIDE).addEventListener("change", view.arrange);
+    addEventListener("beforeprint", () => grid.print(true));
+    addEventListener("afterprint", () => grid.print(false));
+    view.update();
+    document.documentElement.dataset.ready = "yes";
+  }
+
+  function searching(search, state) {
+    let typing = null;
+    search.addEventListener("input", () => {
+      clearTimeout(typing);
+      typing = setTimeout(() => state.set({ query: search.value.trim() }, { replace: true }), 120);
+    });
+    search.parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
+  }
+
+  /** How many experiments a state leaves, and what it asks for in vain. */
+  function foundText(table, state, count) {
+    const all = table.count.toLocaleString("en");
+    const found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} experiments` : `${all} experiment${table.count === 1 ? "" : "s"}`;
+    return [found, ...table.unknown(state)].join(". ");
+  }
+
+  /** What shows the state in all parts. */
+  function viewOf({ table, state, search, heat, filters, grid, columns, experiment }) {
+    let drawn = null;
     let scrolled = 0; // where the page stood before an experiment took its place
 
     /** Show the state. Rows are found and sorted again only when what they depend on has changed. */
@@ -35,15 +62,11 @@ const Report = (() => {
       if (key !== drawn) {
         drawn = key;
         const { rows, apart, counts } = table.filter(state.query, state.chosen, HeatMap.FREE);
-        const sorted = table.sort(rows, state.order.replace("-", ""), state.order.startsWith("-"));
-        grid.show(sorted);
+        grid.show(table.sort(rows, state.order.replace("-", ""), state.order.startsWith("-")));
         heat.show(apart);
         filters.show(counts);
         columns.show();
-        const found = state.isFiltered
-          ? `${rows.length.toLocaleString("en")} of ${table.count.toLocaleString("en")} experiments`
-          : `${table.count.toLocaleString("en")} experiment${table.count === 1 ? "" : "s"}`;
-        find("found").textContent = [found, ...table.unknown(state)].join(". ");
+        find("found").textContent = foundText(table, state, rows.length);
         if (search.value !== state.query) search.value = state.query;
       } else grid.show(grid.rows);
       arrange();
@@ -54,7 +77,7 @@ const Report = (() => {
       const isOpen = Boolean(state.experiment), wasOpen = experiment.isOpen;
       if (isOpen && !wasOpen) scrolled = scrollY;
       document.body.classList.toggle("has-experiment", isOpen);
-      for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !wide.matches;
+      for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !matchMedia(WIDE).matches;
       experiment.show();
       if (isOpen && !wasOpen) grid.reveal();
       if (!isOpen && wasOpen) scrollTo({ top: scrolled, behavior: "instant" });
@@ -66,19 +89,7 @@ const Report = (() => {
       grid.focus();
     }
 
-    let typing = null;
-    search.addEventListener("input", () => {
-      clearTimeout(typing);
-      typing = setTimeout(() => state.set({ query: search.value.trim() }, { replace: true }), 120);
-    });
-    find("search").parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
-    keyboard({ state, grid, experiment, search, close });
-    links(grid, () => state.experiment && close());
-    wide.addEventListener("change", arrange);
-    addEventListener("beforeprint", () => grid.print(true));
-    addEventListener("afterprint", () => grid.print(false));
-    update();
-    document.documentElement.dataset.ready = "yes";
+    return { update, arrange, close };
   }
 
   /** Links to filters work as a change of state, links to sections leave it alone. */
