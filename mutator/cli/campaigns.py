@@ -94,19 +94,30 @@ def plan(
         made = mutator.plan(campaign, out, choices=chosen, workspace=workspace)
     folder = out.resolve()
     anew = not_forkable(made, workspace)
-    cost, groups = made.cost(workers or usable_cores()), made.groups()
+    cost = made.cost(workers or usable_cores())
     if as_json:
-        kinds = [
-            {"module": m, "fault_type": f, "method": how, "experiments": n}
-            for (m, f, how), n in sorted(groups.items())
-        ]
-        facts = {"run": str(folder), "digest": made.digest, "seed": made.seed, "reading": made.reading}
-        terminal.emit(
-            facts
-            | {"experiments": len(made.experiments), "runs": made.runs, "groups": kinds, "cost": cost}
-            | {"not_forked": anew}
-        )
-    rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in sorted(groups.items())]
+        _emit_plan(terminal, folder, made, cost, anew)
+    _print_plan(terminal, made, cost, anew)
+    terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {made.digest[:16]})")
+    command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
+    terminal.say(f"run it: {shlex.join(command)}", whole=True)
+
+
+def _emit_plan(
+    terminal: Terminal, folder: Path, made: "mutator.Plan", cost: "Cost", anew: dict[str, str]
+) -> None:
+    kinds = [
+        {"module": m, "fault_type": f, "method": how, "experiments": n}
+        for (m, f, how), n in sorted(made.groups().items())
+    ]
+    facts = {"run": str(folder), "digest": made.digest, "seed": made.seed, "reading": made.reading}
+    facts |= {"experiments": len(made.experiments), "runs": made.runs, "groups": kinds, "cost": cost}
+    terminal.emit(facts | {"not_forked": anew})
+
+
+def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: dict[str, str]) -> None:
+    groups = sorted(made.groups().items())
+    rows = [(f"{module}/{kind}", method, n) for (module, kind, method), n in groups]
     terminal.table(
         ["fault type", "method", "experiments"],
         [*rows, ("total", "", len(made.experiments))],
@@ -118,9 +129,6 @@ def plan(
     for why, variants in _by_reason(anew).items():
         terminal.say(f"on the reference engine: {', '.join(variants)}: {why}")
     terminal.say(f"expected: {_cost_line(cost)}")
-    terminal.say(f"plan: {short_path(folder / 'plan.csv')} (digest {made.digest[:16]})")
-    command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
-    terminal.say(f"run it: {shlex.join(command)}", whole=True)
 
 
 def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:

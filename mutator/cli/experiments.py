@@ -79,7 +79,6 @@ def show(
 
     Without an experiment the worst of a run are listed: by class of severity and delta-v, then by margin.
     """
-    from mutator.api.experiment_results import describe
     from mutator.cli import experiment_view
 
     terminal = Terminal(as_json)
@@ -93,28 +92,40 @@ def show(
         return
     drawn = _plot(terminal, found) if plot and found.record else None
     filmed = _film(terminal, found, video, still or [])
-    stretch = found.stretch
     if as_json:
-        facts = {**describe(found.experiment), **found.verdict, "patch": patch}
-        facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
-        facts |= {"run_with": stretch, "verifiable": found.run.verifiable}
-        facts |= {"path": asdict(found.fault_path) if found.fault_path else None}
-        terminal.emit(facts | {"films": filmed})
+        terminal.emit(_facts(found, patch, drawn) | {"films": filmed})
         return
+    _print(terminal, found, patch)
+    if drawn:
+        terminal.say(f"plot: {short_path(drawn)}")
+    for path in filmed:
+        terminal.say(f"film: {short_path(path)}")
+
+
+def _facts(found: "RunExperiment", patch: str, drawn: Path | None) -> dict[str, object]:
+    """The experiment for JSON, without its films."""
+    from mutator.api.experiment_results import describe
+
+    facts = {**describe(found.experiment), **found.verdict, "patch": patch}
+    facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
+    facts |= {"run_with": found.stretch, "verifiable": found.run.verifiable}
+    return facts | {"path": asdict(found.fault_path) if found.fault_path else None}
+
+
+def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
+    """The experiment for people, without its pictures."""
+    from mutator.cli import experiment_view
+
     experiment_view.print_experiment(terminal, found.experiment, patch)
     if found.record is None:
         terminal.say(str(found.not_run()))
     else:
         experiment_view.print_verdict(terminal, found)
         experiment_view.print_path(terminal, found)
-    if stretch:
-        terminal.say(f"run with: {stretch}")
+    if found.stretch:
+        terminal.say(f"run with: {found.stretch}")
     if not found.run.verifiable:
         terminal.say("not verifiable: an earlier version of mutator wrote this run, without digests")
-    if drawn:
-        terminal.say(f"plot: {short_path(drawn)}")
-    for path in filmed:
-        terminal.say(f"film: {short_path(path)}")
 
 
 def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:

@@ -69,10 +69,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             _check_complete(folder)
         stretches = [plain(s) for s in _stretches(folders, accept=accept_versions)]
         _check_goldens(folders)
-        if any(out.glob(f"{_MARK}*")):  # a merge was killed here
-            with owned(out, patience_s=0.0):
-                cleaning.clear(out)
-        make_run_folder(out)
+        _make_empty(out)
         stack.enter_context(owned(out))
         try:
             with raising_disk_full(out):
@@ -82,6 +79,14 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
         except BaseException:
             cleaning.clear(out)
             raise
+
+
+def _make_empty(out: Path) -> None:
+    """The folder to merge into, without what a merge that was killed left there."""
+    if any(out.glob(f"{_MARK}*")):
+        with owned(out, patience_s=0.0):
+            cleaning.clear(out)
+    make_run_folder(out)
 
 
 def _opened(path: Path) -> RunFolder:

@@ -17,7 +17,7 @@ from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.golden import BadOutput, Trace
-from mutator.outcomes.judging import load_channels, load_judged
+from mutator.outcomes.judging import Judged, load_channels, load_judged
 from mutator.outcomes.propagation import departures
 from mutator.outcomes.sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge
@@ -193,31 +193,33 @@ class Runner:
     ) -> tuple[Record, Trace | None]:
         """The record, and the trace of a run that ended well."""
         if execution.status is not Status.OK or execution.probe is None:
-            status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
-            # a time-out's count depends on the machine's speed, a crash's does not
-            crashed = status is Status.CRASHED
-            activation = activation_of(execution.probe or {}) if crashed else None
-            bare = _bare(experiment, status, detail, built, activation)
-            return replace(bare, error=error_of(execution.raised)), None
+            return self._failed(experiment, built, execution), None
         activation = activation_of(execution.probe)
-        reference = self.goldens.trace(experiment)
         try:
             faulty, judged = load_judged(self.manifest, execution.out)
         except BadOutput as err:
             if activation is None:
                 raise
             return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation), None
-        time = self.manifest.time_channel
+        record = self._judged(experiment, built, execution, faulty, judged)
+        return record, faulty if record.status is Status.OK else None
+
+    def _judged(
+        self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: Judged
+    ) -> Record:
+        """The record of a run that ended well, beside golden."""
+        activation = activation_of(execution.probe or {})
+        reference, time = self.goldens.trace(experiment), self.manifest.time_channel
         if execution.stopped:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
-                return _bare(experiment, Status.HARNESS_ERROR, why, built), None
+                return _bare(experiment, Status.HARNESS_ERROR, why, built)
             reference = golden.until(reference, faulty[time][-1], time)
         difference = golden.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
-            return _bare(experiment, Status.HARNESS_ERROR, problem, built), None
+            return _bare(experiment, Status.HARNESS_ERROR, problem, built)
         hazards = first_events(judged.hazards, activation)
-        record = Record(
+        return Record(
             experiment_id=experiment.id,
             status=Status.OK,
             outcome=judge(activation=activation, t_manifest=difference.t_first, hazards=hazards),
@@ -235,7 +237,14 @@ class Runner:
             metrics=judged.metrics,
             left=departures(reference, faulty, self.manifest.channels, time, judged.t_end),
         )
-        return record, faulty
+
+    def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
+        """The record of a run that did not end well."""
+        status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
+        # a time-out's count depends on the machine's speed, a crash's does not
+        activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
+        bare = _bare(experiment, status, detail, built, activation)
+        return replace(bare, error=error_of(execution.raised))
 
 
 def _problem_of(err: BadOutput) -> str:

@@ -52,10 +52,26 @@ def row(
     makes classes of delta-v. None stands for nothing; flags are 0 or 1; times are seconds of simulation
     since its start.
     """
+    cells = plan_row(experiment) | _verdict_cells(record, scale)
+    ok, times = record.status is Status.OK, dict(record.hazards)
+    for name in hazards:
+        flag, time = hazard_columns(name)
+        cells[flag.name] = int(name in times) if ok else None
+        cells[time.name] = _time(times.get(name))
+    columns = deviation_columns([name for name, _ in record.max_dev])
+    cells |= {columns[name]: value for name, value in record.max_dev}
+    if ends:
+        driven = dict(record.max_dev) | dict(record.dev)
+        cells |= {columns[name].removeprefix("max_"): value for name, value in driven.items()}
+        cells[T_END] = _time(record.t_end)
+    return cells | dict(record.metrics)
+
+
+def _verdict_cells(record: Record, scale: Scale | None) -> dict[str, object]:
+    """The cells that every target's results have."""
     activation = record.activation
     ok = record.status is Status.OK
-    cells: dict[str, object] = plan_row(experiment)
-    cells |= {
+    return {
         "status": record.status.value,
         "outcome": record.outcome.value if record.outcome else None,
         "activated": 1 if activation else (0 if ok else None),
@@ -71,18 +87,6 @@ def row(
         "manifest_to_hazard": _time(since_manifestation(record)),
         "detail": record.detail or None,
     }
-    times = dict(record.hazards)
-    for name in hazards:
-        flag, time = hazard_columns(name)
-        cells[flag.name] = int(name in times) if ok else None
-        cells[time.name] = _time(times.get(name))
-    columns = deviation_columns([name for name, _ in record.max_dev])
-    cells |= {columns[name]: value for name, value in record.max_dev}
-    if ends:
-        driven = dict(record.max_dev) | dict(record.dev)
-        cells |= {columns[name].removeprefix("max_"): value for name, value in driven.items()}
-        cells[T_END] = _time(record.t_end)
-    return cells | dict(record.metrics)
 
 
 def _time(value: float | None) -> float | None:
