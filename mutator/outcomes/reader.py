@@ -16,6 +16,7 @@ from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes import results
 from mutator.outcomes.columns import SINCE, hazards_in
 from mutator.outcomes.rows import Row, row_from
+from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
 
 if TYPE_CHECKING:
@@ -134,8 +135,14 @@ class Results:
         came = frame[hazards].any(axis=1).astype("boolean")
         frame["hazard"] = came.mask(frame["status"] != Status.OK.value)
         frame["t_hazard"] = frame[[f"t_{name}" for name in hazards]].min(axis=1).astype(float)
-        frame.attrs["units"] = _units(frame)
+        frame.attrs["units"] = _units(frame) | self._metric_units(frame)
         return frame
+
+    def _metric_units(self, frame: "pd.DataFrame") -> dict[str, str]:
+        """The units of the target's metrics, as run.json has them; of a table alone they are not known."""
+        folder = self.path.parent
+        metrics = RunFolder.unverified(folder).head.get("metrics", ()) if RunFolder.exists(folder) else ()
+        return {name: unit for name, unit, *_ in metrics if name in frame}
 
     def propagation(self) -> "pd.DataFrame":
         """A frame of propagation.parquet: a row for each channel of an experiment that left golden."""
@@ -200,5 +207,5 @@ def _units(frame: "pd.DataFrame") -> dict[str, str]:
     times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
     times |= {column.name for column in SINCE}
     known = {name: "s" if name in times else "-" for name in numbers}
-    known |= {name: "as its channel" for name in numbers if name.startswith("max_dev_")}
+    known |= {name: "as its channel" for name in numbers if name.startswith(("max_dev_", "dev_"))}
     return known | {"value": "as the column `unit` says"}

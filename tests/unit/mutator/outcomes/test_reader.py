@@ -77,6 +77,21 @@ def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> Non
     assert frame.attrs["units"]["max_dev_winch"] == "as its channel"
 
 
+def test_numbers_have_the_units_of_their_metric_or_channel(
+    crane: Workspace, tmp_path: Path, write_run: WriteRun
+) -> None:
+    """A metric's unit is the manifest's; a difference, up to the drive's end too, has that of its channel."""
+    path = crane.library / "targets" / "toycar.yaml"
+    hazards = "hazards: {DROPPED: {when: speed > 90, terminal: true, unit: m/s}, "
+    hazards += "CRUSHED: {when: speed > 91}, TOO_FAST: {when: speed > 92}}\n"
+    metrics = "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
+    path.write_text(re.sub("hazards: .*\n", hazards + metrics, path.read_text()))
+    run = write_run(crane, tmp_path / "run", lambda e: {"hazards": ()})
+    units = Results.up_to_date(run).frame().attrs["units"]
+    assert (units["way"], units["margin_dropped"], units["t_end"]) == ("m", "m/s", "s")
+    assert units["max_dev_winch"] == units["dev_winch"] == "as its channel"
+
+
 def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
     """Whichever way the results are read, the same experiments had the same hazards at the same times."""
     table = Results.up_to_date(run)
