@@ -1,21 +1,36 @@
-"""Puts into the wheel what ships with the harness; everything else about the build is in pyproject.toml."""
+"""Compiles the C of the target, and puts into a wheel what ships with the harness."""
 
 import shutil
+import sys
 from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 from setuptools import setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 
-CLONE = Path(__file__).parent
+CLONE = Path(__file__).resolve().parent
 SHIPPED = ("target", "fault_library", "templates")
 ARCHIVE = Path("mutator", "_common", "shipped.zip")  # where mutator/_common/shipped.py looks for it
+COMPILER = "ziglang>=0.13"  # a C compiler from the package index, where the machine has none
+
+sys.path.insert(0, str(CLONE / "target"))
+sys.dont_write_bytecode = True  # none may lie beside a target's sources
+from selfdrive.common import compiled  # noqa: E402
+from selfdrive.common.errors import ConfigError  # noqa: E402
+from selfdrive.sim.compile_helpers import FOLDER, compile_helpers, compiler  # noqa: E402
 
 
 class BuildWithShipped(build_py):
-    """Builds the packages and, unless the install is editable, the archive of what ships with them."""
+    """Compiles helpers and builds the packages and, unless the install is editable, the archive of what ships
+    with them.
+    """
 
     def run(self) -> None:
+        try:
+            list(compile_helpers(FOLDER))
+        except ConfigError as error:
+            print(f"warning: {error}", file=sys.stderr)
         if not self.editable_mode:
             shutil.rmtree(self.build_lib, ignore_errors=True)  # modules of an earlier build stay out
         super().run()
@@ -23,6 +38,16 @@ class BuildWithShipped(build_py):
             archive = Path(self.build_lib) / ARCHIVE
             archive.parent.mkdir(parents=True, exist_ok=True)
             write_archive(archive)
+
+
+class WheelOfOneMachine(bdist_wheel):
+    """A wheel for any Python 3 but, where helpers were compiled, for this kind of machine alone."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        if not any(FOLDER.glob(f"*{compiled.SUFFIX}")):
+            return super().get_tag()
+        self.root_is_pure = False
+        return "py3", "none", super().get_tag()[2]
 
 
 def write_archive(path: Path) -> None:
@@ -35,4 +60,7 @@ def write_archive(path: Path) -> None:
                 archive.writestr(ZipInfo(name.as_posix()), file.read_bytes())
 
 
-setup(cmdclass={"build_py": BuildWithShipped})
+setup(
+    cmdclass={"build_py": BuildWithShipped, "bdist_wheel": WheelOfOneMachine},
+    setup_requires=[] if compiler() else [COMPILER],
+)

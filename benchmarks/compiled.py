@@ -27,10 +27,10 @@ from selfdrive.sim.vision import DETECTORS, Pictures  # noqa: E402
 KINDS = (None, *DETECTORS)
 
 
-def run(kind: str | None, cache: Path, helpers: bool) -> tuple[float, bytes]:
+def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, bytes]:
     """CPU seconds and the trace of one run whose pictures nobody has seen before."""
     (cache / FILE).unlink(missing_ok=True)
-    compiled.use(cache if helpers else None)
+    compiled.use(helpers)
     pictures = Pictures(detector=kind, cache=cache) if kind else None
     scenario = load_scenario(ROOT / "fault_library/scenarios/S1.yaml")
     start = process_time()
@@ -47,16 +47,16 @@ def main() -> int:
     cv2.setNumThreads(1)
     figures, same = {}, True
     with TemporaryDirectory() as folder:
-        cache = Path(folder)
-        for path in compile_helpers(cache):
+        cache, made = Path(folder, "cache"), Path(folder, "compiled")
+        for path in compile_helpers(made):
             print(path.name)
         for kind in KINDS:
-            run(kind, cache, True)  # imports, frames
+            run(kind, cache, made)  # imports, frames
             spent: dict[bool, list[float]] = {False: [], True: []}
             for _ in range(options.rounds):
                 traces = set()
                 for helpers, times in spent.items():
-                    seconds, trace = run(kind, cache, helpers)
+                    seconds, trace = run(kind, cache, made if helpers else None)
                     times.append(seconds)
                     traces.add(trace)
                 same &= len(traces) == 1

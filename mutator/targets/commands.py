@@ -21,7 +21,8 @@ class ChangeModel(StrictModel, title="A change"):
 class EntryModel(StrictModel, title="The entry"):
     """Anywhere in an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for
     trace and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable
-    or damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same."""
+    or damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same. `{root}`
+    is the target's root, for what lies there beside its files; a run reads it, and never writes there."""
 
     module: str = Field(description="Run as `python -m`, from the root.")
     args: list[str] = Field(

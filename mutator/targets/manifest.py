@@ -60,7 +60,7 @@ class TargetManifest:
     env: Mapping[str, str]  # variables of every process that runs the target
     requires: tuple[Requirement, ...]  # installed packages that the target needs
     entry_module: str  # run as `python -m`
-    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}
+    entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
     stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
     independent: tuple[str, ...]  # more arguments, of a run that takes nothing from what others left behind
     reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
@@ -159,7 +159,7 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for a change the target does not know."""
         values = {"scenario": str(scenario), "seed": str(seed), "out": str(out)}
-        values |= {"film": str(out / FILM), "cache": str(caches.of_target(self.name))}
+        values |= {"film": str(out / FILM), "cache": str(caches.of_target(self.name)), "root": str(self.root)}
         extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from mutator.config.yaml_files import Keys, Source
 
-OF_RUNS = ("scenario", "seed", "out", "cache")
+OF_RUNS = ("scenario", "seed", "out", "cache", "root")
 OF_FILMED_RUNS = (*OF_RUNS, "film")
 OF_FILMS = ("golden", "faulty", "events", "out", "t")
 _PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")

@@ -11,7 +11,6 @@ import cv2
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import detection_memory
-from selfdrive.sim.compile_helpers import compile_helpers
 from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main
@@ -113,7 +112,7 @@ def checks(toy: Workspace, folder: Path) -> Cache:
 
 
 def pictures(toy: Workspace, folder: Path) -> Cache:
-    """Frames, detections and compiled helpers of the controller that ships, on a road of a few frames."""
+    """Frames and detections of the controller that ships, on a road of a few frames."""
     frames, home, at = folder / "frames", folder / "home", folder / "cache"
     frames.mkdir()
     (frames / "camera.yaml").write_text(CAMERA)
@@ -128,8 +127,6 @@ def pictures(toy: Workspace, folder: Path) -> Cache:
         assert main([*words, "--out", str(out), "--cache", str(kept)]) == 0
         return contents_of(out)
 
-    if shutil.which("cc"):
-        list(compile_helpers(kept))
     use(folder / "first")
     shutil.move(at, home)
     return Cache(home=home, at=at, use=use)

@@ -1,62 +1,75 @@
 """C libraries that do a part of a run's arithmetic: the same numbers, sooner. Nothing needs them.
 
-They lie in a folder of the cache, each under a digest of what it was made of, so one that was made of
-something else is never taken. `selfdrive.sim.compile_helpers` makes them; runs only look.
+A C file names the Python files beside it that it stands for: `Stands for: hog.py, mark_edges.py.` The name of
+its library has a digest of all of these, so an edited file, a mutant's for instance, has no library and
+calculates itself. `selfdrive.sim.compile_helpers` makes libraries; runs only look for them.
 """
 
 import ctypes
-from collections.abc import Callable
+import re
+import sysconfig
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
-FOLDER, SUFFIX = "compiled", ".so"
+SUFFIX = f".{sysconfig.get_platform()}.so"
 CHECK = 32  # bytes at a library's end: the digest of those before
+_STANDS_FOR = re.compile(rb"Stands for: ([\w./, ]+)\.$", re.MULTILINE)
 
 _folder: Path | None = None
 
 
 class Library(NamedTuple):
-    """A library that was found, and the digest of its bytes."""
+    """A library that was found: its functions, and the digest of its bytes."""
 
-    path: Path
+    code: ctypes.CDLL
     digest: bytes
 
 
-def use(cache: Path | None) -> None:
-    """From now on look for libraries in this cache folder; None: do without."""
+def use(folder: Path | None) -> None:
+    """From now on look for libraries in this folder; None: do without."""
     global _folder
     _folder = None
-    if cache is not None:
+    if folder is not None:
         try:
-            folder = cache / FOLDER
             _folder = folder if any(folder.glob(f"*{SUFFIX}")) else None
         except OSError:  # a folder that nobody may look into
             return
 
 
-def library(name: str, made_of: Callable[[], bytes]) -> Library | None:
-    """The library `name` of what `made_of` stands for; None if there is none, or none is to be used.
+def library(source: Path) -> Library | None:
+    """The library of the C file `source`; None if there is none, or none is to be used.
 
-    `made_of` is asked only where there may be one. One that is damaged, or cannot be loaded here as it was
-    made with another C library, is none.
+    One that is damaged, or cannot be loaded here as it was made with another C library, is none.
     """
     if _folder is None:
         return None
-    path = _folder / file_name(name, made_of())
-    if path.is_fifo():  # nobody waits for what a pipe may say
-        return None
     try:
-        data = path.read_bytes()
-        digest = sha256(data[:-CHECK]).digest()
-        if data[-CHECK:] != digest:
-            return None
-        ctypes.CDLL(str(path))
+        return _loaded(_folder / file_name(source))
     except OSError:
         return None
-    return Library(path, digest)
 
 
-def file_name(name: str, made_of: bytes) -> str:
-    """What a library's file is called."""
-    return f"{name}-{sha256(made_of).hexdigest()[:32]}{SUFFIX}"
+def file_name(source: Path) -> str:
+    """What the library of the C file `source` is called. Raises OSError for a file that cannot be read."""
+    text = source.read_bytes()
+    digest = sha256(text)
+    for name in stands_for(text):
+        digest.update(sha256((source.parent / name).read_bytes()).digest())
+    return f"{source.stem}-{digest.hexdigest()[:32]}{SUFFIX}"
+
+
+def stands_for(text: bytes) -> list[str]:
+    """Paths, from the C file's folder, of the Python files that its text says it stands for."""
+    found = _STANDS_FOR.search(text)
+    return found[1].decode().split(", ") if found else []
+
+
+@cache
+def _loaded(path: Path) -> Library | None:
+    if path.is_fifo():  # nobody waits for what a pipe may say
+        return None
+    data = path.read_bytes()
+    digest = sha256(data[:-CHECK]).digest()
+    return Library(ctypes.CDLL(str(path)), digest) if data[-CHECK:] == digest else None

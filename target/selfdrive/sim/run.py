@@ -77,7 +77,7 @@ def _open(options: argparse.Namespace) -> Run:
         scenario = on_plant(scenario, options.plant)
     if options.max_steps is not None:
         scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
-    compiled.use(None if options.forget else options.cache)
+    compiled.use(None if options.forget else options.compiled)
     simulator = Simulator()
     simulator.reset(scenario, options.seed, _pictures(options), options.film)
     return Run(simulator)
@@ -125,10 +125,11 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
     )
     parser.add_argument(
-        "--cache", type=Path, metavar="DIR", help="keep pictures and detections here, find compiled code here"
+        "--cache", type=Path, metavar="DIR", help="keep pictures and detections in this folder"
     )
+    parser.add_argument("--compiled", type=Path, metavar="DIR", help="find compiled code in this folder")
     parser.add_argument(
-        "--forget", action="store_true", help="take no detection and no compiled code from the cache"
+        "--forget", action="store_true", help="take no detection from the cache, and no compiled code"
     )
     parser.add_argument("--film", type=Path, metavar="DIR", help="keep what the camera shows, to be watched")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")

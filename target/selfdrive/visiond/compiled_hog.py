@@ -1,4 +1,4 @@
-"""Histograms of oriented gradients with their slow steps in C, where someone has had them compiled."""
+"""Histograms of oriented gradients with their slow steps in C, where these were compiled."""
 
 import ctypes
 from pathlib import Path
@@ -6,20 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from selfdrive.common import compiled
-from selfdrive.visiond import hog
 from selfdrive.visiond.hog import BINS, Hog
 
 C_SOURCE = Path(__file__).with_name("hog.c")
 
 
-def made_of() -> bytes:
-    """Stands for all that the library calculates: its source, and the code that it must agree with."""
-    return C_SOURCE.read_bytes() + Path(hog.__file__).read_bytes()
-
-
 def build_hog(rows: int, width: int) -> Hog:
     """A Hog, compiled where it is to be used and has been."""
-    library = compiled.library(C_SOURCE.stem, made_of)
+    library = compiled.library(C_SOURCE)
     return CompiledHog(rows, width, library) if library else Hog(rows, width)
 
 
@@ -29,7 +23,7 @@ class CompiledHog(Hog):
     def __init__(self, rows: int, width: int, library: compiled.Library) -> None:
         super().__init__(rows, width)
         self.calculated_by = library.digest.hex()
-        code, pointer = ctypes.CDLL(str(library.path)), ctypes.c_void_p
+        code, pointer = library.code, ctypes.c_void_p
         self._c_votes, self._c_blocks = code.votes, code.blocks
         self._c_votes.argtypes = [pointer, ctypes.c_long, ctypes.c_long, *[pointer] * 4]
         self._c_blocks.argtypes = [pointer, pointer, ctypes.c_long, ctypes.c_long, pointer]

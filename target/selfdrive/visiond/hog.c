@@ -1,5 +1,6 @@
-/* The two slow steps of hog.py, which has the words for them. The same operations in the same order, so
- * the same bits: a cell's votes are added in double precision, pixel by pixel, row by row. */
+/* Stands for: hog.py.
+ * Its two slow steps. The same operations in the same order, so the same bits: a cell's votes are added in
+ * double precision, pixel by pixel, row by row. */
 
 #include <stdint.h>
 #include <string.h>

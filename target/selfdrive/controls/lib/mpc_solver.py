@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from selfdrive.common import compiled
-
 FEASIBILITY_TOL = 1e-3  # in the units of the bounds; DAQP may miss them by 1e-6 of its scaled rows
 STATIONARITY_TOL = 1e-6  # relative to the gradient
 LARGEST = 1e100  # square sum of a trajectory that still means something
@@ -158,17 +156,6 @@ def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     return ca.Function("condense", [old, z0, p], outputs, {"live_variables": False})
 
 
-def _compiled(ocp: Ocp, function: ca.Function) -> ca.Function:
-    """The function, compiled where it is to be used and has been: its operations, in their order."""
-    library = compiled.library(ocp.name, lambda: made_of(function))
-    return ca.external(function.name(), str(library.path)) if library else function
-
-
-def made_of(function: ca.Function) -> bytes:
-    """Stands for all that the function calculates."""
-    return f"{ca.__version__} {function.serialize()}".encode()
-
-
 def _shifted(ocp: Ocp, integrate: ca.Function, new: ca.MX, p: ca.MX) -> ca.MX:
     """The trajectory moved on by one interval; the last control is held, through the last interval."""
     end = ocp.n_state * (ocp.n_control + 1)
@@ -209,7 +196,7 @@ def build_solver(ocp: Ocp) -> ca.Function:
     old, z0 = ca.MX.sym("old", ocp.n_trajectory), ca.MX.sym("z0", nx)
     p = ca.MX.sym("p", ocp.n_param)
     integrators = integrators_of(ocp)
-    hessian, gradient, states, derivative = _compiled(ocp, condense(ocp, integrators))(old, z0, p)
+    hessian, gradient, states, derivative = condense(ocp, integrators)(old, z0, p)
 
     bounded = [(nx * k + i, lo, hi) for k in range(1, n + 1) for i, lo, hi in ocp.state_bounds]
     index, low, high = (list(values) for values in zip(*bounded, strict=True))

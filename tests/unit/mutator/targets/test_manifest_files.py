@@ -197,7 +197,11 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("    hwt:", "    d_rel:", "24: 'd_rel'; expected a name of letters, digits and _, once"),
         ("is: v_ego - v_lead", "is: v_ego - v_leed", "25: unknown name 'v_leed' in 'v_ego - v_leed'"),
         ("file: toycar/world.py", "file: ../world.py", "17: path '../world.py' leads out of the target"),
-        ('"{seed}"', '"{sed}"', "10: '{sed}' in '{sed}'; expected one of {scenario}, {seed}, {out}, {cache}"),
+        (
+            '"{seed}"',
+            '"{sed}"',
+            "10: '{sed}' in '{sed}'; expected one of {scenario}, {seed}, {out}, {cache}, {",
+        ),
         ('"{out}"', '"--out={film}"', "10: '{film}' in '--out={film}'; expected one of {scenario}"),
         ("[--alone,", "['{outt}',", "'{outt}' in '{outt}'; expected one of {scenario}"),
         (
