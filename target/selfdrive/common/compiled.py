@@ -1,8 +1,8 @@
 """C libraries that do a part of a run's arithmetic: the same numbers, sooner. Nothing needs them.
 
 A C file names the Python files beside it that it stands for: `Stands for: hog.py, mark_edges.py.` The name of
-its library has a digest of all of these, so an edited file, a mutant's for instance, has no library and
-calculates itself. `selfdrive.sim.compile_helpers` makes libraries; runs only look for them.
+its library has a digest of all of these, so where one of them is edited there is no library, and the Python
+calculates. `selfdrive.sim.compile_helpers` makes libraries; runs only look for them.
 """
 
 import ctypes
