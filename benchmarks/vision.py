@@ -63,7 +63,7 @@ def view(repeat: int) -> bool:
     """One frame moved to a pose that changes."""
     model = CameraModel()
     drawn = RoadRenderer(model, "dashed", 0, periods=1).grey(0.0)
-    frame = Picture(("drawn",), drawn.shape, lambda *_: drawn)
+    frame = Picture(("drawn",), drawn.shape, lambda region: drawn[region.part])
     ground, shifted = GroundView(model), ShiftedView(model)
     whole = times(lambda number: ground.seen(frame, 0.01 * number, 0.02).pixels(), repeat)
     part = RoadRegion(model).part

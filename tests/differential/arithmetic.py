@@ -60,7 +60,8 @@ def roads() -> dict[str, np.ndarray]:
         name: RoadRenderer(model, look, seed=3).grey(31.0, 0.4, 0.02)
         for name, look in (("solid", "solid"), ("dashed", "dashed"), ("worn", WORN))
     }
-    frame = Picture(("frame",), found["solid"].shape, lambda *_: found["solid"])
+    solid = found["solid"]
+    frame = Picture(("frame",), solid.shape, lambda region: solid[region.part])
     for mover in (GroundView(model), ShiftedView(model), CodedView()):
         found[type(mover).__name__] = mover.seen(frame, 0.7, -0.015).pixels()
     return found

@@ -51,7 +51,9 @@ class ImageLibrary:
         """The picture at time `t` (s), after `position` m."""
         passed = t * self.fps if self.spacing is None else position / self.spacing
         number = int(passed + 1e-6) % len(self.frames)
-        return Picture((self.digest, number), self.frames.shape[1:], lambda *_: self.frames[number])
+        return Picture(
+            (self.digest, number), self.frames.shape[1:], lambda region: self.frames[number][region.part]
+        )
 
 
 class Frames:

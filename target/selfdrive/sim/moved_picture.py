@@ -7,12 +7,12 @@ on the road. What is above the horizon only pans. Where the frame ends, its last
 
 from math import tan
 
-import cv2
 import numpy as np
 
 from selfdrive.common.array_math import dot, product
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.picture import Picture
+from selfdrive.sim.compiled_warp import build_warp
+from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan, picture_to_car
 
 # Poses are rounded to these, less than a detector can tell: equal poses give equal bytes.
@@ -21,52 +21,49 @@ HEADING_STEP = 0.00025  # rad
 SHIFT_DISTANCE = 10.0  # m ahead where a shift of the whole frame is right
 CODED_METRES_PER_PIXEL = 0.03895
 CODED_REACH = 1.0  # m: further the picture never moves
-VECTOR = 64  # columns: of so many OpenCV calculates a row's pixels alike, however long the row is
 
 
 class GroundView:
-    """Moves frames to another place on the road by the ground's homography."""
+    """Moves frames to another place on the road by the ground's homography.
+
+    `calculated_by` tells which compiled code it calculates with, if any.
+    """
 
     def __init__(self, model: CameraModel) -> None:
         self._model = model
         self._first = first_road_row(model)
         self._to_car = picture_to_car(model, self._first)
         self._from_car = _inverse(self._to_car)
+        self._warp, self.calculated_by = build_warp()
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
         """The frame as seen `offset` m further left (m), turned left by `heading` (rad)."""
         left, turn = round(offset / OFFSET_STEP), round(heading / HEADING_STEP)
         if left == 0 and turn == 0:
             return frame
+        offset, heading = OFFSET_STEP * left, HEADING_STEP * turn
         return frame.changed(
-            ("ground", left, turn),
-            lambda rows, columns: self._moved(
-                frame.pixels(), OFFSET_STEP * left, HEADING_STEP * turn, rows, columns
-            ),
+            ("ground", left, turn), lambda region: self._moved(frame, offset, heading, region)
         )
 
-    def _moved(self, frame: np.ndarray, offset: float, heading: float, rows: int, columns: int) -> np.ndarray:
-        """So many of the moved frame's first rows; below the horizon, columns that are not asked for may be
-        missing.
-        """
-        first, width = self._first, frame.shape[1]
-        picture = np.empty((rows, width), np.uint8)
-        moved(frame[:first], pan(self._model, heading), picture[:first])
-        if rows > first:
-            columns = min(-(-columns // VECTOR) * VECTOR, width)
-            cv2.warpPerspective(
-                frame[first:],
-                product(product(self._from_car, car_to_road(0.0, offset, heading)), self._to_car),
-                (columns, rows - first),
-                dst=picture[first:, :columns],
-                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-                borderMode=cv2.BORDER_REPLICATE,
-            )
-        return picture
+    def _moved(self, frame: Picture, offset: float, heading: float, region: Region) -> np.ndarray:
+        """Pixels of the moved frame."""
+        first = self._first
+        parts = []
+        if region.top < first:
+            above = region._replace(bottom=min(region.bottom, first))
+            parts.append(moved(frame, pan(self._model, heading), above))
+        if region.bottom > first:
+            matrix = product(product(self._from_car, car_to_road(0.0, offset, heading)), self._to_car)
+            below = region._replace(top=max(region.top - first, 0), bottom=region.bottom - first)
+            parts.append(self._warp(frame.pixels()[first:], matrix, below))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 class ShiftedView:
     """Moves frames sideways as a whole: how the paper makes the view follow the car."""
+
+    calculated_by = ""  # no compiled code
 
     def __init__(self, model: CameraModel) -> None:
         self._pixels_per_metre = 1.0 / model.metres_per_pixel(model.row(SHIFT_DISTANCE))
@@ -81,6 +78,8 @@ class CodedView:
     """Moves frames sideways as a whole, as the paper's authors coded it: by the metres of another row than
     the one in which their detector reads lines, so that it sees 64 % of the way. Heading is not seen."""
 
+    calculated_by = ""
+
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
         """The frame as seen `offset` m further left (m); `heading` is of no account."""
         return _shifted(frame, round(min(max(offset, -CODED_REACH), CODED_REACH) / CODED_METRES_PER_PIXEL))
@@ -88,13 +87,7 @@ class CodedView:
 
 def _shifted(frame: Picture, columns: int) -> Picture:
     """The frame moved that far to the right."""
-
-    def make(rows: int, width: int) -> np.ndarray:
-        picture = np.empty((rows, frame.shape[1]), np.uint8)
-        moved(frame.pixels()[:rows], columns, picture)
-        return picture
-
-    return frame.changed(("shift", columns), make)
+    return frame.changed(("shift", columns), lambda region: moved(frame, columns, region))
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
@@ -104,15 +97,14 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     return np.array(columns).T / dot(a, columns[0])
 
 
-def moved(frame: np.ndarray, columns: int, out: np.ndarray) -> None:
-    """Write `frame` to `out`, which may have fewer rows, moved that far to the right.
-
-    Where it ends, its last column is repeated.
-    """
-    frame = frame[: len(out)]
-    width = frame.shape[1]
-    left = min(max(columns, 0), width)
-    right = min(max(width + columns, 0), width)
-    out[:, left:right] = frame[:, left - columns : right - columns]
-    out[:, :left] = frame[:, :1]
-    out[:, right:] = frame[:, -1:]
+def moved(frame: Picture, columns: int, region: Region) -> np.ndarray:
+    """The region of `frame` moved that far to the right. Where it ends, its last column is repeated."""
+    last = frame.shape[1] - 1
+    left, right = (min(max(end - columns, 0), last) for end in (region.left, region.right - 1))
+    there = frame[region.top : region.bottom, left : right + 1]
+    before = min(max(left - (region.left - columns), 0), region.shape[1] - 1)
+    out = np.empty(region.shape, np.uint8)
+    out[:, before : before + right + 1 - left] = there
+    out[:, :before] = there[:, :1]
+    out[:, before + right + 1 - left :] = there[:, -1:]
+    return out

@@ -12,14 +12,15 @@ from selfdrive.sim.vision import GROUND, SHIFT
 class PictureCamera:
     """Takes the view's geometry from `geometry` and its picture from `library`.
 
-    `translation` says how frames follow the car: "ground" by the road's homography, "shift" and "as_coded"
-    sideways as a whole.
+    `calculated_by` tells which compiled code moves frames, if any. `translation` says how these follow the
+    car: "ground" by the road's homography, "shift" and "as_coded" sideways as a whole.
     """
 
     def __init__(self, geometry: Camera, library: ImageLibrary, translation: str) -> None:
         self._geometry, self._library = geometry, library
         self.model = library.model
         self._move = _mover(translation, self.model)
+        self.calculated_by = self._move.calculated_by
 
     def look(self, truth: GroundTruth) -> CameraView:
         """The view at this moment. Its picture must not be written to."""

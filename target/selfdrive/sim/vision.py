@@ -79,6 +79,8 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
             expected="a straight road, as pictures show",
             remedy="run it without pictures",
         )
+    if pictures.forget:
+        compiled.use(None)
     library = open_library(pictures, seed)
     camera = PictureCamera(Camera(road), library, pictures.translation)
     description = {
@@ -89,7 +91,7 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
     }
     return Vision(
         camera=camera,
-        detector=_detector(pictures, library),
+        detector=_detector(pictures, camera),
         description=description,
         model=library.model,
     )
@@ -106,15 +108,13 @@ def build_detector(name: str, model: CameraModel):
     return Detector(model)
 
 
-def _detector(pictures: Pictures, library) -> LaneDetector:
+def _detector(pictures: Pictures, camera) -> LaneDetector:
     from selfdrive.sim.detection_memory import DetectionMemory
     from selfdrive.sim.remembering_detector import RememberingDetector
 
-    if pictures.forget:
-        compiled.use(None)
-    detector = build_detector(pictures.detector, library.model)
+    detector = build_detector(pictures.detector, camera.model)
     if pictures.forget or pictures.cache is None:
         return detector
     memory = DetectionMemory(pictures.cache)
-    made_of = (pictures.detector, library.model, detector.calculated_by)
+    made_of = (pictures.detector, camera.model, detector.calculated_by, camera.calculated_by)
     return RememberingDetector(detector, made_of, memory)

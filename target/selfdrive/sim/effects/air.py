@@ -13,6 +13,7 @@ import numpy as np
 from selfdrive.common.array_math import each
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Effect, Scene
+from selfdrive.sim.picture import Picture, Region
 
 THRESHOLD = 0.05
 LAYER = 100.0  # m: above the road there is clear sky again
@@ -41,10 +42,10 @@ def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
     return each(exp, np.float32(-coefficient) * ways(camera)).astype(np.float32)
 
 
-def airlight(picture: np.ndarray, camera: CameraModel) -> float:
+def airlight(picture: np.ndarray | Picture, camera: CameraModel) -> float:
     """Grey level of the air: the mean above the horizon, or of the uppermost tenth where little is above."""
     rows = max(int(camera.horizon), camera.rows // 10)
-    return cv2.mean(picture[:rows])[0]
+    return cv2.mean(picture[:rows, :])[0]
 
 
 class Fog(Effect):
@@ -56,6 +57,7 @@ class Fog(Effect):
         self._kept = clearness(extinction(self.amount), self.camera)
         self._lost = 1.0 - self._kept
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        air = np.full_like(picture, round(airlight(picture, self.camera)))
-        return cv2.blendLinear(picture, air, self._kept, self._lost)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        part = region.part
+        air = np.full(region.shape, round(airlight(picture, self.camera)), np.uint8)
+        return cv2.blendLinear(picture[part], air, self._kept[part], self._lost[part])

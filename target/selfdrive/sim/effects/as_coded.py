@@ -12,8 +12,10 @@ from typing import ClassVar
 import cv2
 import numpy as np
 
+from selfdrive.sim.effects.canvas import filtered
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.effects.paper_weather import motion_kernel
+from selfdrive.sim.picture import Picture, Region, whole
 
 PICTURES_PER_SECOND = 20
 CANVAS = 2  # times the picture's size each way: streaks are drawn on it
@@ -41,14 +43,20 @@ class _AsCoded(Effect):
     def _prepare(self, random: np.random.Generator) -> None:
         """Nothing is the same for all pictures."""
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         number = round(PICTURES_PER_SECOND * abs(scene.t))
         stream = [self.seed, number, *type(self).__name__.encode()]
-        return self._drawn(picture, int(self.amount), np.random.Generator(np.random.PCG64(stream)))
+        return self._drawn(picture, region, np.random.Generator(np.random.PCG64(stream)))
 
     @abstractmethod
-    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
-        """The picture at that level, with what chance puts into it."""
+    def _drawn(
+        self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
+    ) -> np.ndarray:
+        """The picture's region with what chance puts into it."""
+
+    @property
+    def _level(self) -> int:
+        return int(self.amount)
 
 
 class CodedRain(_AsCoded):
@@ -57,11 +65,14 @@ class CodedRain(_AsCoded):
     def _prepare(self, random: np.random.Generator) -> None:
         self._streak, self._way = _streak()
 
-    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
-        rows, columns = picture.shape
-        wet = cv2.convertScaleAbs(gaussian(picture, 0.5 + level / 10.0), alpha=0.75 - level / 100.0)
+    def _drawn(
+        self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
+    ) -> np.ndarray:
+        level, (rows, columns) = self._level, picture.shape
+        wet = cv2.convertScaleAbs(blurred(picture, region, 0.5 + level / 10.0), alpha=0.75 - level / 100.0)
         size = np.array([CANVAS * columns, CANVAS * rows])
-        first = np.array([0, round(CROP * rows)])
+        first = np.array([region.left, round(CROP * rows) + region.top])
+        rows, columns = region.shape
         layer = np.empty((rows + 2 * MARGIN, columns + 2 * MARGIN), np.uint8)
         inside = layer[MARGIN:-MARGIN, MARGIN:-MARGIN]
         pixels = self._streak[:, 1] * layer.shape[1] + self._streak[:, 0]
@@ -79,8 +90,10 @@ class CodedRain(_AsCoded):
 class CodedFog(_AsCoded):
     """White pixels in random places, blurred, added to a picture with less contrast."""
 
-    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
-        return hazed(picture, level, random)
+    def _drawn(
+        self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
+    ) -> np.ndarray:
+        return hazed(picture, region, self._level, random)
 
 
 class CodedSnow(_AsCoded):
@@ -90,46 +103,78 @@ class CodedSnow(_AsCoded):
         self._smear = motion_kernel(5, 75.0)
         self._flakes = np.stack([_flake(0.5 + number / 10.0) for number in range(1, self.MOST + 1)])
 
-    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+    def _drawn(
+        self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
+    ) -> np.ndarray:
         rows, columns = (size + 2 * FLAKE_REACH for size in picture.shape)
-        light = np.zeros((rows, columns), np.uint16)
-        places = random.integers(0, (rows - FLAKE) * columns, (level, FLAKES, 1))
+        places = random.integers(0, (rows - FLAKE) * columns, (self._level, FLAKES))
+        wide = region.around(len(self._smear) // 2, picture.shape)
+        # Only flakes that begin in these rows are seen; one at a row's end goes on in the next.
+        first, end = max(wide.top + FLAKE_REACH - FLAKE, 0), wide.bottom + FLAKE_REACH
+        layer, number = ((places >= first * columns) & (places < end * columns)).nonzero()
         pixels = (columns * np.arange(FLAKE)[:, np.newaxis] + np.arange(FLAKE)).ravel()
-        shades = np.broadcast_to(self._flakes[:level, np.newaxis], (level, FLAKES, FLAKE * FLAKE))
-        np.add.at(light.reshape(-1), (places + pixels).ravel(), shades.ravel())
-        flakes = cv2.convertScaleAbs(light[FLAKE_REACH:-FLAKE_REACH, FLAKE_REACH:-FLAKE_REACH])
-        return cv2.add(hazed(picture, level, random), cv2.filter2D(flakes, -1, self._smear))
+        light = np.zeros((end - first + FLAKE + 1, columns), np.uint16)
+        begins = places[layer, number, np.newaxis] - first * columns
+        np.add.at(light.reshape(-1), (begins + pixels).ravel(), self._flakes[layer].ravel())
+        down, right = wide.top + FLAKE_REACH - first, wide.left + FLAKE_REACH
+        light = light[down : down + wide.shape[0], right : right + wide.shape[1]]
+        flakes = cv2.filter2D(cv2.convertScaleAbs(light), -1, self._smear)[region.inside(wide)]
+        return cv2.add(hazed(picture, region, self._level, random), flakes)
 
 
 class CodedOcclusion(_AsCoded):
     """One blob for each level in the picture's lower half: a black core, and a gray rim with a hard edge."""
 
-    def _drawn(self, picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
+    def _drawn(
+        self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
+    ) -> np.ndarray:
         rows, columns = picture.shape
-        mask = np.full_like(picture, WHITE)
-        for size, across, down in random.random((level, 3)).tolist():
+        mask = np.full(picture.shape, WHITE, np.uint8)
+        for size, across, down in random.random((self._level, 3)).tolist():
             radius = round(BLOB_RADII[0] + size * (BLOB_RADII[1] - BLOB_RADII[0]))
             lowest = rows - radius
             centre = round(across * (columns - 1)), round(rows / 2 + down * (lowest - rows / 2))
             cv2.circle(mask, centre, radius, 0, cv2.FILLED)
-        mask = gaussian(mask, BLOB_BLUR)
-        return cv2.copyTo(mask, cv2.compare(mask, COVERED, cv2.CMP_LT), picture.copy())
+        mask = blurred(mask, region, BLOB_BLUR)
+        return np.where(mask < COVERED, mask, picture[region.part])
 
 
-def hazed(picture: np.ndarray, level: int, random: np.random.Generator) -> np.ndarray:
-    """The picture behind the fog of that level, which is blurred at half its size."""
-    rows, columns = picture.shape
-    droplets = np.zeros_like(picture)
-    droplets.reshape(-1)[random.integers(0, picture.size, DROPLETS * level)] = WHITE
-    half = cv2.resize(droplets, (columns // 2, rows // 2), interpolation=cv2.INTER_AREA)
-    fog = cv2.resize(gaussian(half, DROPLET_BLUR / 2.0), (columns, rows))
-    return cv2.addWeighted(picture, 0.9 - 0.05 * level, fog, 1.0, 0.0)
+def hazed(
+    picture: np.ndarray | Picture, region: Region, level: int, random: np.random.Generator
+) -> np.ndarray:
+    """The picture's region behind the fog of that level, which is blurred at half its size."""
+    shape = picture.shape
+    droplets = np.zeros(shape, np.uint8)
+    droplets.reshape(-1)[random.integers(0, droplets.size, DROPLETS * level)] = WHITE
+    wide = _halved(region.around(2 * _reach(DROPLET_BLUR / 2.0) + 2, shape), shape)
+    rows, columns = wide.shape
+    half = cv2.resize(droplets[wide.part], (columns // 2, rows // 2), interpolation=cv2.INTER_AREA)
+    fog = cv2.resize(gaussian(half, DROPLET_BLUR / 2.0), (columns, rows))[region.inside(wide)]
+    return cv2.addWeighted(picture[region.part], 0.9 - 0.05 * level, fog, 1.0, 0.0)
+
+
+def _halved(region: Region, shape: tuple[int, int]) -> Region:
+    """The region, or a little more, that is halved as the whole picture is: all of it if its size is odd."""
+    if shape[0] % 2 or shape[1] % 2:
+        return whole(shape)
+    top, bottom, left, right = region
+    return Region(top - top % 2, bottom + bottom % 2, left - left % 2, right + right % 2)
 
 
 def gaussian(picture: np.ndarray, sigma: float) -> np.ndarray:
     """Blurred by a Gaussian that is cut at two sigma."""
-    size = 2 * ceil(2.0 * sigma) + 1
+    size = 2 * _reach(sigma) + 1
     return cv2.GaussianBlur(picture, (size, size), sigma)
+
+
+def blurred(picture: np.ndarray | Picture, region: Region, sigma: float) -> np.ndarray:
+    """The picture's region, the same."""
+    return filtered(picture, region, _reach(sigma), lambda wide: gaussian(wide, sigma))
+
+
+def _reach(sigma: float) -> int:
+    """How many pixels far such a Gaussian reaches."""
+    return ceil(2.0 * sigma)
 
 
 def _streak() -> tuple[np.ndarray, np.ndarray]:

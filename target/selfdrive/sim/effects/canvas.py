@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from selfdrive.sim.picture import Picture, Region
+
 
 def splat(picture: np.ndarray, columns: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> None:
     """Add to `picture`, float32 and contiguous, each point's weight, shared among four pixels.
@@ -45,6 +47,14 @@ def seamless(levels: np.ndarray, margin: int, change: Callable[[np.ndarray], np.
     return change(np.pad(levels, margin, mode="wrap"))[margin:-margin, margin:-margin]
 
 
+def filtered(
+    picture: np.ndarray | Picture, region: Region, margin: int, change: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """The region of a picture that is changed by a filter reaching at most `margin` pixels far."""
+    wide = region.around(margin, picture.shape)
+    return change(picture[wide.part])[region.inside(wide)]
+
+
 class Tile:
     """A grey picture that repeats in both directions and is seen through a window of its own size."""
 
@@ -52,7 +62,8 @@ class Tile:
         self._rows, self._width = levels.shape
         self._four = np.tile(levels, (2, 2))
 
-    def moved(self, right: float, down: float) -> np.ndarray:
-        """The tile after its content moved by whole pixels nearest to these; a view, not to be written."""
+    def moved(self, right: float, down: float, region: Region) -> np.ndarray:
+        """A region of the window after the tile's content moved by whole pixels nearest to these; a view, not
+        to be written."""
         left, top = -round(right) % self._width, -round(down) % self._rows
-        return self._four[top : top + self._rows, left : left + self._width]
+        return self._four[top + region.top : top + region.bottom, left + region.left : left + region.right]

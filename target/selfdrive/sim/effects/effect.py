@@ -13,7 +13,7 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.picture import Picture
+from selfdrive.sim.picture import Picture, Region, whole
 
 WHITE = 255
 
@@ -79,10 +79,10 @@ class Effect(ABC):
             raise ConfigError(got, expected=expected, remedy="give a grey picture of this camera")
         moment = Moment(scene.t, scene.position, scene.v_ego) if self.MOVING else None
         if not isinstance(picture, Picture):
-            return self._seen(picture, moment)
+            return self._seen(picture, whole(size), moment)
         if not type(self).__module__.startswith(f"{__package__}."):  # nobody knows what it follows from
-            return self._seen(picture.pixels(), moment)
-        return picture.changed((self._key, moment), lambda *_: self._seen(picture.pixels(), moment))
+            return self._seen(picture.pixels(), whole(size), moment)
+        return picture.changed((self._key, moment), lambda region: self._seen(picture, region, moment))
 
     def ready(self) -> Self:
         """Itself, with all made that is the same for all pictures."""
@@ -91,9 +91,9 @@ class Effect(ABC):
             self._prepared = True
         return self
 
-    def _seen(self, picture: np.ndarray, moment: Moment | None) -> np.ndarray:
-        """The changed picture. What it takes is made only now, as pictures need not be looked at."""
-        return self.ready()._affect(picture, moment)
+    def _seen(self, picture: np.ndarray | Picture, region: Region, moment: Moment | None) -> np.ndarray:
+        """The changed region. What it takes is made only now, as pictures need not be looked at."""
+        return self.ready()._affect(picture, region, moment)
 
     @property
     def thickness(self) -> float:
@@ -105,8 +105,11 @@ class Effect(ABC):
         """Make what is the same for all pictures."""
 
     @abstractmethod
-    def _affect(self, picture: np.ndarray, scene: Moment | None) -> np.ndarray:
-        """The changed picture; `scene` is given to MOVING effects."""
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Moment | None) -> np.ndarray:
+        """A region of the changed picture, a new array with the bits that the whole has there.
+
+        No more should be cut out of `picture` than this takes. `scene` is given to MOVING effects.
+        """
 
     def _check(self, amount: float, seed: int) -> None:
         name = type(self).__name__

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 
 from selfdrive.sim.effects.effect import Effect, Scene
+from selfdrive.sim.picture import Picture, Region
 
 MUD_LEVEL = 45.0  # grey level of mud against the light
 CLODS = 24.0, 8.0, 3.0  # px: sizes of its clods in a picture 640 wide
@@ -18,8 +19,9 @@ class _OnLens(Effect):
 
     MOVING = False
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.add(cv2.multiply(picture, self._open, scale=1.0 / 255.0), self._dirt)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        part = region.part
+        return cv2.add(cv2.multiply(picture[part], self._open[part], scale=1.0 / 255.0), self._dirt[part])
 
     def _cover(self, share: np.ndarray, levels: np.ndarray | float) -> None:
         self._open = np.rint(255.0 * (1.0 - share)).astype(np.uint8)

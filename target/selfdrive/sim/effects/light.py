@@ -8,6 +8,7 @@ import numpy as np
 from selfdrive.common.array_math import each, length
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+from selfdrive.sim.picture import Picture, Region
 
 WHITE_REFLECTANCE = 0.32  # of what daylight's exposure shows as white: asphalt of 0.12 is of level 95
 SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn between
@@ -48,8 +49,8 @@ class SunGlare(Effect):
         light = WHITE * seen / white + 2.0 * WHITE * (angle < SUN_RADIUS)
         self._light = np.clip(np.rint(light), 0, WHITE).astype(np.uint8)
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.add(picture, self._light)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        return cv2.add(picture[region.part], self._light[region.part])
 
 
 def level_rays(camera: CameraModel) -> np.ndarray:
@@ -96,13 +97,15 @@ class LowLight(Effect):
         rows, columns = self.camera.rows, self.camera.width
         self._chance = random.integers(0, QUANTILES, size=(2 * rows, 2 * columns), dtype=np.uint16)
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         moment = np.random.Generator(np.random.PCG64([self.seed, round(1000.0 * abs(scene.t))]))
         rows, columns = picture.shape
         top, left = moment.integers(0, (rows, columns))
-        place = picture.astype(np.intp)
+        place = picture[region.part].astype(np.intp)
         place *= QUANTILES
-        place += self._chance[top : top + rows, left : left + columns]
+        place += self._chance[
+            top + region.top : top + region.bottom, left + region.left : left + region.right
+        ]
         return np.take(self._table, place)
 
 

@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 
 from selfdrive.common.array_math import each
-from selfdrive.sim.effects.canvas import Tile, seamless, splat, strokes
+from selfdrive.sim.effects.canvas import Tile, filtered, seamless, splat, strokes
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+from selfdrive.sim.picture import Picture, Region
 
 HAZE = 0.9, 0.4  # share of the contrast that fog leaves, and the fog in which it snows
 STREAKS = 1000  # for each thickness: 10,000 at thickness 10
@@ -77,13 +78,16 @@ class PaperRain(_PaperWeather):
         splat(levels, across, down, light)
         return levels
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         sigma, alpha = self._between(0.5, 1.5), self._between(0.75, 0.65)
-        wet = cv2.convertScaleAbs(cv2.GaussianBlur(picture, (0, 0), sigma), alpha=alpha)
+        margin = int(4 * sigma) + 1
+        wet = filtered(picture, region, margin, lambda wide: cv2.GaussianBlur(wide, (0, 0), sigma))
+        wet = cv2.convertScaleAbs(wet, alpha=alpha)
         lengths = RAIN_SPEED[0] * scene.t + RAIN_SPEED[1] * scene.position
         for tile, length in zip(self._tiles, self._lengths, strict=True):
             way = length * lengths
-            wet = cv2.add(wet, tile.moved(-sin(STREAK_LEAN) * way, cos(STREAK_LEAN) * way))
+            streaks = tile.moved(-sin(STREAK_LEAN) * way, cos(STREAK_LEAN) * way, region)
+            cv2.add(wet, streaks, dst=wet)
         return wet
 
 
@@ -100,8 +104,8 @@ class PaperFog(_PaperWeather):
             random, self.camera.rows, self.camera.width, self.amount / self.MOST, self.thickness
         )
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return hazed(picture, self._haze, self.contrast, scene)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        return hazed(picture[region.part], self._haze, self.contrast, scene, region)
 
 
 class PaperSnow(_PaperWeather):
@@ -128,12 +132,13 @@ class PaperSnow(_PaperWeather):
             [np.roll(white, (down, right), (0, 1)) for down in (0, 1) for right in (0, 1)]
         )
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        snow = hazed(picture, self._haze, self._between(*HAZE), scene)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        snow = hazed(picture[region.part], self._haze, self._between(*HAZE), scene, region)
         pixels = SNOW_SPEED[0] * scene.t + SNOW_SPEED[1] * scene.position
         for tile, speed in zip(self._tiles, FLAKE_SPEEDS, strict=True):
             way = speed * pixels
-            snow = cv2.add(snow, tile.moved(-cos(radians(75.0)) * way, sin(radians(75.0)) * way))
+            flakes = tile.moved(-cos(radians(75.0)) * way, sin(radians(75.0)) * way, region)
+            cv2.add(snow, flakes, dst=snow)
         return snow
 
 
@@ -144,10 +149,10 @@ def haze(random: np.random.Generator, rows: int, columns: int, density: float, t
     return Tile(to_levels(blurred_round(noise, 5.0 + 2.0 * thickness)))
 
 
-def hazed(picture: np.ndarray, droplets: Tile, contrast: float, scene: Scene) -> np.ndarray:
-    """The picture with its contrast reduced, and the droplets, drifting slowly, added."""
+def hazed(picture: np.ndarray, droplets: Tile, contrast: float, scene: Scene, region: Region) -> np.ndarray:
+    """The picture's region with its contrast reduced, and the droplets, drifting slowly, added."""
     down = FOG_SPEED[0] * scene.t + FOG_SPEED[1] * scene.position
-    return cv2.addWeighted(picture, contrast, droplets.moved(0.3 * down, down), 1.0, 0.0)
+    return cv2.addWeighted(picture, contrast, droplets.moved(0.3 * down, down, region), 1.0, 0.0)
 
 
 def blurred_round(levels: np.ndarray, sigma: float) -> np.ndarray:

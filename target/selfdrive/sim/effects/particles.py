@@ -15,6 +15,7 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.canvas import splat, strokes
 from selfdrive.sim.effects.effect import Scene
+from selfdrive.sim.picture import Region
 
 NEAREST = 0.25  # m: what is nearer to the lens is out of focus
 FAINTEST = 0.03  # share of a pixel's light: a streak that takes less is not seen
@@ -97,48 +98,65 @@ class Cover:
     """
 
     def __init__(self, camera: CameraModel) -> None:
-        self._inside = slice(MARGIN, MARGIN + camera.rows), slice(MARGIN, MARGIN + camera.width)
         sizes = [(-(-camera.rows // s) + 2 * MARGIN, -(-camera.width // s) + 2 * MARGIN) for s in (1, 2, 4)]
         corners = [(0, 0), (sizes[0][0], 0), (sizes[0][0], sizes[1][1])]
+        self._sizes, self._places = sizes, corners
         self._sheet = np.zeros((sizes[0][0] + sizes[1][0], sizes[0][1]), dtype=np.float32)
-        self._grids = [
-            self._sheet[row : row + rows, column : column + columns]
-            for (row, column), (rows, columns) in zip(corners, sizes, strict=True)
-        ]
         self._corners = np.array(corners, dtype=np.float32).T[::-1]  # columns, then rows
         self._ends = self._corners + np.array(sizes, dtype=np.float32).T[::-1] - 1.0
 
-    def taken(self, streaks: Streaks) -> np.ndarray:
-        """Shares in parts of 255, uint8 (rows, width)."""
-        self._sheet.fill(0.0)
-        self._draw(streaks)
-        full, half, quarter = self._grids
-        half += _enlarged(quarter, half.shape)
-        coarse = _enlarged(cv2.convertScaleAbs(half, alpha=255.0), full.shape)
-        return cv2.add(cv2.convertScaleAbs(full, alpha=255.0)[self._inside], coarse[self._inside])
+    def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
+        """Shares in parts of 255, uint8, in a region of the picture."""
+        full = Region(*(end + MARGIN for end in region))
+        half = _seen_through(full, self._sizes[1])
+        quarter = _seen_through(half, self._sizes[2])
+        windows = [
+            self._sheet[row + window.top : row + window.bottom, column + window.left : column + window.right]
+            for (row, column), window in zip(self._places, (full, half, quarter), strict=True)
+        ]
+        for window in windows:
+            window.fill(0.0)
+        self._draw(streaks, (full, half, quarter))
+        windows[1] += _enlarged(windows[2], quarter, half)
+        coarse = _enlarged(cv2.convertScaleAbs(windows[1], alpha=255.0), half, full)
+        return cv2.add(cv2.convertScaleAbs(windows[0], alpha=255.0), coarse)
 
-    def _draw(self, streaks: Streaks) -> None:
-        """Each streak as points on its grid."""
+    def _draw(self, streaks: Streaks, windows: tuple[Region, ...]) -> None:
+        """Each streak as points on its grid, as far as they lie in that grid's window."""
         grid = np.searchsorted((*SOFT, inf), streaks.width)
         scale = np.float32([1.0, 2.0, 4.0])[grid]
         # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
         corner = self._corners[:, grid] + MARGIN - 0.5
         start, end = ((place + 0.5) / scale + corner for place in (streaks.start, streaks.end))
+        # A point weighs on the pixels around it.
+        least = np.float32([(window.left - 1, window.top - 1) for window in windows]).T + self._corners
+        most = np.float32([(window.right, window.bottom) for window in windows]).T + self._corners
+        least, most = np.maximum(least, self._corners), np.minimum(most, self._ends)
+        there = (np.maximum(start, end) >= least[:, grid]) & (np.minimum(start, end) < most[:, grid])
+        near = np.flatnonzero(there[0] & there[1])
+        start, end, grid = start[:, near], end[:, near], grid[near]
         counts = (_lengths(end - start) / SPACING).astype(np.intp) + 1
-        share = (0.25 * np.pi) * (streaks.width / scale) ** 2 / counts.astype(np.float32)
+        share = (0.25 * np.pi) * (streaks.width[near] / scale[near]) ** 2 / counts.astype(np.float32)
         _, columns, rows = strokes(start, end, counts)
         grid = np.repeat(grid, counts)
-        first, last = self._corners[:, grid], self._ends[:, grid]
+        first, last = least[:, grid], most[:, grid]
         inside = np.flatnonzero(
             (columns >= first[0]) & (columns < last[0]) & (rows >= first[1]) & (rows < last[1])
         )
         splat(self._sheet, columns[inside], rows[inside], np.repeat(share, counts)[inside])
 
 
-def _enlarged(coarse: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """A grid of half the size on a finer one of this shape; both have their margins."""
-    fine = cv2.resize(coarse, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_LINEAR)
-    return fine[MARGIN : MARGIN + shape[0], MARGIN : MARGIN + shape[1]]
+def _seen_through(fine: Region, size: tuple[int, int]) -> Region:
+    """The part of a grid of this size that makes up that of the grid twice as fine."""
+    top, bottom, left, right = ((end + MARGIN) // 2 for end in fine)
+    return Region(max(top - 1, 0), min(bottom + 2, size[0]), max(left - 1, 0), min(right + 2, size[1]))
+
+
+def _enlarged(coarse: np.ndarray, seen: Region, fine: Region) -> np.ndarray:
+    """The region `fine` of a grid from the region `seen` of one of half the size; both have their margins."""
+    twice = cv2.resize(coarse, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_LINEAR)
+    down, right = fine.top + MARGIN - 2 * seen.top, fine.left + MARGIN - 2 * seen.left
+    return twice[down : down + fine.shape[0], right : right + fine.shape[1]]
 
 
 def _lengths(ways: np.ndarray) -> np.ndarray:

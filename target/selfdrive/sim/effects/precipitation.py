@@ -17,6 +17,7 @@ from selfdrive.sim.effects.air import airlight, clearness
 from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.effects.particles import Box, Cover, Particles
 from selfdrive.sim.effects.windscreen import Windscreen
+from selfdrive.sim.picture import Picture, Region, whole
 
 EXPOSURE = 0.001  # s, under a grey sky
 ON_GLASS = 1000  # diameters to choose from
@@ -63,12 +64,12 @@ class _Precipitation(Effect):
         few, many = exp(-slope * most), exp(-slope * least)
         return -each(log, few + (many - few) * random.uniform(size=count)) / slope
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        taken = self._cover.taken(self._particles.streaks(scene, EXPOSURE))
-        kept = cv2.multiply(self._veil, cv2.bitwise_not(taken), scale=1.0 / 255.0)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        taken = self._cover.taken(self._particles.streaks(scene, EXPOSURE), region)
+        kept = cv2.multiply(self._veil[region.part], cv2.bitwise_not(taken), scale=1.0 / 255.0)
         air = airlight(picture, self.camera)
         lost = cv2.convertScaleAbs(kept, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
-        return cv2.add(cv2.multiply(picture, kept, scale=1.0 / 255.0), lost)
+        return cv2.add(cv2.multiply(picture[region.part], kept, scale=1.0 / 255.0), lost)
 
     @abstractmethod
     def _spectrum(self) -> tuple[float, float]:
@@ -103,8 +104,10 @@ class Rain(_Precipitation):
         self._glass = Windscreen(random, self.camera, self.density(*limits), diameters)
         super()._prepare(random)
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return self._glass.seen(super()._affect(picture, scene), scene)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        everything = whole(picture.shape)  # of which each drop shows most
+        through = super()._affect(picture[everything.part], everything, scene)
+        return self._glass.seen(through, region, scene)
 
     def _spectrum(self) -> tuple[float, float]:
         return 8000.0, 4.1 * self.amount**-0.21

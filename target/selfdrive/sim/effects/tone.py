@@ -4,7 +4,9 @@ import cv2
 import numpy as np
 
 from selfdrive.common.errors import ConfigError
+from selfdrive.sim.effects.canvas import filtered
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+from selfdrive.sim.picture import Picture, Region
 
 
 class _Tone(Effect):
@@ -12,8 +14,8 @@ class _Tone(Effect):
 
     MOVING = False
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.LUT(picture, self._levels)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        return cv2.LUT(picture[region.part], self._levels)
 
     def _set(self, levels: np.ndarray) -> None:
         self._levels = np.clip(np.rint(levels), 0, WHITE).astype(np.uint8)
@@ -45,8 +47,8 @@ class AveragingBlur(Effect):
     def _prepare(self, random: np.random.Generator) -> None:
         self._kernel = int(self.amount), int(self.amount)
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.blur(picture, self._kernel)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        return filtered(picture, region, self._kernel[0], lambda wide: cv2.blur(wide, self._kernel))
 
 
 class _OddKernel(Effect):
@@ -67,8 +69,9 @@ class GaussianBlur(_OddKernel):
 
     UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.GaussianBlur(picture, (int(self.amount), int(self.amount)), 0)
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        size = int(self.amount)
+        return filtered(picture, region, size, lambda wide: cv2.GaussianBlur(wide, (size, size), 0))
 
 
 class MedianBlur(_OddKernel):
@@ -76,5 +79,6 @@ class MedianBlur(_OddKernel):
 
     UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 
-    def _affect(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        return cv2.medianBlur(picture, int(self.amount))
+    def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
+        size = int(self.amount)
+        return filtered(picture, region, size, lambda wide: cv2.medianBlur(wide, size))

@@ -9,6 +9,7 @@ import numpy as np
 from selfdrive.common.array_math import each
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Scene
+from selfdrive.sim.picture import Region
 
 DISTANCE = 0.05  # m from lens to glass
 RAKE = 0.52  # rad between glass and road
@@ -38,6 +39,15 @@ class Pixels(NamedTuple):
         ends = np.concatenate([[0], np.cumsum([drop.shape[1] for drop in drops])])
         return cls(places, sources, shares.astype(np.int16), ends)
 
+    def within(self, region: Region, columns: int) -> "Pixels":
+        """Those in a region of the picture, which has so many columns; their places are the region's."""
+        row, column = np.divmod(self.places, columns)
+        down, right = row - region.top, column - region.left
+        rows, width = region.shape
+        there = (down >= 0) & (down < rows) & (right >= 0) & (right < width)
+        ends = np.concatenate([[0], np.cumsum(there)])[self.ends]
+        return Pixels((down * width + right)[there], self.sources[there], self.shares[there], ends)
+
     def first(self, drops: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Places, sources and shares of so many drops."""
         end = self.ends[min(drops, self.ends.size - 1)]
@@ -57,19 +67,20 @@ class Windscreen:
         area = DISTANCE**2 * camera.width / camera.fx * camera.rows / camera.fy
         self._per_metre = density * area  # drops for each metre of air that moves at the glass
         most = int(self._per_metre * _speed(FASTEST) * WIPE) + 1
+        self._region: Region | None = None
         self._start = random.uniform(0.0, WIPE)
         self._sets = [
             _landed(random, camera, random.choice(diameters, size=most), self._size) for _ in range(SETS)
         ]
 
-    def seen(self, picture: np.ndarray, scene: Scene) -> np.ndarray:
-        """The picture through the glass; a new array."""
+    def seen(self, picture: np.ndarray, region: Region, scene: Scene) -> np.ndarray:
+        """The picture's region through the glass; a new array."""
         wipe, since = divmod(scene.t + self._start, WIPE)
-        wholly, edges = self._sets[int(wipe) % SETS]
+        wholly, edges = self._landing(region, picture.shape[1])[int(wipe) % SETS]
         landed = int(self._per_metre * _speed(scene.v_ego) * since)
         through = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
         through = cv2.GaussianBlur(through, (0, 0), BLUR).reshape(-1)
-        seen = picture.copy()
+        seen = picture[region.part].copy()
         flat = seen.reshape(-1)
         places, sources, shares = edges.first(landed)
         before = flat[places].astype(np.int16)
@@ -77,6 +88,13 @@ class Windscreen:
         places, sources, _ = wholly.first(landed)
         flat[places] = through[sources]
         return seen
+
+    def _landing(self, region: Region, columns: int) -> list[tuple[Pixels, Pixels]]:
+        """The sets of drops in a region; kept, as all pictures of a run are asked for the same one."""
+        if region != self._region:
+            self._seen = [tuple(part.within(region, columns) for part in drops) for drops in self._sets]
+            self._region = region
+        return self._seen
 
 
 def _speed(v_ego: float) -> float:

@@ -10,6 +10,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim import effects
 from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.picture import Picture, Region
 
 ALL = sorted(LEVELS, key=lambda effect: effect.__name__)
 MOVING = [
@@ -72,6 +73,44 @@ def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
     kept = first.copy()
     made.apply(255 - road, moment(1))
     assert np.array_equal(first, kept)
+
+
+CAMERAS = [
+    CameraModel(),
+    CameraModel.from_view(width=352, rows=264, horizon=90.0, focal=200.0, height=1.4),
+    CameraModel.from_view(width=333, rows=251, horizon=70.3, focal=180.0, height=1.4),  # no whole vectors
+]
+
+
+def regions(shape, random):
+    """Any rows and columns, single pixels and the four corners among them."""
+    for _ in range(6):
+        top, left = (int(random.integers(size)) for size in shape)
+        bottom, right = random.integers((top + 1, left + 1), (shape[0] + 1, shape[1] + 1)).tolist()
+        yield Region(top, bottom, left, right)
+    for top in (0, shape[0] - 1):
+        for left in (0, shape[1] - 1):
+            yield Region(top, top + 1, left, left + 1)
+
+
+@pytest.mark.parametrize("model", CAMERAS, ids=["640x480", "352x264", "333x251"])
+@every
+def test_a_part_is_that_of_the_whole(effect, model, moment):
+    """What is cut out of a changed picture, anywhere, has the bits that all of it has there; also where two
+    effects follow each other."""
+    random = np.random.default_rng(7)
+    noise = random.integers(0, 256, (model.rows, model.width), np.uint8)
+    for amount in (LEVELS[effect][0], LEVELS[effect][-1]):
+        made, before = effect(amount, 3, model), effects.GaussianBlur(5, 3, model)
+        for number in (0, 17):
+            once = Picture(("noise",), noise.shape, lambda region: noise[region.part])
+            shown = made.apply(once, moment(number))
+            pixels = made.apply(noise, moment(number))
+            twice = made.apply(before.apply(once, moment(number)), moment(number))
+            for region in regions(noise.shape, random):
+                assert np.array_equal(shown[region.part], pixels[region.part])
+            assert np.array_equal(twice[region.part], np.asarray(twice)[region.part])
+            assert np.array_equal(twice, made.apply(before.apply(noise, moment(number)), moment(number)))
 
 
 @pytest.mark.parametrize("effect", RANDOM)

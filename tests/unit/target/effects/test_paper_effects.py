@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from selfdrive.sim.effects import Brightness, Contrast, PaperFog, PaperOcclusion, PaperRain, PaperSnow
 from selfdrive.sim.effects.paper_weather import BLOCKS, STREAKS, motion_kernel
+from selfdrive.sim.picture import whole
 
 
 def black(camera):
@@ -32,8 +33,9 @@ def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
 def test_falling_keeps_what_falls(effect, camera, moment):
     """Who leaves the screen enters it again: a layer's levels are always the same ones."""
     made = effect(3, 0, camera).ready()
+    everything = whole((camera.rows, camera.width))
     for tile in made._tiles:
-        first, later = tile.moved(0.0, 0.0), tile.moved(-35.0, 412.0)
+        first, later = tile.moved(0.0, 0.0, everything), tile.moved(-35.0, 412.0, everything)
         assert np.array_equal(np.sort(first, axis=None), np.sort(later, axis=None))
 
 
@@ -44,7 +46,7 @@ def test_drops_fall(effect, camera, moment):
     ways = []
     for tile in made._tiles:
 
-        def moved(right, down):
+        def moved(right, down, region):
             ways.append(down)
             return black(camera)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from selfdrive.sim.effects import Rain, Snow
 from selfdrive.sim.effects.particles import Box, Cover, Particles, Streaks
+from selfdrive.sim.picture import whole
 
 
 def alone(camera, *, size=0.004, speed=0.0, reach=8.0, number=400):
@@ -100,7 +101,7 @@ def test_streaks_take_the_light_of_their_area(width, camera):
     """However it is spread, a particle takes pi / 4 * width^2 pixels of light, on any of the grids."""
     start = np.array([[100.3, 300.0, 500.7], [200.1, 240.5, 300.9]], np.float32)
     streaks = Streaks(start, start + np.float32(6.3), np.full(3, width, np.float32))
-    taken = Cover(camera).taken(streaks).astype(float) / 255.0
+    taken = Cover(camera).taken(streaks, whole((camera.rows, camera.width))).astype(float) / 255.0
     assert taken.sum() == pytest.approx(3 * np.pi / 4 * width**2, rel=0.06)
     rows, columns = np.nonzero(taken[:, :200])
     assert np.average(columns, weights=taken[rows, columns]) == pytest.approx(103.45, abs=0.25)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from selfdrive.sim.effects.windscreen import WIPE, Windscreen
+from selfdrive.sim.picture import whole
 
 
 @pytest.fixture
@@ -14,7 +15,7 @@ def glass(camera):
 def wet(glass, picture, moment, share, wipe=3):
     """Which pixels show drops at this share of the time between two wipes."""
     start = wipe * WIPE - glass._start
-    return glass.seen(picture, moment._replace(t=start + share * WIPE)) != picture
+    return glass.seen(picture, whole(picture.shape), moment._replace(t=start + share * WIPE)) != picture
 
 
 def test_drops_gather_until_the_wipe(glass, road, moment):
@@ -39,6 +40,7 @@ def test_drops_show_the_scene_upside_down(glass, camera, moment):
     picture = np.full((camera.rows, camera.width), 60, np.uint8)
     picture[:200] = 200
     start = 3 * WIPE - glass._start
-    change = glass.seen(picture, moment()._replace(t=start + 0.9)).astype(int) - picture
+    seen = glass.seen(picture, whole(picture.shape), moment()._replace(t=start + 0.9))
+    change = seen.astype(int) - picture
     assert change[:190].max() <= 0 and change[:190].min() < -60
     assert change[210:].min() >= 0 and change[210:].max() > 60

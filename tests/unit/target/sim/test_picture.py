@@ -4,18 +4,18 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from selfdrive.sim.picture import Picture
+from selfdrive.sim.picture import Picture, Region, whole
 
 WHOLE = np.arange(6 * 8, dtype=np.uint8).reshape(6, 8)
 
 
 def picture(asked=None):
-    """One whose rows and columns that are not asked for are not there; `asked` keeps what was."""
+    """One of which no more is there than is asked for; `asked` keeps what was."""
 
-    def make(rows, columns):
+    def make(region):
         if asked is not None:
-            asked.append((rows, columns))
-        return WHOLE[:rows, :columns]
+            asked.append(region)
+        return WHOLE[region.part]
 
     return Picture(("some",), WHOLE.shape, make)
 
@@ -49,14 +49,14 @@ def test_a_cut_is_that_of_the_whole(cut):
 
 
 def test_no_more_is_made_than_asked_for():
-    """Nothing is made for size and type; a cut asks for rows and columns to its end; all are made once."""
+    """Nothing is made for size and type; a cut asks for what is in it; all are made once."""
     asked = []
     one = picture(asked)
     assert (one.shape, one.dtype, len(one)) == ((6, 8), np.uint8, 6) and asked == []
     _ = one[1:3, 2:5]
-    assert asked == [(3, 5)]
+    assert asked == [Region(1, 3, 2, 5)]
     np.asarray(one), one.pixels(), one[1:3, 2:5], one.mean()
-    assert asked == [(3, 5), (6, 8)]
+    assert asked == [Region(1, 3, 2, 5), whole((6, 8))]
 
 
 def test_it_is_calculated_with_as_an_array():

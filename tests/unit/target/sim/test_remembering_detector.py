@@ -152,7 +152,7 @@ def test_effects_from_elsewhere_are_looked_at(look, truth):
         def _prepare(self, random):
             pass
 
-        def _affect(self, picture, scene):
+        def _affect(self, picture, region, scene):
             return picture[::-1].copy()
 
     picture = Upside(1, 0, MODEL).apply(look(), truth())

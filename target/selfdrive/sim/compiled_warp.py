@@ -1,0 +1,57 @@
+"""The warp of a region in C, where that was compiled and gives OpenCV's bits."""
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from selfdrive.common import compiled
+from selfdrive.sim.picture import Region
+from selfdrive.sim.warp import VECTOR, warp
+
+C_SOURCE = Path(__file__).with_name("warp.c")
+PROBE = Region(0, 48, 0, 512)
+
+Warp = Callable[[np.ndarray, np.ndarray, Region], np.ndarray]
+
+
+def build_warp() -> tuple[Warp, str]:
+    """What does as `warp` does, in C where it may, and which compiled code it calculates with, if any."""
+    library = compiled.library(C_SOURCE)
+    if library is None or not agrees(library):
+        return warp, ""
+    return CompiledWarp(library), library.digest.hex()
+
+
+class CompiledWarp:
+    """Does what `warp` does: `library` is `warp.c`, compiled."""
+
+    def __init__(self, library: compiled.Library) -> None:
+        pointer, number = ctypes.c_void_p, ctypes.c_long
+        self._warp = library.code.warp
+        self._warp.argtypes = [pointer, number, number, pointer, *[number] * 4, pointer]
+        self._warp.restype = None
+
+    def __call__(self, source: np.ndarray, matrix: np.ndarray, region: Region) -> np.ndarray:
+        """The region of `source`, warped by `matrix`."""
+        rows, width = source.shape
+        # What is left of a row beyond whole vectors OpenCV calculates in another way.
+        if source.dtype != np.uint8 or matrix.dtype != float or region.right > width // VECTOR * VECTOR:
+            return warp(source, matrix, region)
+        source, matrix = np.ascontiguousarray(source), np.ascontiguousarray(matrix)
+        out = np.empty(region.shape, np.uint8)
+        self._warp(source.ctypes.data, rows, width, matrix.ctypes.data, *region, out.ctypes.data)
+        return out
+
+
+@cache
+def agrees(library: compiled.Library) -> bool:
+    """Whether compiled code has OpenCV's bits: an older one, or one without fused sums, calculates otherwise.
+
+    A noisy picture so large that places in it are coarse shows each other way to round.
+    """
+    noise = (np.arange(48 * 8192) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 8192)
+    matrix = np.array([(1.7, 31.3, 3007.3), (1.3e-3, 0.93, 0.4), (3.1e-5, 1.7e-4, 1.1)])
+    return np.array_equal(CompiledWarp(library)(noise, matrix, PROBE), warp(noise, matrix, PROBE))
