@@ -10,12 +10,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from itertools import pairwise
 from math import inf
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record
 from mutator.outcomes.propagation import Departure
+from mutator.outcomes.way import Way, chained, links_of, steps_from, structured
 from mutator.store.run_head import REMEDY, Head
 from mutator.stpa.analysis import Kind, StructureModel
 from mutator.targets.channels import Role
@@ -84,22 +84,6 @@ class Path:
     stopped_at: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
-    """Where the faults of some components may go: the components in causal order, the links between them."""
-
-    components: tuple[str, ...]
-    links: Mapping[str, tuple[str, str]]
-    sources: frozenset[str]  # where the fault comes in
-    injected: bool  # whether these are known to be where
-    fed: Mapping[str, frozenset[str]]  # what else leads to a component, from off the way
-    steps: Mapping[str, int]  # links that are left to the process
-
-    def feeders(self, component: str) -> set[str]:
-        """The components that lead to one."""
-        return {tail for tail, tip in self.links.values() if tip == component}
-
-
 class Ways:
     """Paths of faults through a target.
 
@@ -112,10 +96,10 @@ class Ways:
         self.component_of = {name: component for name, _, _, component, _ in channels}
         self._roles = {component: role for _, _, role, component, _ in channels if component}
         self.structure = structure
-        self._links = _links_of(structure) if structure else {}
+        self._links = links_of(structure) if structure else {}
         # from what is not recorded back to what leads to it
         self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
-        self._way = lru_cache(maxsize=None)(self._structured if structure else self._chain)
+        self._way = lru_cache(maxsize=None)(self._way_of)
 
     @property
     def processes(self) -> frozenset[str]:
@@ -209,44 +193,16 @@ class Ways:
                     times[feeder] = min(times.get(feeder, inf), times[name])
         return times
 
+    def _way_of(self, injected: frozenset[str]) -> Way:
+        if self.structure is None:
+            return chained(self._roles, self.processes)
+        return structured(self.structure.components, self._links, self.processes, injected)
+
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
         """When (s) feedback can first have come through one of these components: when it left golden, or what
         leads to it did where it is not recorded; infinite: it cannot."""
-        unseen = _steps([name for name in names if name not in self._roles], self._back).keys()
+        unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
-
-    def _chain(self, _: frozenset[str]) -> Way:
-        order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
-        chain = sorted(self._roles, key=lambda name: order.index(self._roles[name]))
-        links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
-        # what is seen of the process may come first
-        return Way(
-            components=tuple(chain),
-            links=links,
-            sources=frozenset(chain[:1]),
-            injected=False,
-            fed=dict.fromkeys(chain[:1], self.processes),
-            steps={name: len(chain) - place for place, name in enumerate(chain)},
-        )
-
-    def _structured(self, injected: frozenset[str]) -> Way:
-        assert self.structure is not None
-        forward = {name: ends for name, ends in self._links.items() if ends[0] not in self.processes}
-        steps = _steps(self.processes, [(tip, tail) for tail, tip in forward.values()])
-        on_way = (_steps(injected, forward.values()).keys() & steps.keys()) | injected
-        links = {name: pair for name, pair in forward.items() if on_way.issuperset(pair)}
-        fed = {
-            name: frozenset(tail for tail, tip in self._links.values() if tip == name and tail not in on_way)
-            for name in on_way
-        }
-        return Way(
-            components=_in_causal_order([n for n in self.structure.components if n in on_way], links, steps),
-            links=links,
-            sources=injected,
-            injected=True,
-            fed=fed,
-            steps={name: steps.get(name, len(on_way)) for name in on_way},
-        )
 
 
 def ways_of(head: Head) -> Ways | None:
@@ -267,36 +223,6 @@ _CAME = (State.INJECTED, State.REACHED, State.PASSED)
 
 def _sooner(some: Mapping[str, float], others: Mapping[str, float], name: str) -> float | None:
     return some[name] if some.get(name, inf) < others.get(name, inf) else None
-
-
-def _links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
-    """The ends of each link that is studied, and not from or to people."""
-    people = {name for name, one in structure.components.items() if one.kind is Kind.HUMAN}
-    ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
-    return {name: pair for name, pair in ends if not people.intersection(pair)}
-
-
-def _steps(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
-    """How many links away from `start` everything is that can be come to from there, itself included."""
-    found = dict.fromkeys(start, 0)
-    while more := {tip for tail, tip in links if tail in found} - found.keys():
-        found |= dict.fromkeys(more, max(found.values()) + 1)
-    return found
-
-
-def _in_causal_order(
-    nodes: Sequence[str], links: Mapping[str, tuple[str, str]], steps: Mapping[str, int]
-) -> tuple[str, ...]:
-    """The nodes, each after all that feed it. Of several, and in a circle, the one with most `steps` to the
-    process comes first."""
-    left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
-    order: list[str] = []
-    while left:
-        waiting = {tip for tail, tip in links.values() if tail in left and tail != tip}
-        chosen = next((name for name in left if name not in waiting), left[0])
-        left.remove(chosen)
-        order.append(chosen)
-    return tuple(order)
 
 
 def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collection[str]) -> Passage:
