@@ -8,7 +8,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mutator._common.files import no_pipe
 from mutator.errors import MutatorError
@@ -123,7 +123,7 @@ class Results:
         """
         import pandas as pd
 
-        frame = pd.read_parquet(io.BytesIO(self.parquet())).set_index("experiment_id")
+        frame = _frame(self.parquet()).set_index("experiment_id")
         hazards = [name.lower() for name in hazards_in(frame.columns)]
         frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
         for name in ("activated", "manifested", *hazards):
@@ -146,9 +146,7 @@ class Results:
 
     def propagation(self) -> "pd.DataFrame":
         """A frame of propagation.parquet: a row for each channel of an experiment that left golden."""
-        import pandas as pd
-
-        return pd.read_parquet(io.BytesIO(self.propagation_parquet()))
+        return _frame(self.propagation_parquet())
 
     def propagation_parquet(self) -> bytes:
         """The bytes of propagation.parquet; MutatorError for a run that recorded none."""
@@ -164,9 +162,7 @@ class Results:
 
     def timings(self) -> "pd.DataFrame":
         """A frame of timings.parquet: a row for each experiment that ran."""
-        import pandas as pd
-
-        return pd.read_parquet(io.BytesIO(self.timings_parquet()))
+        return _frame(self.timings_parquet())
 
     def timings_parquet(self) -> bytes:
         """The bytes of timings.parquet."""
@@ -193,12 +189,24 @@ def same_parquet(path: Path, made: bytes) -> bool:
     """Whether the Parquet file at `path` has the rows of one that was made now, maybe by another version of
     pyarrow."""
     import pyarrow as pa  # type: ignore[import-untyped]
-    from pyarrow import parquet
 
     try:
-        return bool(parquet.read_table(path).equals(parquet.read_table(io.BytesIO(made))))
+        return bool(_table(path).equals(_table(io.BytesIO(made))))
     except (pa.ArrowException, OSError):
         return False
+
+
+def _frame(data: bytes) -> "pd.DataFrame":
+    frame: pd.DataFrame = _table(io.BytesIO(data)).to_pandas(use_threads=False)
+    return frame
+
+
+def _table(source: Path | io.BytesIO) -> Any:
+    """The table of a Parquet file, read in this thread alone: one of pyarrow's that gives bytes back while
+    Python ends aborts the process, after all its work."""
+    from pyarrow import parquet
+
+    return parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
 
 
 def _units(frame: "pd.DataFrame") -> dict[str, str]:

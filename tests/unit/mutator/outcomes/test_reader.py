@@ -1,6 +1,8 @@
 """The one reader of a run's results."""
 
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -53,6 +55,26 @@ def became(e: Experiment) -> dict[str, Any] | None:
 def run(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> Path:
     """A run of the crane with made-up records."""
     return write_run(crane, tmp_path / "run", became)
+
+
+ALONE = """
+import sys
+from pathlib import Path
+from mutator.outcomes.reader import Results, same_parquet
+table = Results.of_run(Path(sys.argv[1]))
+assert same_parquet(table.path.with_name("results.parquet"), table.parquet())
+table.frame(), table.timings(), table.propagation()
+print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")))
+"""
+
+
+def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
+    """A thread of pyarrow that gives bytes back to Python while that ends kills the process after its work:
+    whatever reads tables starts none. That of its allocator knows nothing of Python."""
+    results.build(run)
+    words = [sys.executable, "-c", ALONE, str(run)]
+    ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
+    assert [name for name in ended.stdout.split() if name != "jemalloc_bg_thd"] == [ended.stdout.split()[0]]
 
 
 def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> None:
