@@ -41,15 +41,26 @@ class Packer:
         self._checksum_mask = 0xF if message.has_checksum else 0
         self._checksum_base = checksum_base(message.address)
         self._values: tuple[float, ...] | None = None
-        self._word = 0
+        self._word = -1
+        self._frames: dict[int, CanFrame] = {}  # of the word, by counter: values often stay
 
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
         """The frame for physical `values`; `counter` counts the frames sent of this message."""
         if values != self._values:
-            self._word = self._encode(values)
+            word = self._encode(values)
             self._values = values
+            if word != self._word:
+                self._word = word
+                self._frames = {}
+        counter &= self._counter_mask
+        frame = self._frames.get(counter)
+        if frame is None:
+            frame = self._frames[counter] = self._frame(counter)
+        return frame
+
+    def _frame(self, counter: int) -> CanFrame:
         size = self._size
-        word = self._word | (counter & self._counter_mask) << self._counter_shift
+        word = self._word | counter << self._counter_shift
         halves = half_byte_sum(word.to_bytes(size, "big"))
         word |= (self._checksum_base - halves) & self._checksum_mask
         return CanFrame(self._address, word.to_bytes(size, "big"), self._bus)

@@ -20,7 +20,10 @@ class Expected(NamedTuple):
 
 
 class _State:
-    """One message's layout, its newest values, and when and how well it was received."""
+    """One message's layout, its newest values, and when and how well it was received.
+
+    A message without a counter always has the counter 0.
+    """
 
     __slots__ = (
         "bad_counters",
@@ -29,10 +32,12 @@ class _State:
         "checksum_base",
         "checksum_mask",
         "counter",
+        "counter_mask",
         "counter_shift",
         "deadline",
         "fields",
         "name",
+        "read",
         "size",
         "timeout",
     )
@@ -40,11 +45,13 @@ class _State:
     def __init__(self, message: Message, expected: Expected) -> None:
         self.name, self.size = message.name, message.size
         self.fields: list[Field] = [message.fields[name] for name in expected.signals]
-        self.counter_shift = message.counter_shift
+        self.counter_shift = message.counter_shift or 0
+        self.counter_mask = 0 if message.counter_shift is None else 0x3
         self.checksum_mask = 0xF if message.has_checksum else 0
         self.checksum_base = checksum_base(message.address)
         self.body_mask = sum(field.mask << field.shift for field in self.fields)
         self.body = -1  # the payload's bits that matter, of the last valid frame
+        self.read: dict[bytes, int] = {}  # counters of payloads with that body that were right: it often stays
         self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # the excess keeps rounding of t out
         self.deadline = float("-inf")  # s, after which the message is overdue
         self.counter: int | None = None  # of the next frame
@@ -54,15 +61,25 @@ class _State:
         """Whether size, checksum and counter are right; keeps count of wrong counters."""
         if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
             return False
-        if self.counter_shift is None:
-            return True
-        expected, self.counter = self.counter, (word >> self.counter_shift) + 1 & 0x3
-        if word >> self.counter_shift & 0x3 == expected or expected is None:
+        counter = word >> self.counter_shift & self.counter_mask
+        expected, self.counter = self.counter, counter + 1 & self.counter_mask
+        if counter == expected or expected is None:
             if self.bad_counters:
                 self.bad_counters -= 1
         else:
             self.bad_counters += 1
         return self.bad_counters < MAX_BAD_COUNTERS
+
+    def takes(self, data: bytes, word: int) -> bool:
+        """Keep a payload that was accepted; whether its values are new."""
+        body = word & self.body_mask
+        new = body != self.body
+        if new:
+            self.body = body
+            self.read = {}
+        if len(self.read) <= self.counter_mask:
+            self.read[data] = word >> self.counter_shift & self.counter_mask
+        return new
 
 
 class CanParser:
@@ -90,14 +107,17 @@ class CanParser:
         for address, data, frame_bus in frames:
             if frame_bus != bus or (state := states.get(address)) is None:
                 continue
-            word = int.from_bytes(data, "big")
-            if not state.accepts(data, word):
-                continue
+            counter = state.read.get(data)
+            if counter is not None and counter == state.counter and not state.bad_counters:
+                state.counter = counter + 1 & state.counter_mask
+            else:
+                word = int.from_bytes(data, "big")
+                if not state.accepts(data, word):
+                    continue
+                if state.takes(data, word):
+                    self.values[state.name] = decode(state.fields, word)
             state.deadline = t + state.timeout
             updated.append(state.name)
-            if word & state.body_mask != state.body:
-                state.body = word & state.body_mask
-                self.values[state.name] = decode(state.fields, word)
         self.updated = updated
         if t > self._valid_until:
             self._valid_until = min([state.deadline for state in states.values()])
