@@ -51,7 +51,7 @@ class _State:
         self.checksum_base = checksum_base(message.address)
         self.body_mask = sum(field.mask << field.shift for field in self.fields)
         self.body = -1  # the payload's bits that matter, of the last valid frame
-        self.read: dict[bytes, int] = {}  # counters of payloads with that body that were right: it often stays
+        self.read: dict[bytes, int] = {}  # counters of right payloads with that body, which often stays
         self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # the excess keeps rounding of t out
         self.deadline = float("-inf")  # s, after which the message is overdue
         self.counter: int | None = None  # of the next frame
