@@ -1,0 +1,179 @@
+"""A picture in a run by this version and by an older one: `python benchmarks/pictures.py CLONE`.
+
+CLONE is a checkout of the older commit. Each version has an interpreter, compiled helpers and an empty cache
+of its own, and takes its pictures in turn with the other: all are new, and nothing is remembered. Prints the
+CPU time of moving a frame to the car's pose, the image effect and the detection together, and the ratio. A
+detector or effect that the older version lacks is left out; lines that the two see differently are told.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from hashlib import sha256
+from math import sin
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import process_time
+
+ROOT = Path(__file__).resolve().parents[1]
+HELPERS = ("-m", "selfdrive.sim.compile_helpers")
+EFFECTS: dict[str, tuple[str, float] | None] = {
+    "clean": None,
+    "paper's rain": ("PaperRain", 5),
+    "paper's snow": ("PaperSnow", 5),
+    "mild rain": ("Rain", 5),
+    "strong rain": ("Rain", 100),
+    "mild snow": ("Snow", 1),
+    "strong snow": ("Snow", 6),
+    "rain as coded": ("CodedRain", 5),
+    "snow as coded": ("CodedSnow", 5),
+}
+
+
+class Version:
+    """A checkout and the process that takes its pictures."""
+
+    def __init__(self, clone: Path, scratch: Path) -> None:
+        env = os.environ | {"PYTHONPATH": str(clone / "target"), "OPENBLAS_NUM_THREADS": "1"}
+        python = [sys.executable, *HELPERS]
+        said = subprocess.run([*python, "--help"], env=env, check=True, capture_output=True, text=True)
+        option = "--cache" if "--cache" in said.stdout else "--out"
+        subprocess.run([*python, option, scratch], env=env, check=True, stdout=subprocess.DEVNULL)
+        self._process = subprocess.Popen(
+            [sys.executable, __file__, "--take", scratch], env=env, text=True, stdin=-1, stdout=-1
+        )
+        self.detectors, self.effects = self.ask("has")
+
+    def ask(self, *words: object):
+        """The process's answer."""
+        print(json.dumps(words), file=self._process.stdin, flush=True)
+        return json.loads(self._process.stdout.readline())
+
+    def end(self) -> None:
+        """Let the process go."""
+        self._process.communicate()
+
+
+def answers(cache: Path) -> Iterator[object]:
+    """What the parent asks for: which detectors and effects there are; what pictures took and showed."""
+    import cv2
+    from selfdrive.common import compiled
+    from selfdrive.sim import effects, vision
+
+    cv2.setNumThreads(1)
+    compiled.use(cache)
+    cases: dict[tuple[str, str], Drive] = {}
+    for line in sys.stdin:
+        kind, *words = json.loads(line)
+        if kind == "has":
+            yield (
+                vision.DETECTORS,
+                [k for k, made in EFFECTS.items() if not made or hasattr(effects, made[0])],
+            )
+        else:
+            detector, effect, count = words
+            case = cases.get((detector, effect)) or Drive(detector, effect, cache)
+            yield cases.setdefault((detector, effect), case).pictures(count)
+
+
+class Drive:
+    """A car that goes on, never on the same way, and takes pictures with an effect."""
+
+    def __init__(self, detector: str, effect: str, cache: Path) -> None:
+        from selfdrive.sim import effects, vision
+        from selfdrive.sim.road import Road
+
+        coded = detector == "as_coded"
+        move = "as_coded" if coded else vision.GROUND
+        pictures = vision.Pictures(detector=detector, cache=cache, translation=move)
+        self._seen = vision.build_vision(pictures, Road(None, None), 0)
+        self._offset = 0.1 * list(EFFECTS).index(effect)  # cases share no poses
+        self._number = 0
+        self._effect = None
+        if EFFECTS[effect]:
+            name, amount = EFFECTS[effect]
+            self._effect = getattr(effects, name)(amount, 1, self._seen.model).ready()
+
+    def pictures(self, count: int) -> tuple[list[float], str]:
+        """CPU time (ms) of so many, and a digest of their lines."""
+        times, lines = [], sha256()
+        for _ in range(count):
+            truth = self._truth()
+            began = process_time()
+            view = self._seen.camera.look(truth)
+            if self._effect:
+                view = view._replace(picture=self._effect.apply(view.picture, truth))
+            found = self._seen.detector.detect(view)
+            times.append(1000.0 * (process_time() - began))
+            lines.update(repr([tuple(line[:3]) for line in found]).encode())
+        return times, lines.hexdigest()
+
+    def _truth(self):
+        from selfdrive.sim.truth import GroundTruth
+
+        k = self._number = self._number + 1
+        place = {"t": 2.0 + 0.05 * k, "v_ego": 26.82, "position": 1.341 * k}
+        pose = {"lateral_offset": 0.4 * sin(0.071 * k + self._offset), "heading": 0.01 * sin(0.113 * k)}
+        others = dict.fromkeys(GroundTruth._fields, 0.0)
+        return GroundTruth(**others | place | pose)
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("clone", type=Path, nargs="?", help="checkout of the older commit")
+    parser.add_argument("--take", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--detectors", nargs="+", metavar="NAME", help="only these")
+    parser.add_argument("--effects", nargs="+", choices=EFFECTS, default=list(EFFECTS), metavar="NAME")
+    parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--count", type=int, default=20, help="pictures of a round")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    if options.take:
+        for answer in answers(options.take):
+            print(json.dumps(answer), flush=True)
+        return 0
+    if options.clone is None:
+        parser.error("CLONE is missing")
+    figures = {}
+    with ExitStack() as stack:
+        versions = []
+        for clone in (options.clone.resolve(), ROOT):
+            versions.append(Version(clone, Path(stack.enter_context(TemporaryDirectory()))))
+            stack.callback(versions[-1].end)
+        older, this = versions
+        for detector in options.detectors or [name for name in this.detectors if name in older.detectors]:
+            for effect in [name for name in options.effects if name in older.effects]:
+                figures[f"{detector}, {effect}"] = _compared(versions, detector, effect, options)
+    if options.json:
+        options.json.write_text(json.dumps({"unit": "ms", "pictures": figures}, indent=1) + "\n")
+    return 0
+
+
+def _compared(versions: list[Version], detector: str, effect: str, options: argparse.Namespace) -> list:
+    """Times of the older version and of this one, in turn; a line of the table."""
+    times: list[list[float]] = [[], []]
+    same = True
+    for number in range(options.rounds + 1):
+        lines = set()
+        for which in (0, 1) if number % 2 else (1, 0):
+            took, digest = versions[which].ask("pictures", detector, effect, options.count)
+            times[which] += took if number else []  # the first round warms up
+            lines.add(digest)
+        same &= len(lines) == 1
+    older, this = map(median, times)
+    told = "" if same else "  other lines"
+    print(
+        f"{detector:10}{effect:16}{older:8.2f} ms, now {this:8.2f} ms: ratio {this / older:.2f}{told}",
+        flush=True,
+    )
+    return times
+
+
+if __name__ == "__main__":
+    sys.exit(main())
