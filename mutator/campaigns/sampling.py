@@ -3,9 +3,10 @@
 import random
 from collections import Counter, defaultdict, deque
 from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import replace
 
 from mutator._common.hashing import digest
-from mutator.model import Experiment
+from mutator.model import AfterHazard, Experiment
 
 _Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigger
 
@@ -40,7 +41,7 @@ def _pick(
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
-    for unit in sorted(units, key=lambda unit: digest([seed, unit[0].id])):
+    for unit in sorted(units, key=lambda unit: digest([seed, _whole(unit[0]).id])):
         cell = _cell(unit)
         cells[cell[0]].setdefault(cell, deque()).append(unit)
     taken: Counter[Hashable] = Counter()
@@ -56,6 +57,12 @@ def _pick(
         if not cells[variant]:
             del cells[variant]
     return tuple(e for e in experiments if e.id in chosen)
+
+
+def _whole(experiment: Experiment) -> Experiment:
+    """The experiment as one that goes on, so that a campaign which stops its runs draws the same ones."""
+    goes_on = experiment.after_hazard is AfterHazard.GO_ON
+    return experiment if goes_on else replace(experiment, after_hazard=AfterHazard.GO_ON)
 
 
 def _cell(unit: Sequence[Experiment]) -> _Cell:

@@ -34,6 +34,8 @@ def show_counts(terminal: Terminal, run: "Run") -> None:
     with suppress(MutatorError):  # without a library nobody knows which alerts count
         if note := run.alerts_note():
             terminal.say(note)
+    if run.folder.stop_note:
+        terminal.say(run.folder.stop_note)
     terminal.say(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 

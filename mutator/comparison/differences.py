@@ -90,6 +90,10 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
         ("hold otherwise, or wait for another time", lambda p: _hold(p.a) != _hold(p.b)),
         ("drive a scenario with another text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
         ("have another seed", lambda p: p.a.seed != p.b.seed),
+        (
+            "end at their first terminal hazard in one run alone, which did not see what came after it",
+            lambda p: p.a.after_hazard != p.b.after_hazard,
+        ),
     )
     old = (side for side in (a, b) if not side.folder.verifiable)
     counts = ((_count(matching.pairs, differs), what) for what, differs in told)

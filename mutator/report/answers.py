@@ -40,7 +40,7 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
     if (frame["outcome"] == "hazard").any():
         made.append(first_to_fix(frame, run.paths, has_alerts=has_alerts))
     if has_alerts:
-        made.append(unwarned(frame))
+        made.append(unwarned(frame, run.folder.stop_note))
     made.append(survived(frame))
     timings = run.folder.timings()
     if timings:
@@ -69,8 +69,9 @@ def _warned(row: Row) -> str:
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"
 
 
-def unwarned(frame: pd.DataFrame) -> Answer:
-    """Hazards before which no alert came: none at all, or only one afterwards."""
+def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
+    """Hazards before which no alert came: none at all, or only one afterwards. The `note` says what was not
+    seen of them."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
@@ -81,6 +82,7 @@ def unwarned(frame: pd.DataFrame) -> Answer:
         if never or late
         else "."
     )
+    says += f" {note}" if note else ""
     kinds = by_kind(silent, hazards)
     lines = [
         (

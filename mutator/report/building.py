@@ -101,11 +101,9 @@ def _planned(folder: RunFolder) -> str:
     text = f"{experiments} experiments are planned"
     if folder.shard:
         text += f", {folder.planned} of them for this shard {folder.shard}"
-    if runs is None:  # planned before runs were shared
-        return f"{text}."
     if runs == experiments:
-        return f"{text}; each is a run of its own."
-    return (
-        f"{text}, as {runs} runs: where a fault makes several scenarios the same run, it is driven once "
-        "and counted in each."
-    )
+        text += "; each is a run of its own"
+    elif runs is not None:  # not planned before runs were shared
+        text += f", as {runs} runs: where a fault makes several scenarios the same run, it is driven once "
+        text += "and counted in each"
+    return " ".join(filter(None, (f"{text}.", folder.stop_note)))

@@ -34,7 +34,7 @@ from typing import Any
 from mutator._common.files import check_is_text
 from mutator._common.hashing import plain
 from mutator.errors import MutatorError
-from mutator.model import Experiment, Limits, Record
+from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
 from mutator.store.lines import read_segment
 from mutator.store.patches import Patches
@@ -44,6 +44,7 @@ from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
 
+STOP_NOTE = "Runs end at their first terminal hazard: hazards and alerts after it were not seen."
 SERIES_MB = 500  # of a run, unless it was planned with another number
 _LOOKS = 3  # at a folder whose owner writes while it is looked at
 SCRATCH = "work"
@@ -204,6 +205,12 @@ class RunFolder:
     def has_alerts(self) -> bool:
         """Whether the target has alerts; of an old folder that is not known, and taken for granted."""
         return bool(self.head.get("alerts", True))
+
+    @property
+    def stop_note(self) -> str:
+        """What to know of runs that end at their first terminal hazard; empty where they go on."""
+        stops = self.head.get("canary", {}).get("after_hazard") == AfterHazard.STOP
+        return STOP_NOTE if stops else ""
 
     def golden(self, scenario: str, changes: tuple[str, ...] = ()) -> Path:
         """Folder with trace and record of the fault-free run."""

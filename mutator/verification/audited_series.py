@@ -52,7 +52,7 @@ def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
         try:
             there.chunk(name)
         except MutatorError as err:
-            ids = _users(index, name)
+            ids = [one for one in _users(index, name) if not there.kept(one).is_file()]
             more = f" and {len(ids) - 1} more" if len(ids) > 1 else ""
             got = f"{err.got}; the series of {ids[0]}{more} cannot be read" if ids else err.got
             yield _told(err, got, putting_aside(run))

@@ -66,7 +66,8 @@ _HTML = """\
 
 def notes(folder: RunFolder) -> str:
     """What the heads of the counts mean."""
-    return NOTES + (NO_ALERT if folder.has_alerts else "")
+    note = f" {folder.stop_note}" if folder.stop_note else ""
+    return NOTES + (NO_ALERT + note if folder.has_alerts else "")
 
 
 def tables_panel(run: ReportedRun) -> Panel:

@@ -2,11 +2,12 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
 from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs, spread
-from mutator.model import Experiment, Method
+from mutator.model import AfterHazard, Experiment, Method
 
 SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
 
@@ -49,6 +50,16 @@ def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> 
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
     assert pick(many, 10, seed=2) != picked
+
+
+@pytest.mark.parametrize("draw", [pick, pick_pairs])
+def test_runs_that_stop_are_a_sample_of_the_same_faults(
+    many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
+) -> None:
+    """A campaign that ends its runs at a hazard can be compared with one that does not: it draws the same."""
+    stopping = [replace(experiment, after_hazard=AfterHazard.STOP) for experiment in many]
+    picked = [many.index(e) for e in draw(many, 11, seed=1)]
+    assert [stopping.index(e) for e in draw(stopping, 11, seed=1)] == picked
 
 
 def test_more_than_there_is_is_all(many: list[Experiment]) -> None:

@@ -13,10 +13,10 @@ import pytest
 
 from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Gate, compare, findings
-from mutator.comparison.differences import facts
+from mutator.comparison.differences import facts, remarks
 from mutator.comparison.sides import read_side
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Experiment, Outcome, Status
+from mutator.model import AfterHazard, Experiment, Outcome, Status
 from mutator.store.run_head import HEAD
 from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
@@ -61,6 +61,14 @@ def test_what_differs_is_told(found: Comparison) -> None:
     assert [fact.name for fact in found.facts if fact.differs] == ["digest of target"]
     assert pages.files_text(found) == "Files of the target changed: toycar/driver.py."
     assert found.remarks == ()
+
+
+def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
+    """An alert that one run alone waited for is not lost: that its partner ended earlier is remarked."""
+    first, *rest = found.pairs
+    stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
+    (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
+    assert remark.startswith(f"1 of {len(found.pairs)} pairs end at their first terminal hazard in one run")
 
 
 def test_a_run_planned_before_files_were_written_down(

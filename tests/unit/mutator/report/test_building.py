@@ -16,6 +16,7 @@ from mutator.figures.style import themed
 from mutator.report import building
 from mutator.report.panels import failed
 from mutator.review import gate
+from mutator.store.run_folder import STOP_NOTE
 from mutator.workspace import Workspace
 
 from .made_run import COLUMNS, HEAD, OK, PATCH, Page, make_run
@@ -141,6 +142,18 @@ def test_experiments_and_runs_are_told_apart(run: Path) -> None:
     assert "3 experiments are planned, as 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
+
+
+def test_what_runs_that_stop_have_not_seen_is_told(run: Path) -> None:
+    """A hazard that no alert followed may be one whose run ended before: the summary, the answer on
+    warnings and the heads of the tables say so, and say nothing of it where runs go on."""
+    assert STOP_NOTE not in building.write(run, None).markdown.read_text()
+    stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
+    (run / "run.json").write_text(json.dumps(HEAD | stops))
+    written = building.write(run, None)
+    assert written.markdown.read_text().count(STOP_NOTE) == 3
+    assert f"counted in each. {STOP_NOTE}" in written.markdown.read_text()
+    assert STOP_NOTE in written.page.read_text()
 
 
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:
