@@ -15,13 +15,15 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
-from mutator._common.files import write_json
+from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
+from mutator.store.check_results import FILE
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder, golden_key
@@ -70,15 +72,16 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     """Have the cache believe that the checks of this plan passed."""
     looked_at = preflight._Checks(workspace, folder)
     goldens = {}
-    for key in looked_at.keys:
-        out = folder.golden(*key)
+    for scenario, changes in looked_at.keys:
+        key = golden_key(scenario, changes)
+        out = looked_at.kept / "golden" / key
         out.mkdir(parents=True)
-        for name in (looked_at.manifest.trace_file, looked_at.manifest.record_file):
+        for name in looked_at.manifest.outputs:
             (out / name).write_bytes(bytes(500_000))
-        goldens[golden_key(*key)] = preflight_rules.digest_of(looked_at.manifest, out)
-    said = {"schema": preflight.SCHEMA, "digest": looked_at.digest, "results": []}
-    write_json(folder.path / preflight.FILE, said | {"goldens": goldens, "run_cpu_s": 1.0})
-    preflight_cache.store(preflight_cache.entry(looked_at.digest), folder.path, preflight.FILE)
+        goldens[key] = preflight_rules.digest_of(looked_at.manifest, out)
+    said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
+    looked_at._install(json_bytes(said | {"run_cpu_s": 1.0}))
+    preflight_cache.store(preflight_cache.entry(looked_at.digest), folder.path, FILE, looked_at.kept)
 
 
 def until_the_first_run(workspace: Workspace, out: Path) -> float:

@@ -38,6 +38,7 @@ from mutator.report.page import Content
 from mutator.report.panels.answers import answers_panel
 from mutator.report.panels.paths import paths_panel
 from mutator.report.studies import ReportedRun
+from mutator.report.words import words_of
 from mutator.review.groups import shapes
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
@@ -51,8 +52,14 @@ ROOT = Path(__file__).resolve().parents[1]
 SIZES = (1_000, 11_280, 100_000)
 GOAL_SIZE, GOAL_MS, GOAL_KB = 11_280, 1_000.0, 8_000.0
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-FLAGS = ("--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
-FLAGS += ("--disable-component-update", "--disable-sync")
+FLAGS = (
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
 WATCH = """new MutationObserver(() => {
     if (document.documentElement?.dataset.ready) window.readyAt ??= performance.now();
 }).observe(document, {attributes: true, subtree: true, attributeFilter: ["data-ready"]})"""
@@ -155,7 +162,7 @@ def write(size: int, out: Path) -> dict[str, float]:
         alarm="",
         outcomes=outcome_counts(rows),
         planned="",
-        notes="",
+        words=words_of(run),
         study="",
         answers=answers_panel(run),
         panels=[panel for panel in (paths_panel(run),) if panel],
@@ -165,8 +172,8 @@ def write(size: int, out: Path) -> dict[str, float]:
     (out / "report").mkdir()
     (out / "report" / "index.html").write_text(page)
     sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "paths_kb": ways}
-    found = {name: len(text.encode()) / 1000 for name, text in sizes.items()}
-    return {"table_s": table_s} | found | {"index_kb": index_kb}
+    kb = {name: len(text.encode()) / 1000 for name, text in sizes.items()}
+    return {"table_s": table_s, **kb, "index_kb": index_kb}
 
 
 def opened(browser: Any, page_file: Path, repeat: int) -> dict[str, float]:

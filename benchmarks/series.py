@@ -20,10 +20,12 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.campaigns.plans import Choices  # noqa: E402
-from mutator.execution import runner, worker  # noqa: E402
+from mutator.execution import runner  # noqa: E402
 from mutator.execution.running import run_campaign  # noqa: E402
+from mutator.store.patches import PatchWriter  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
 from mutator.store.series import SeriesFolder  # noqa: E402
+from mutator.store.series_packing import SeriesWriter  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 PAPER, GOAL_BYTES, GOAL_SHARE, GOAL_MB = 11_280, 6_000, 0.01, 150
@@ -54,8 +56,8 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
     """Run the experiments; shares of CPU, and bytes."""
     made, series, patches = Clock(), Clock(), Clock()
     made.on(runner.Runner, "_series")
-    series.on(worker.SeriesWriter, "append")
-    patches.on(worker.PatchWriter, "append")
+    series.on(SeriesWriter, "append")
+    patches.on(PatchWriter, "append")
     workspace = Workspace.find(root=ROOT)
     summary = run_campaign(workspace, campaign, out, choices=Choices(limit=count))
     folder = RunFolder.open(out)
