@@ -3,12 +3,31 @@
 Until then a mutant's run is the golden run, so its probe observes the same values, double for double.
 """
 
+import ast
+import math
 from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from types import CodeType
+from functools import cached_property, lru_cache, reduce
+from typing import Any
 
-from mutator.mutants.probe import decision
+import numpy as np
+
+from mutator.mutants.probe import decision_in
+
+_COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
+    ast.Lt: np.less,
+    ast.LtE: np.less_equal,
+    ast.Gt: np.greater,
+    ast.GtE: np.greater_equal,
+    ast.Eq: np.equal,
+    ast.NotEq: np.not_equal,
+}
+_ARITHMETIC: Mapping[type[ast.operator], np.ufunc] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # looked up by identity: there are thousands
@@ -22,6 +41,11 @@ class Observed:
     values: tuple[tuple[float, ...], ...]
     before: tuple[int, ...]
     libraries: tuple[str, ...] = ()
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """`values`, a row for time and for each observed value."""
+        return np.array(self.values, dtype=float).T
 
     def step_of(self, observation: int) -> int:
         """The step in which that observation was made; none is made before the first step."""
@@ -41,24 +65,93 @@ class Start:
     t: float | None
 
 
-def first_active(probe: CodeType, seen: Observed) -> Start | None:
-    """Where a mutant with this probe must leave the golden run; None when its trigger never holds."""
-    return _first_active(_without_texts(probe), seen)
+def first_active(own: str, seen: Observed) -> Start | None:
+    """Where a mutant must leave the golden run; None when its trigger never holds.
 
-
-def _without_texts(probe: CodeType) -> CodeType:
-    """Equal for probes that differ only in their ids, or in what they do once they are active."""
-    return probe.replace(co_consts=tuple("" if isinstance(c, str) else c for c in probe.co_consts))
+    `own` is the source of what is its probe's own (`probe.parts_of`).
+    """
+    return _first_active(*decision_in(own), seen)
 
 
 @lru_cache(maxsize=64)  # faults share their triggers: contexts of the hazard analysis
-def _first_active(probe: CodeType, seen: Observed) -> Start | None:
-    armed_t, holds = decision(probe)
-    for number, values in enumerate(seen.values):
-        if values[0] >= armed_t and holds(*values):
-            step = seen.step_of(number)
-            done = seen.before[step]
-            times = [t for t, *_ in seen.values[:done]]  # a run that starts again does so no later
-            last = times[-1] if done else None
-            return Start(step=step, observed=done, began=min(times, default=None), t=last)
-    return None
+def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | None:
+    if not seen.values:
+        return None
+    (function,) = ast.parse(condition).body
+    assert isinstance(function, ast.FunctionDef)
+    names = [argument.arg for argument in function.args.args]
+    at = np.flatnonzero(
+        (seen.columns[0] >= armed_t) & _holds(function, dict(zip(names, seen.columns, strict=True)))
+    )
+    if not at.size:
+        return None
+    step = seen.step_of(int(at[0]))
+    done = seen.before[step]
+    times = seen.columns[0, :done].tolist()  # a run that starts again does so no later
+    last = times[-1] if done else None
+    return Start(step=step, observed=done, began=min(times, default=None), t=last)
+
+
+def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
+    """What a probe's condition says of each observation: of doubles, numpy's arithmetic is Python's."""
+    with np.errstate(all="ignore"):
+        for node in function.body:
+            if isinstance(node, ast.Assign):
+                assert isinstance(node.targets[0], ast.Name)
+                values[node.targets[0].id] = _value(node.value, values)
+            elif isinstance(node, ast.Return) and node.value is not None:
+                return _value(node.value, values)
+    raise AssertionError(ast.unparse(function))
+
+
+def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
+    """What an expression of `conditions.to_code` gives: an array, or one value for all observations."""
+
+    def of(node: ast.expr) -> Any:
+        return _value(node, values)
+
+    match node:
+        case ast.Constant():
+            return np.bool_(node.value) if isinstance(node.value, bool) else np.float64(node.value)  # type: ignore[arg-type]
+        case ast.Name():
+            return values[node.id]
+        case ast.Attribute():
+            return np.float64(np.inf)
+        case ast.BoolOp():
+            return reduce(
+                np.logical_and if isinstance(node.op, ast.And) else np.logical_or, map(of, node.values)
+            )
+        case ast.UnaryOp():
+            return np.logical_not(of(node.operand)) if isinstance(node.op, ast.Not) else -of(node.operand)
+        case ast.Compare():
+            terms = [of(part) for part in (node.left, *node.comparators)]
+            return reduce(np.logical_and, map(_compared, node.ops, terms[:-1], terms[1:]))
+        case ast.IfExp():
+            return np.where(of(node.test), of(node.body), of(node.orelse))
+        case ast.BinOp():
+            return _ARITHMETIC[type(node.op)](of(node.left), of(node.right))
+        case ast.Call():
+            return _FUNCTIONS[ast.unparse(node.func)](*map(of, node.args))
+    raise AssertionError(ast.unparse(node))
+
+
+def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
+    return _COMPARE[type(operator)](one, other)
+
+
+def _least(*terms: Any) -> Any:
+    """As `min` has it, NaN or not."""
+    return reduce(lambda least, term: np.where(term < least, term, least), terms)
+
+
+def _greatest(*terms: Any) -> Any:
+    return reduce(lambda greatest, term: np.where(term > greatest, term, greatest), terms)
+
+
+_FUNCTIONS: Mapping[str, Any] = {
+    "abs": np.abs,
+    "min": _least,
+    "max": _greatest,
+    "math.hypot": np.vectorize(math.hypot, otypes=[float]),  # numpy's is another one in the last bit
+    "_div": np.divide,
+}

@@ -10,6 +10,7 @@ import marshal
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +124,7 @@ class ForkEngine:
         seen = self._observed(job, job.golden)
         if job.stop and job.golden_ends:  # maybe before the fault is first active: there is no fork of that
             return self._from_the_start(job, folder, swap)
-        start = first_active(swap.probe, seen)
+        start = first_active(swap.own, seen)
         if start is None:
             return _golden(job, job.golden)
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
@@ -147,8 +148,9 @@ class ForkEngine:
 
     def _at(self, job: Job, step: int, swap: CodeSwap) -> Waiting:
         pool = self._running()
-        golden = Golden(key=_key(job), arguments=self._arguments(job, pool.home))
-        seen = self._seen.get(_key(job))
+        key = _key(job)
+        golden = Golden(key=key, arguments=lambda: self._arguments(job, pool.home))
+        seen = self._seen.get(key)
         libraries = seen.libraries if isinstance(seen, Observed) else ()
         return pool.before(step, golden, [*libraries, *_needed(swap)], self._patience_s)
 
@@ -172,7 +174,7 @@ class ForkEngine:
             "log": str(folder / "log"),
             "report": str(folder / "report.json"),
             "inactive": str(inactive(folder)),
-            "args": self._arguments(job, self._running().home if watch else out),  # begun as waiting ones are
+            "args": None,
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
             "disk_mb": self._limits.disk_mb,
@@ -184,6 +186,8 @@ class ForkEngine:
             "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
+        if waiting.key is None:  # it is to begin the run; if it is watched, as waiting ones are begun
+            request["args"] = self._arguments(job, self._running().home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
         said, _ = waiting.ask(asked, self._patience_s)
@@ -289,7 +293,12 @@ def _needed(swap: CodeSwap) -> list[str]:
 
 
 def _key(job: Job) -> _Key:
-    return (str(job.scenario.resolve()), job.seed, job.changes)
+    return (_resolved(job.scenario), job.seed, job.changes)
+
+
+@cache
+def _resolved(scenario: Path) -> str:
+    return str(scenario.resolve())
 
 
 def _golden(job: Job, golden: Path) -> Execution:

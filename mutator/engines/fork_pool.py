@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,10 +47,11 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
-    """A golden run: the same key for the same run, and the entry module's arguments that begin it."""
+    """A golden run: the same key for the same run, and what gives the entry module's arguments that begin
+    it."""
 
     key: Hashable
-    arguments: list[str]
+    arguments: Callable[[], list[str]]
 
 
 class Waiting:
@@ -172,7 +173,7 @@ class Pool:
         mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
         if not mine:
             self.first.load(modules, patience_s)
-            mine = [self._branch(self.first, golden.key, 0, patience_s, golden.arguments)]
+            mine = [self._branch(self.first, golden.key, 0, patience_s, golden.arguments())]
         best = max(mine, key=lambda waiting: waiting.step)
         best.load(modules, patience_s)
         if 0 < best.step < step <= best.step + _NEAR:

@@ -24,6 +24,7 @@ OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the 
 # in quotes, in a name or in a tag: a number of eight digits is none
 INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
 
+_TINY = 1e-9  # s, the probe's
 _MARK = "# fi:"
 _TAG = rf"{_MARK}([0-9a-z]+)(?: guard:(\d+))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
@@ -42,6 +43,12 @@ _SETTING = re.compile(
     r"|^\+def _condition\(.*\n(?:\+    \w+ = .*\n)*\+    return (?P<condition>.+)$",
     re.MULTILINE,
 )
+
+# what differs from probe to probe: its docstring, its settings, its condition
+_OWN = re.compile(
+    r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^(?=_TINY)|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
+)
+_ARMED = re.compile(r"^ARMED_AFTER_S = (.+)$", re.MULTILINE)
 
 
 def probe_path(package: str | None) -> str:
@@ -187,6 +194,19 @@ def _end_of_settings(patch: str, begin: int, end: int) -> int:
 # A probe at work
 
 
+def parts_of(probe: str) -> tuple[str, str]:
+    """A probe's source in two: what is its own, and what the probes of a target have in common. Each has
+    empty lines in place of the other, and one after the other they do what the whole does.
+    """
+    own, common, at = [], [], 0
+    for found in _OWN.finditer(probe):
+        between = probe[at : found.start()]
+        own += ["\n" * between.count("\n"), found[0]]
+        common += [between, "\n" * found[0].count("\n")]
+        at = found.end()
+    return ("".join(own), "".join([*common, probe[at:]])) if at else (probe, "")
+
+
 def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
     """The time (s) from which a probe is armed, and its condition, to be called with what it observes.
 
@@ -196,6 +216,13 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
     module: dict[str, Any] = {"__name__": PROBE_NAME}
     exec(probe, module)
     return module["ARMED_AFTER_S"] - module["_TINY"], module["_condition"]
+
+
+def decision_in(own: str) -> tuple[float, str]:
+    """The same, from the source of what is a probe's own: the condition is the source of its function."""
+    armed = _ARMED.search(own)
+    assert armed is not None
+    return float(armed[1]) - _TINY, own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:

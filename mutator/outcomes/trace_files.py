@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mutator._common.files import no_pipe
+from mutator.outcomes import npz
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
@@ -66,6 +67,9 @@ def _empty(values: np.ndarray) -> np.ndarray:
 
 
 def _read_npz(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
+    members = npz.members(no_pipe(path).read_bytes())
+    if members is not None:
+        return {name: members[name] for name in _wanted(members, names, may_miss)}
     loaded = np.load(no_pipe(path), allow_pickle=False)
     if not isinstance(loaded, np.lib.npyio.NpzFile):
         raise BadTrace("an array alone", "an .npz file")

@@ -112,8 +112,9 @@ def _refuse(
     return MutatorError(f"{what} in {text!r}", expected=_ALLOWED + known, remedy=remedy)
 
 
+@lru_cache(maxsize=1024)  # those of a manifest are asked for again with each run that is judged
 def parse(text: str) -> ast.expr:
-    """The tree of a condition or formula; MutatorError for what is no expression."""
+    """The tree of a condition or formula, to be read only; MutatorError for what is no expression."""
     if len(text) > _MAX_LENGTH:
         raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MAX_LENGTH}")
     try:

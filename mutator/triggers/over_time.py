@@ -2,6 +2,8 @@
 
 import ast
 from collections.abc import Mapping
+from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -27,59 +29,67 @@ _OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maximum}
 
 def holds(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """Whether a checked condition holds, for each step; `values` has the variables, time (s) among them."""
-    return _Evaluation(values).boolean(parse(condition))
+    with np.errstate(all="ignore"):
+        return _for_each_step(_Evaluation(values).boolean(parse(condition)), values)
 
 
 def numbers(formula: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """What a checked formula gives, for each step. Division by 0 is infinite or NaN, as the probe has it."""
-    return _Evaluation(values).number(parse(formula))
+    with np.errstate(all="ignore"):
+        return _for_each_step(_Evaluation(values).number(parse(formula)), values)
+
+
+def _for_each_step(found: Any, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    """An array, also of what is the same in every step."""
+    shape = values[TIME].shape
+    return found if np.shape(found) == shape else np.full(shape, found)
 
 
 class _Evaluation:
-    """Walks a checked expression; everything in it is an array with a value for each step."""
+    """Walks a checked expression; everything in it is an array with a value for each step, or one value for
+    all of them."""
 
     def __init__(self, values: Mapping[str, np.ndarray]) -> None:
         self._values = values
         self._time = values[TIME]
 
-    def boolean(self, node: ast.expr) -> np.ndarray:
+    def boolean(self, node: ast.expr) -> Any:
         if isinstance(node, ast.Constant):
-            return np.full(self._time.shape, bool(node.value))
+            return np.bool_(node.value)
         if isinstance(node, ast.BoolOp):
             both = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
-            return np.asarray(both.reduce([self.boolean(value) for value in node.values]))
+            return reduce(both, map(self.boolean, node.values))
         if isinstance(node, ast.UnaryOp):
-            return np.asarray(np.logical_not(self.boolean(node.operand)))
+            return np.logical_not(self.boolean(node.operand))
         if isinstance(node, ast.Call):  # ever
-            return np.asarray(np.logical_or.accumulate(self.boolean(node.args[0])))
+            held = _for_each_step(self.boolean(node.args[0]), self._values)
+            return np.logical_or.accumulate(held)
         assert isinstance(node, ast.Compare)
         terms = [self.number(part) for part in (node.left, *node.comparators)]
         found = [_COMPARE[type(op)](*terms[i : i + 2]) for i, op in enumerate(node.ops)]
-        return np.asarray(np.logical_and.reduce(found))
+        return reduce(np.logical_and, found)
 
-    def number(self, node: ast.expr) -> np.ndarray:
-        with np.errstate(all="ignore"):
-            return self._number(node)
-
-    def _number(self, node: ast.expr) -> np.ndarray:
+    def number(self, node: ast.expr) -> Any:
         if isinstance(node, ast.Constant):
-            return np.full(self._time.shape, float(node.value))  # type: ignore[arg-type]
+            return np.float64(node.value)  # type: ignore[arg-type]
         if isinstance(node, ast.Name):
-            return np.full(self._time.shape, np.inf) if node.id == "inf" else self._values[node.id]
+            return np.float64(np.inf) if node.id == "inf" else self._values[node.id]
         if isinstance(node, ast.UnaryOp):
             operand = self.number(node.operand)
             return -operand if isinstance(node.op, ast.USub) else operand
         if isinstance(node, ast.BinOp):
-            return np.asarray(_ARITHMETIC[type(node.op)](self.number(node.left), self.number(node.right)))
+            return _ARITHMETIC[type(node.op)](self.number(node.left), self.number(node.right))
         if isinstance(node, ast.IfExp):
             return np.where(self.boolean(node.test), self.number(node.body), self.number(node.orelse))
         assert isinstance(node, ast.Call)
-        return self._call(ast.unparse(node.func), [self.number(argument) for argument in node.args])
+        return self._call(node, [self.number(argument) for argument in node.args])
 
-    def _call(self, name: str, arguments: list[np.ndarray]) -> np.ndarray:
+    def _call(self, node: ast.Call, arguments: list[Any]) -> Any:
+        assert isinstance(node.func, ast.Name)
+        name = node.func.id
         if name in _OF_MANY:
-            return np.asarray(_OF_MANY[name].reduce(arguments))
+            return reduce(_OF_MANY[name], arguments)
         if name == "rate":
-            (values,) = arguments
+            values = _for_each_step(arguments[0], self._values)
             return np.concatenate(([np.nan], np.diff(values) / np.diff(self._time)))[: len(values)]
-        return np.asarray(_FUNCTIONS[name](*arguments))
+        return _FUNCTIONS[name](*arguments)

@@ -17,13 +17,14 @@ class SwapRefused(Exception):
     """The loaded program is not the one that the swap was made for."""
 
 
-def install(name: str, code: types.CodeType) -> Any:
-    """The probe module `name` (dotted), loaded as an import would load it."""
+def install(name: str, parts: Sequence[types.CodeType]) -> Any:
+    """The probe module `name` (dotted), its code in parts, loaded as an import would load it."""
     package, _, own = name.rpartition(".")
     module = types.ModuleType(name)
-    module.__file__, module.__package__ = code.co_filename, package
+    module.__file__, module.__package__ = parts[0].co_filename, package
     sys.modules[name] = module
-    exec(code, vars(module))
+    for code in parts:
+        exec(code, vars(module))
     if package:
         setattr(sys.modules[package], own, module)
     return module

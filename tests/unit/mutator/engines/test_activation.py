@@ -2,27 +2,24 @@
 
 import math
 import random
-import types
 
 import pytest
 
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants.building import build
-from mutator.mutants.probe import probe_path, state_after
+from mutator.mutants.probe import parts_of, probe_path, state_after
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
 
 @pytest.fixture
 def probe(toycar: Workspace):
-    """The code of the null mutant's probe with a trigger."""
+    """The source of the null mutant's probe with a trigger."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
-    def make(trigger: Trigger) -> types.CodeType:
-        return compile(
-            build(manifest, models, None, trigger).files[probe_path(manifest.package)], "_fi", "exec"
-        )
+    def make(trigger: Trigger) -> str:
+        return build(manifest, models, None, trigger).files[probe_path(manifest.package)].decode()
 
     return make
 
@@ -31,6 +28,10 @@ GAPS = (50.0, 40.0, 30.0, 20.0, 30.0, 40.0)
 SEEN = Observed(
     values=tuple((0.05 * i, gap, 10.0, 10.0) for i, gap in enumerate(GAPS)), before=(0, 1, 2, 3, 4, 5)
 )
+
+
+def start_of(probe: str, seen: Observed) -> Start | None:
+    return first_active(parts_of(probe)[0], seen)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +49,7 @@ SEEN = Observed(
 )
 def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
     """The step is the one in which the probe itself first says active; none when it never does."""
-    start = first_active(probe(trigger), SEEN)
+    start = start_of(probe(trigger), SEEN)
     assert (start.step if start else None) == step
     if start:
         assert start.observed == step
@@ -64,14 +65,23 @@ def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
         "hwt < 1.5",
         "rs > 2.0 and d_rel / v_lead < 3.0",
         "d_rel < 0.0 or hwt > 9.0",
+        "not (d_rel > 5.0 or rs <= -3.0)",
+        "min(d_rel, v_ego, rs) < 0.0 < max(hwt, v_lead)",
+        "hypot(d_rel, v_ego) == hypot(v_ego, d_rel) and d_rel / v_ego > d_rel / v_lead",
+        "abs(rs) * 0.1 + t - 1.0 >= 3.0",
+        "True",
     ],
 )
 def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: float, hold: Hold) -> None:
-    """For whatever a car does, standing still among it, the step is the first that `observe` calls active."""
+    """Whatever is observed, standstill and what is no number among it, the step is the first that `observe`
+    calls active."""
     draw = random.Random(condition)
     code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
     for _ in range(10):
-        truth = [tuple(draw.choice((0.0, draw.uniform(0, 40))) for _ in range(3)) for _ in range(40)]
+        truth = [
+            tuple(draw.choice((0.0, math.inf, math.nan, draw.uniform(0, 40))) for _ in range(3))
+            for _ in range(40)
+        ]
         values = tuple((0.05 * i, *others) for i, others in enumerate(truth))
         module: dict = {}
         exec(code, module)
@@ -79,14 +89,30 @@ def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: f
         for one in values:
             module["observe"](*one)
             active.append(module["_run"].active)
-        start = first_active(code, Observed(values=values, before=tuple(range(40))))
+        start = start_of(code, Observed(values=values, before=tuple(range(40))))
         assert (start.step if start else None) == (active.index(True) if True in active else None)
+
+
+def test_the_parts_of_a_probe_do_what_it_does(probe) -> None:
+    """What is a probe's own and what is not, run one after the other, are the probe, on the same lines."""
+    trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
+    whole, parts = {}, {}
+    exec(compile(probe(trigger), "_fi", "exec"), whole)
+    for part in parts_of(probe(trigger)):
+        exec(compile(part, "_fi", "exec"), parts)
+    assert parts.keys() == whole.keys()
+    for name, thing in whole.items():
+        if hasattr(thing, "__code__"):
+            assert parts[name].__code__ == thing.__code__
+        elif isinstance(thing, str | float | list):
+            assert parts[name] == thing
+    assert parts_of(probe(trigger))[1] == parts_of(probe(always()))[1]
 
 
 def test_several_observations_in_a_step(probe) -> None:
     """A step may observe never or often; a mutant leaves the golden run before the step that observes."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
-    starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
+    starts = [start_of(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
     assert starts[4] == Start(step=3, observed=3, began=SEEN.values[0][0], t=SEEN.values[2][0])
 
@@ -94,7 +120,7 @@ def test_several_observations_in_a_step(probe) -> None:
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
 def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigger) -> None:
     """A probe that is given the state after some observations equals one that made them all."""
-    start = first_active(probe(trigger), SEEN)
+    start = start_of(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}
     for module in (saw, given):
@@ -115,7 +141,5 @@ def test_probes_of_one_trigger_are_asked_once(probe) -> None:
     """Mutants that differ in their ids share the answer; what holds later has an answer of its own."""
     one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
     assert one != other
-    assert first_active(one, SEEN) is first_active(other, SEEN)
-    assert first_active(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != first_active(
-        one, SEEN
-    )
+    assert start_of(one, SEEN) is start_of(other, SEEN)
+    assert start_of(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != start_of(one, SEEN)

@@ -207,7 +207,7 @@ def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pyte
     def full(*given: Any, **more: Any) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr(np, "load", full)
+    monkeypatch.setattr(Path, "read_bytes", full)
     with pytest.raises(Shortage, match="too many open files"):
         load_trace(MANIFEST, tmp_path)
 

@@ -1,0 +1,81 @@
+"""Arrays of an .npz file whose members are stored, as `numpy.savez` leaves them, without the detours of
+`zipfile` and `numpy.load`, which take longer than all else that is done with a run's trace.
+
+Format: PKWARE's APPNOTE 6.3. Whatever is not just as usual is left to numpy, and to its words about it.
+"""
+
+import io
+from functools import lru_cache
+from struct import Struct, error
+from zlib import crc32
+
+import numpy as np
+from numpy.lib import format as npy
+
+_END = Struct("<4sHHHHIIH")
+_ENTRY = Struct("<4sBBHHHHHIIIHHHHHII")
+_LOCAL = Struct("<4sHHHHHIIIHH")
+_MAGIC = b"\x93NUMPY\x01\x00"
+_BEFORE = len(_MAGIC) + 2  # bytes of a .npy file until its header
+_IN_EXTRA = 0xFFFFFFFF  # a size that a ZIP64 field tells
+_NAME = ".npy"
+
+
+def members(data: bytes) -> dict[str, np.ndarray] | None:
+    """The arrays of a file by name, read-only; None for a file that is not as usual, or not whole."""
+    try:
+        return _members(data)
+    except (ValueError, error):
+        return None
+
+
+def _members(data: bytes) -> dict[str, np.ndarray] | None:
+    if len(data) < _END.size:
+        return None
+    magic, *disks, count, total, size, begin, comment = _END.unpack_from(data, len(data) - _END.size)
+    if magic != b"PK\5\6" or any(disks) or count != total or comment or begin + size + _END.size != len(data):
+        return None
+    found: dict[str, np.ndarray] = {}
+    view = memoryview(data)
+    at = begin
+    for _ in range(count):
+        one = _member(data, view, at)
+        if one is None:
+            return None
+        name, array, at = one
+        found[name] = array
+    return found if len(found) == count and at == begin + size else None
+
+
+def _member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarray, int] | None:
+    """The member with the directory's entry at `at`, and where the next entry is."""
+    (magic, _, _, _, flags, method, _, _, crc, packed, size, named, extra, comment, *_, begin) = (
+        _ENTRY.unpack_from(data, at)
+    )
+    local, _, own_flags, own_method, *_, own_named, own_extra = _LOCAL.unpack_from(data, begin)
+    name = data[at + _ENTRY.size : at + _ENTRY.size + named]
+    start = begin + _LOCAL.size
+    if magic != b"PK\1\2" or local != b"PK\3\4" or data[start : start + own_named] != name:
+        return None
+    if flags or method or own_flags or own_method or packed != size or size == _IN_EXTRA:
+        return None
+    start += own_named + own_extra
+    inside = view[start : start + size]
+    if len(inside) != size or crc32(inside) != crc or inside[: len(_MAGIC)] != _MAGIC:
+        return None
+    head = _BEFORE + int.from_bytes(inside[_BEFORE - 2 : _BEFORE], "little")
+    dtype, shape = _header(bytes(inside[_BEFORE - 2 : head]))
+    array = np.frombuffer(inside[head:], dtype=dtype).reshape(shape)
+    text = name.decode("ascii")
+    if not text.endswith(_NAME):
+        return None
+    return text.removesuffix(_NAME), array, at + _ENTRY.size + named + extra + comment
+
+
+@lru_cache(maxsize=256)
+def _header(text: bytes) -> tuple[np.dtype, tuple[int, ...]]:
+    """Type and shape in a .npy file's header; ValueError unless it is of numbers one after the other."""
+    shape, fortran, dtype = npy.read_array_header_1_0(io.BytesIO(text))
+    if fortran or dtype.hasobject or dtype.kind not in "biuf":
+        raise ValueError(text)
+    return dtype, shape

@@ -1,0 +1,60 @@
+"""Arrays of stored .npz files: those that numpy reads, or none."""
+
+import io
+
+import numpy as np
+import pytest
+
+from mutator.outcomes import npz
+
+ARRAYS = {
+    "t": np.arange(5) * 0.01,
+    "gear": np.arange(5, dtype=np.int32),
+    "on": np.array([True, False, True, False, True]),
+    "none": np.empty(0),
+    "table": np.arange(6.0).reshape(2, 3),
+}
+
+
+def written(save=np.savez, **arrays: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    save(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def test_the_arrays_are_those_that_numpy_reads() -> None:
+    """Names, order, types, shapes and values are numpy's."""
+    found = npz.members(written(**ARRAYS))
+    assert found is not None
+    assert list(found) == list(ARRAYS)
+    for name, array in ARRAYS.items():
+        assert (found[name].dtype, found[name].shape) == (array.dtype, array.shape)
+        assert np.array_equal(found[name], array)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"something else than a file of arrays, and longer than an empty one",
+        written(np.savez_compressed, t=np.arange(100.0)),
+        written(t=np.asfortranarray(np.arange(6.0).reshape(2, 3))),
+        written(t=np.array(["text"])),
+        written(t=np.arange(3.0)) + b"more",
+    ],
+)
+def test_what_is_not_as_usual_is_left_to_numpy(data: bytes) -> None:
+    """Compressed members, other orders and types, and what is no such file have no arrays here."""
+    assert npz.members(data) is None
+
+
+def test_a_damaged_file_has_no_arrays() -> None:
+    """Whatever bit of a file is changed, the arrays are the ones that were written, or there are none."""
+    data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
+    for place in range(len(data)):
+        found = npz.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])
+        if found is not None and list(found) == ["t", "x"]:
+            assert np.array_equal(found["t"], np.arange(3.0))
+            assert np.array_equal(found["x"], np.arange(3))
+    for end in range(len(data)):
+        assert npz.members(data[:end]) is None
