@@ -1,7 +1,8 @@
 """CPU time of both model-predictive controllers: build, iteration, and the solver's share of it.
 
-`python benchmarks/mpc.py [--rounds N] [--json FILE]`. All are measured in turn in each round, so that what
-else the machine does falls on all of them; printed are the medians and the best rounds.
+`python benchmarks/mpc.py [--plain] [--rounds N] [--json FILE]`. The solvers are those that were compiled at
+installing; with `--plain` CasADi's. All are measured in turn in each round, so that what else the machine
+does falls on all of them; printed are the medians and the best rounds.
 """
 
 import argparse
@@ -16,9 +17,11 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
 from selfdrive.car.honda.interface import get_params  # noqa: E402
+from selfdrive.common import compiled  # noqa: E402
 from selfdrive.controls.lib.lateral_mpc import Lanes, LateralMpc  # noqa: E402
 from selfdrive.controls.lib.long_mpc import LongitudinalMpc  # noqa: E402
 from selfdrive.messages import LeadData  # noqa: E402
+from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
 
 UPDATES = 200  # in each round
 GOALS = {  # microseconds of CPU
@@ -80,9 +83,11 @@ def repeat(task: Callable[[], object]) -> None:
 def main() -> None:
     """Measure and print; exit 1 where a median misses its goal."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--plain", action="store_true", help="without compiled code")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
+    compiled.use(None if options.plain else FOLDER)
     times = measure(options.rounds)
     print(f"{'CPU, microseconds':28}{'median':>10}{'best':>10}{'goal':>10}{'ratio':>8}")
     missed = False

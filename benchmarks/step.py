@@ -1,14 +1,24 @@
 """CPU time of one simulated run beyond imports, and which part of the loop it goes to.
 
-`python benchmarks/step.py [scenario.yaml] [--repeat N]`; the parts are measured in a run of their own, as
-measuring slows it down. Times are of this process, so other work on the machine matters little. Exit
-code 1 where 30 s of driving cost more than their goal.
+`python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`; the parts are measured in a run of their
+own, as measuring slows it down. Times are of this process, so other work on the machine matters little.
+Compiled code is what installing made; none with `--plain`. Exit code 1 where 30 s of driving cost more than
+their goal.
+
+`--against CLONE` measures this version and a checkout of an older commit instead, in turn, each time in a
+fresh interpreter with bytecode and compiled code at hand: imports, building and loop, over those of the
+older one.
 """
 
 import argparse
+import json
+import os
+import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 from time import process_time
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -18,6 +28,7 @@ from selfdrive.can.packer import Packer  # noqa: E402
 from selfdrive.can.parser import CanParser  # noqa: E402
 from selfdrive.car.honda.interface import CarInterface  # noqa: E402
 from selfdrive.car.honda.radar_interface import RadarInterface  # noqa: E402
+from selfdrive.common import compiled  # noqa: E402
 from selfdrive.controls.controlsd import Controlsd  # noqa: E402
 from selfdrive.controls.lib.latcontrol import LatControl  # noqa: E402
 from selfdrive.controls.lib.long_mpc import LongitudinalMpc  # noqa: E402
@@ -26,6 +37,7 @@ from selfdrive.controls.plannerd import Planner  # noqa: E402
 from selfdrive.controls.radard import Radard  # noqa: E402
 from selfdrive.sim.actuators import ActuatorReceiver  # noqa: E402
 from selfdrive.sim.camera import Camera  # noqa: E402
+from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
 from selfdrive.sim.hazards import HazardMonitor  # noqa: E402
 from selfdrive.sim.plant import Plant  # noqa: E402
 from selfdrive.sim.radar import RadarSensor  # noqa: E402
@@ -59,6 +71,33 @@ GROUPS: dict[str, tuple[tuple[type, str], ...]] = {
 PARTS = tuple(part for parts in GROUPS.values() for part in parts)
 GOAL = 0.7  # s of CPU for 30 s of driving, once the loop is built
 STEPS_OF_GOAL = 3000
+GOALS = {"start": 0.8, "loop": 0.75}  # over the older version
+HELPERS = ("-m", "selfdrive.sim.compile_helpers")
+# Run with the folder of compiled code and a scenario, in a fresh interpreter of either version.
+RUN = """
+import json, sys
+from pathlib import Path
+from time import process_time
+begun = process_time()
+from selfdrive.sim.run import Scenario, Simulator, load_scenario
+from selfdrive.common import compiled
+imported = process_time()
+folder, scenario = Path(sys.argv[1]), load_scenario(Path(sys.argv[2]))
+compiled.use(folder)
+def run():
+    began = process_time()
+    simulator = Simulator()
+    simulator.reset(scenario, 0)
+    built = process_time()
+    while not simulator.done:
+        simulator.step()
+    simulator.result()
+    return built - began, process_time() - built
+first, times = run(), [run() for _ in range(3)]
+loop = min(loop for _, loop in times)
+imports = imported - begun
+print(json.dumps({"imports": imports, "build": first[0], "start": imports + first[0], "loop": loop}))
+"""
 
 
 class Stopwatch:
@@ -117,12 +156,58 @@ def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
     return watch, total
 
 
+def against(clone: Path, scenario: Path, rounds: int) -> bool:
+    """Print what start and loop take in this version and in `clone`'s; whether the goals are reached."""
+    with tempfile.TemporaryDirectory() as place:
+        versions = {"older": clone.resolve(), "this": ROOT}
+        times: dict[str, list[dict[str, float]]] = {name: [] for name in versions}
+        for name, root in versions.items():
+            _fresh(root, place, *HELPERS, _folder_option(root, place), f"{place}/{name}")
+            _fresh(root, place, "-c", RUN, f"{place}/{name}", str(scenario))  # writes the bytecode
+        for number in range(rounds):
+            for name in versions if number % 2 == 0 else reversed(versions):
+                said = _fresh(versions[name], place, "-c", RUN, f"{place}/{name}", str(scenario))
+                times[name].append(json.loads(said))
+    reached = True
+    for key in ("imports", "build", "start", "loop"):
+        older, this = (median(run[key] for run in times[name]) for name in versions)
+        goal = GOALS.get(key)
+        print(
+            f"{key:8} older {older:.4f} s, this {this:.4f} s: ratio {this / older:.2f}"
+            + f" of {goal}" * bool(goal)
+        )
+        reached &= goal is None or this / older <= goal
+    return reached
+
+
+def _folder_option(root: Path, place: str) -> str:
+    return "--cache" if "--cache" in _fresh(root, place, *HELPERS, "--help") else "--out"
+
+
+def _fresh(root: Path, place: str, *words: str) -> str:
+    """What a fresh interpreter says that has the target of the clone `root`; its bytecode lies in `place`."""
+    environment = os.environ | {
+        "PYTHONPATH": str(root / "target"),
+        "PYTHONPYCACHEPREFIX": f"{place}/bytecode",
+    }
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    return subprocess.run(
+        [sys.executable, *words], env=environment, check=True, stdout=subprocess.PIPE, text=True
+    ).stdout
+
+
 def main() -> None:
     """Measure and print; exit 1 where the goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", nargs="?", type=Path, default=ROOT / "fault_library/scenarios/S1.yaml")
     parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest counts")
+    parser.add_argument("--plain", action="store_true", help="without compiled code")
+    parser.add_argument("--against", type=Path, metavar="CLONE", help="checkout of an older commit")
+    parser.add_argument("--rounds", type=int, default=7, help="fresh interpreters of each version")
     options = parser.parse_args()
+    if options.against:
+        sys.exit(0 if against(options.against, options.scenario, options.rounds) else 1)
+    compiled.use(None if options.plain else FOLDER)
     scenario = load_scenario(options.scenario)
     times = [run(scenario) for _ in range(options.repeat)]
     first_build = times[0][0]

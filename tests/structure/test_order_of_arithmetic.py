@@ -18,7 +18,7 @@ NO_RESULT = (  # draws, compares or trains; and symbols, which CasADi works out 
     "selfdrive/visiond/evaluate.py",
     "selfdrive/visiond/under_effects.py",
     "selfdrive/visiond/train*.py",
-    "selfdrive/controls/lib/lateral_mpc.py",
+    "selfdrive/controls/lib/lateral_ocp.py",
     "selfdrive/controls/lib/mpc_solver.py",
 )
 PRODUCTS = {

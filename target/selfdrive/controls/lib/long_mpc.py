@@ -3,25 +3,16 @@
 The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
 """
 
-import math
 from array import array
 from operator import sub
 
-import casadi as ca
-
-from selfdrive.controls.lib.mpc_solver import Iteration, Ocp, build_solver
+from selfdrive.controls.lib.compiled_mpc import build_longitudinal
+from selfdrive.controls.lib.horizon import INTERVALS, LONGITUDINAL_STEP, N_NODES
+from selfdrive.controls.lib.mpc_iteration import Iteration, Solver
 from selfdrive.messages import LeadData
 
-N_NODES = 21
-RK4_STEP = 0.2  # s
-INTERVALS = ((1, 1.0),) * 5 + ((3, 3.0),) * 15  # 0.2 s, then 0.6 s, which weigh three times as much
-NODE_STEPS = tuple(RK4_STEP * n for n, _ in INTERVALS)  # s
+NODE_STEPS = tuple(LONGITUDINAL_STEP * n for n, _ in INTERVALS)  # s
 FUTURE_NODE = 10  # 4 s ahead
-
-COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK = 5.0, 0.1, 10.0, 20.0
-TIME_GAP = 1.8  # s
-STANDSTILL_GAP = 4.0  # m
-BRAKING = 2 * 9.81  # m/s^2, twice the deceleration assumed of both cars
 
 LEAD_DECAY = 1.5  # 1/s, rate at which a lead's acceleration fades
 LEAD_DECAY_FACTOR = 0.9  # each update while it lasts
@@ -31,39 +22,6 @@ LEAD_JUMP = 2.5  # m from one update to the next: another car
 NO_LEAD_GAP, NO_LEAD_SPEED = 50.0, 10.0  # m, m/s faster than the host: a lead that never matters
 CRASH_GAP = -50.0  # m
 BACKWARDS_SPEED = -0.01  # m/s
-
-
-def _ode(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> ca.SX:
-    """Derivative of (x, v, a of the host; x, v, a of the lead); the lead's acceleration decays."""
-    return ca.vertcat(z[1], z[2], jerk, z[4], z[5], -decay * z[5])
-
-
-def _residuals(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Danger of a collision, error of the gap, acceleration and jerk; without jerk at the end."""
-    x, v, a, x_lead, v_lead, _ = ca.vertsplit(z)
-    wanted = STANDSTILL_GAP + TIME_GAP * (2 * v - v_lead) + (v * v - v_lead * v_lead) / BRAKING
-    lack = wanted - (x_lead - x)
-    danger = ca.exp(0.3 * lack / (ca.sqrt(v + 0.5) + 0.1)) - 1
-    comfort = 1 + v / 10
-    end = ca.vertcat(danger, -lack / (0.1 * v + 0.5), a * comfort)
-    return ca.vertcat(end, jerk * comfort), end
-
-
-def long_ocp() -> Ocp:
-    """The optimal control problem of following a lead; its parameter is the lead's decay in 1/s."""
-    return Ocp(
-        name="long_mpc",
-        n_state=6,
-        n_param=1,
-        rk4_step=RK4_STEP,
-        intervals=INTERVALS,
-        ode=_ode,
-        residuals=_residuals,
-        weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK),
-        terminal_weights=(COST_TTC, COST_DISTANCE, COST_ACCELERATION),
-        state_bounds=((1, 0.0, math.inf),),
-        linear=True,
-    )
 
 
 class LongitudinalMpc:
@@ -85,10 +43,10 @@ class LongitudinalMpc:
     kept (`unsolved` counts this), and the rules above judge the outcome.
     """
 
-    def __init__(self, mpc_id: int, solver: ca.Function | None = None) -> None:
+    def __init__(self, mpc_id: int, solver: Solver | None = None) -> None:
         """`mpc_id` is 1 or 2, for the log. `solver`: that of another instance, which has no memory."""
         self.mpc_id = mpc_id
-        self.solver = solver or build_solver(long_ocp())
+        self.solver = solver or build_longitudinal()
         self._iteration = Iteration(self.solver)
         self.reset()
 

@@ -6,8 +6,7 @@ program goes to DAQP, which is set up anew in every call: a built solver has no 
 """
 
 import math
-from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -53,7 +52,7 @@ class Ocp:
         return self.n_state * (self.n_control + 1) + self.n_control
 
 
-def _rk4(ocp: Ocp) -> ca.Function:
+def rk4(ocp: Ocp) -> ca.Function:
     """One step of RK4: (state, control, p) -> (next state, its derivatives by state and by control)."""
     z, u, p, h = ca.SX.sym("z", ocp.n_state), ca.SX.sym("u"), ca.SX.sym("p", ocp.n_param), ocp.rk4_step
     k1 = ocp.ode(z, u, p)
@@ -117,7 +116,7 @@ def _linearise(
 
 def integrators_of(ocp: Ocp) -> dict[int, ca.Function]:
     """The integrator of each kind of interval, by its number of steps."""
-    step = _rk4(ocp)
+    step = rk4(ocp)
     return {n: _integrator(ocp, step, n) for n in dict.fromkeys(n for n, _ in ocp.intervals)}
 
 
@@ -208,42 +207,3 @@ def build_solver(ocp: Ocp) -> ca.Function:
     following = _shifted(ocp, integrators[ocp.intervals[-1][0]], new, p) if ocp.shift else new
     finite = (ca.sumsqr(new) < LARGEST) * (ca.norm_1(gradient) < LARGEST_GRADIENT)
     return ca.Function(ocp.name, [old, z0, p], [new, following, ca.vertcat(solved, finite)])
-
-
-class Iteration:
-    """Runs a solver on buffers of its own; holds the trajectory from one iteration to the next.
-
-    `guess` is the trajectory the next iteration linearises at, `solution` the last one computed: the
-    states node by node, then the controls. They are written in place. `unsolved` counts the finite
-    iterations that kept the controls.
-    """
-
-    def __init__(self, solver: ca.Function) -> None:
-        self._buffer, self._evaluate = solver.buffer()
-        inputs = [array("d", bytes(8 * solver.size1_in(i))) for i in range(3)]
-        outputs = [array("d", bytes(8 * solver.size1_out(i))) for i in range(3)]
-        for i, (arg, res) in enumerate(zip(inputs, outputs, strict=True)):
-            self._buffer.set_arg(i, memoryview(arg))
-            self._buffer.set_res(i, memoryview(res))
-        self.guess, self._start, self._param = inputs
-        self.solution, self._next, self._flags = outputs
-        n_state = len(self._start)
-        self._n_control = (len(self.guess) - n_state) // (n_state + 1)
-        self.unsolved = 0
-
-    def restart(self, nodes: Sequence[float] | None = None, control: float = 0.0) -> None:
-        """Guess anew: the states of all nodes (None: zeros) and the same control all along."""
-        controls = array("d", [control]) * self._n_control
-        states = array("d", nodes or bytes(8 * (len(self.guess) - self._n_control)))
-        self.guess[:] = states + controls
-
-    def run(self, start: Sequence[float], param: Sequence[float]) -> bool:
-        """One iteration from the state `start`; False when the solution is not finite."""
-        self._start[:] = array("d", start)
-        self._param[:] = array("d", param)
-        self._evaluate()
-        self.guess[:] = self._next
-        solved, finite = self._flags
-        if finite and not solved:
-            self.unsolved += 1
-        return finite == 1.0

@@ -5,9 +5,11 @@ from array import array
 
 import casadi as ca
 import pytest
-from selfdrive.controls.lib.lateral_mpc import FIRST_RATE, lateral_ocp
-from selfdrive.controls.lib.long_mpc import long_ocp
-from selfdrive.controls.lib.mpc_solver import Iteration, build_solver
+from selfdrive.controls.lib.lateral_mpc import FIRST_RATE
+from selfdrive.controls.lib.lateral_ocp import lateral_ocp
+from selfdrive.controls.lib.long_ocp import long_ocp
+from selfdrive.controls.lib.mpc_iteration import Iteration
+from selfdrive.controls.lib.mpc_solver import build_solver
 
 LONG_START = (0.0, 20.0, -0.3, 40.0, 15.0, -1.0)
 LONG_PARAM = (1.5,)

@@ -1,0 +1,202 @@
+"""The compiled solvers: the bits of CasADi's, and CasADi's wherever they may not be."""
+
+import ctypes
+import math
+import random
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import casadi
+import pytest
+from selfdrive.common import compiled
+from selfdrive.controls.lib import compiled_mpc, mpc_parts
+from selfdrive.controls.lib.compiled_mpc import C_SOURCE, CompiledSolver, build_lateral, build_longitudinal
+from selfdrive.controls.lib.lateral_mpc import FIRST_RATE
+from selfdrive.controls.lib.lateral_ocp import lateral_ocp
+from selfdrive.controls.lib.long_ocp import long_ocp
+from selfdrive.controls.lib.mpc_iteration import Iteration, Solver
+from selfdrive.controls.lib.mpc_solver import build_solver
+from selfdrive.sim.compile_helpers import compile_helpers, compiler
+
+RATE_COST = 0.5
+REFERENCES = {
+    "longitudinal": lambda: build_solver(long_ocp()),
+    "lateral": lambda: build_solver(lateral_ocp(RATE_COST)),
+}
+COMPILED = {"longitudinal": build_longitudinal, "lateral": lambda: build_lateral(RATE_COST)}
+NO_NUMBERS = (math.nan, math.inf, -math.inf, 1e300, -1e9)
+
+pytestmark = pytest.mark.skipif(not compiler(), reason="there is no C compiler")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all compiled helpers."""
+    folder = tmp_path_factory.mktemp("compiled")
+    list(compile_helpers(folder))
+    return folder
+
+
+@pytest.fixture
+def use(made: Path) -> Iterator[None]:
+    """While a test runs, compiled code is to be used."""
+    compiled.use(made)
+    yield
+    compiled.use(None)
+
+
+@pytest.fixture(scope="module")
+def references() -> dict[str, Solver]:
+    """CasADi's solvers, built once."""
+    return {name: build() for name, build in REFERENCES.items()}
+
+
+def number(draw: random.Random, scale: float) -> float:
+    """Nothing, or a number of about that size."""
+    return draw.choice((0.0, draw.uniform(-scale, scale), draw.gauss(0.0, scale)))
+
+
+def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], list[float]]:
+    """A first state and parameters; sizes are `wild` times those of a drive."""
+    if name == "longitudinal":
+        speeds = [abs(number(draw, 30 * wild)) for _ in range(2)]
+        gap = draw.choice((50.0, abs(number(draw, 100 * wild))))
+        start = [0.0, speeds[0], number(draw, 3 * wild), gap, speeds[1], number(draw, 3 * wild)]
+        return start, [draw.choice((1.5, draw.uniform(0.0, 3 * wild)))]
+    sizes = (1e-5 * wild, 1e-3 * wild, 0.05 * wild)
+    lines = [[*(number(draw, size) for size in sizes), y + number(draw, wild)] for y in (1.85, -1.85, 0.0)]
+    start = [abs(number(draw, 3 * wild)), 0.0, number(draw, 0.05 * wild), number(draw, 0.05 * wild)]
+    car = [draw.uniform(0.1, 0.4) * wild, draw.uniform(5.0, 35.0) * wild]
+    return start, [*car, *chain(*lines), draw.random(), draw.random(), 3.7]
+
+
+def spoil(values: list[float], draw: random.Random) -> None:
+    """Now and then one of them is no sensible number."""
+    if draw.random() < 0.03:
+        values[draw.randrange(len(values))] = draw.choice(NO_NUMBERS)
+
+
+@pytest.mark.usefixtures("use")
+@pytest.mark.parametrize("name", REFERENCES)
+@pytest.mark.parametrize("seed", range(40))
+def test_iterations_have_the_bits_of_the_reference(
+    name: str, seed: int, references: dict[str, Solver]
+) -> None:
+    """Trajectory, next guess and flags of 15 iterations are the same bytes, also of impossible problems and
+    of numbers that are none; of what is not finite only that it is not."""
+    draw = random.Random(seed)
+    wild = draw.choice((1.0, 3.0, 10.0, 1e3, 1e10, 1e100, 1e308)) if seed % 4 == 0 else 1.0
+    solver = COMPILED[name]()
+    assert isinstance(solver, CompiledSolver)
+    ours, theirs = Iteration(solver), Iteration(references[name])
+    control = FIRST_RATE if name == "lateral" else 0.0
+    guess = [wild * number(draw, 5.0) for _ in theirs.guess]
+    for one in (ours, theirs):
+        one.restart(control=control)
+        if seed % 3 == 0:
+            one.guess[:] = type(one.guess)("d", guess)
+    for _ in range(15):
+        start, parameters = problem(name, draw, wild)
+        spoil(start, draw)
+        spoil(parameters, draw)
+        if name == "longitudinal":
+            for one in (ours, theirs):
+                one.guess[: len(start)] = type(one.guess)("d", start)
+        finite = theirs.run(start, parameters)
+        assert ours.run(start, parameters) == finite
+        assert ours.unsolved == theirs.unsolved
+        if finite:
+            assert ours.solution.tobytes() == theirs.solution.tobytes()
+            assert ours.guess.tobytes() == theirs.guess.tobytes()
+        else:
+            ours.restart(control=control)
+            theirs.restart(control=control)
+
+
+@pytest.mark.usefixtures("use")
+@pytest.mark.parametrize("name", COMPILED)
+def test_a_solver_has_no_memory(name: str) -> None:
+    """After impossible problems, and in another solver, the same problem gives the same bytes."""
+    draw = random.Random(1)
+    start, parameters = problem(name, draw, 1.0)
+    solver = COMPILED[name]()
+
+    def run(iteration: Iteration) -> bytes:
+        iteration.restart()
+        assert iteration.run(start, parameters)
+        return iteration.solution.tobytes() + iteration.guess.tobytes()
+
+    iteration = Iteration(solver)
+    wanted = run(iteration)
+    for bad in NO_NUMBERS:
+        iteration.run([bad] * len(start), parameters)
+        iteration.run(start, [bad] * len(parameters))
+        iteration.run([*start[:-1], bad], parameters)
+    assert run(iteration) == run(Iteration(solver)) == run(Iteration(COMPILED[name]())) == wanted
+
+
+def test_the_c_file_has_what_casadi_derives() -> None:
+    """Its generated part is that of this CasADi, and its weights are those of the problems."""
+    assert casadi.__version__ == compiled_mpc.CASADI
+    text = C_SOURCE.read_text()
+    assert mpc_parts.with_parts(text) == text
+    assert long_ocp().weights == compiled_mpc.LONGITUDINAL_WEIGHTS
+    assert lateral_ocp(RATE_COST).weights == (*compiled_mpc.LATERAL_WEIGHTS, RATE_COST)
+
+
+@pytest.mark.usefixtures("use")
+@pytest.mark.parametrize("other", ["version", "function", "conduct"])
+def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of another CasADi, without the function that is called, or with another answer to a known problem."""
+    compiled_mpc._daqp.cache_clear()
+    if other == "version":
+        monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")
+    elif other == "function":
+        monkeypatch.setattr(ctypes, "CDLL", lambda path: object())
+    else:
+        nothing = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(lambda *_: None)
+        monkeypatch.setattr(compiled_mpc, "_daqp", lambda: ctypes.cast(nothing, ctypes.c_void_p))
+    found = compiled_mpc._code()
+    monkeypatch.undo()
+    compiled_mpc._daqp.cache_clear()
+    assert found is None and compiled_mpc._code() is not None
+
+
+@pytest.mark.parametrize("edited", ["mpc.c", "mpc_solver.py", "long_ocp.py", "lateral_ocp.py", "horizon.py"])
+def test_an_edited_problem_is_solved_as_it_is_written(made: Path, tmp_path: Path, edited: str) -> None:
+    """Where one of the files that the C code stands for is another, CasADi's solver is built."""
+    target = tmp_path / "target"
+    shutil.copytree(
+        mpc_parts.C_FILE.parents[3] / "selfdrive",
+        target / "selfdrive",
+        ignore=shutil.ignore_patterns("*.pyc"),
+    )
+    path = target / "selfdrive/controls/lib" / edited
+    path.write_text(path.read_text() + "\n")
+    code = (
+        "from pathlib import Path; from selfdrive.common import compiled; compiled.use(Path(%r)); "
+        "from selfdrive.controls.lib.compiled_mpc import *; "
+        "print(type(build_lateral(0.5)).__name__, type(build_longitudinal()).__name__)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code % str(made)], cwd=target, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.split() == ["Function", "Function"]
+
+
+def test_a_run_without_pictures_needs_no_casadi(made: Path) -> None:
+    """What takes long to import is not imported where compiled code stands for it."""
+    code = (
+        "import sys; from selfdrive.sim.run import open_run; "
+        "open_run(['--scenario', %r, '--out', 'none', '--compiled', %r]).step(); "
+        "print([name for name in ('casadi', 'cv2', 'skimage') if name in sys.modules])"
+    )
+    root = mpc_parts.C_FILE.parents[3]
+    scenario = root.parent / "fault_library/scenarios/S1.yaml"
+    command = [sys.executable, "-c", code % (str(scenario), str(made))]
+    ran = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    assert ran.stdout == "[]\n"
