@@ -79,7 +79,7 @@ class _Side:
         pane = self._pane.draw(frame)
         if index >= len(self._reel.frames):
             cv2.addWeighted(pane, 0.4, pane, 0.0, 0.0, dst=pane)
-            pen.chip(pane, "the run broke off", (PANE[0] // 2 - 70, PANE[1] // 2), pen.DIM)
+            pen.chip(pane, "the run ended", (PANE[0] // 2 - 54, PANE[1] // 2), pen.DIM)
         self._draw_chips(pane, frame)
         self._draw_warnings(pane, frame)
         caption = np.full((CAPTION, PANE[0], 3), pen.PAPER, np.uint8)
