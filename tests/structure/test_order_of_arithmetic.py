@@ -46,7 +46,7 @@ EXACT = {  # whole numbers, and sums that a double holds exactly: no order can m
     ("sim/recorder.py", "sum((1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in shown))"),
     (
         "visiond/lane_net.py",
-        "np.matmul(some, self._whole, out=steps[k:k + AT_ONCE])",
+        "np.matmul(some, self.whole, out=steps[k:k + AT_ONCE])",
     ),
 }
 

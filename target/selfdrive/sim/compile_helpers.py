@@ -23,7 +23,18 @@ PACKAGE = Path(__file__).resolve().parents[1]
 FOLDER = PACKAGE.with_name("compiled")
 # IEEE arithmetic as it is written: no fused multiply-add, no other order. Without symbols a library has the
 # same bytes wherever it is compiled.
-OPTIONS = ("-O3", "-ffp-contract=off", "-fno-fast-math", "-std=c11", "-shared", "-fPIC", "-s", "-lm")
+OPTIONS = (
+    "-O3",
+    "-ffp-contract=off",
+    "-fno-fast-math",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-std=c11",
+    "-shared",
+    "-fPIC",
+    "-s",
+    "-lm",
+)
 EXIT_INPUT = 2
 
 

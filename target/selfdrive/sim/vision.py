@@ -100,12 +100,16 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
 def build_detector(name: str, model: CameraModel):
     """The detector of DETECTORS that is called so, for one run's pictures."""
     if name == PAPER:
-        from selfdrive.visiond.paper_detector import PaperDetector as Detector
-    elif name == AS_CODED:
-        from selfdrive.visiond.coded_detector import CodedDetector as Detector
-    else:
-        from selfdrive.visiond.robust_detector import RobustDetector as Detector
-    return Detector(model)
+        from selfdrive.visiond.compiled_paper import build_paper_detector
+
+        return build_paper_detector(model)
+    if name == AS_CODED:
+        from selfdrive.visiond.compiled_coded import build_coded_detector
+
+        return build_coded_detector(model)
+    from selfdrive.visiond.robust_detector import RobustDetector
+
+    return RobustDetector(model)
 
 
 def _detector(pictures: Pictures, camera) -> LaneDetector:

@@ -17,9 +17,8 @@ from selfdrive.common.array_math import dot
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
-from selfdrive.visiond.compiled_hog import build_hog
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine
-from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, windows
+from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
 from selfdrive.visiond.lane_net import LaneNet
 
 WIDTH, ROWS = 640, 480  # px: of the pictures that all places below are meant for
@@ -43,8 +42,11 @@ class CodedDetector:
     """Looks at pictures of 640 x 480 pixels; remembers where it last saw the lines.
 
     It is sure of all that it says: lines are straight along the car, and its path never leaves the car's.
-    Raises ConfigError for a camera with pictures of another size.
+    `calculated_by` tells which compiled code it calculates with, if any. Raises ConfigError for a camera with
+    pictures of another size.
     """
+
+    calculated_by = ""
 
     def __init__(self, model: CameraModel, threshold: float = THRESHOLD) -> None:
         if (model.width, model.rows) != (WIDTH, ROWS):
@@ -54,8 +56,7 @@ class CodedDetector:
                 expected=f"{WIDTH} x {ROWS} for the detector as coded",
                 remedy="take another detector",
             )
-        self._hog = build_hog(*SIZE)
-        self.calculated_by = self._hog.calculated_by
+        self._hog = Hog(*SIZE)
         self._net, self._threshold = LaneNet.load(), threshold
         self.state: tuple[float, ...] = (0.5 * LANE_WIDTH, -0.5 * LANE_WIDTH)  # y (m) of left and right line
 
@@ -76,11 +77,15 @@ class CodedDetector:
         looked_at = np.flatnonzero(edges.sum(axis=(1, 2)) >= LEAST_EDGES)
         if not looked_at.size:
             return np.empty((0, 2), np.intp)
-        found = windows(self._hog.blocks(part))[np.divmod(looked_at, WINDOWS[1])]
-        marked = looked_at[self._net.score(found.reshape(-1, FEATURES)) > self._threshold]
+        marked = self._marked(part, looked_at)
         which, row, column = edges[marked].nonzero()
         down, across = np.divmod(marked[which], WINDOWS[1])
         return np.column_stack((FIRST_ROW + STRIDE * down + row, FIRST_COLUMN + STRIDE * across + column))
+
+    def _marked(self, part: np.ndarray, looked_at: np.ndarray) -> np.ndarray:
+        """Those of the windows with these numbers that hold a lane mark."""
+        found = windows(self._hog.blocks(part))[np.divmod(looked_at, WINDOWS[1])]
+        return looked_at[self._net.score(found.reshape(-1, FEATURES)) > self._threshold]
 
 
 def edges_in_windows(part: np.ndarray) -> np.ndarray:

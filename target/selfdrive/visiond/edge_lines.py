@@ -1,5 +1,6 @@
 """Straight lines through clusters of edges, and which of them bound the lane."""
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -37,13 +38,16 @@ class Points(NamedTuple):
 
 
 class EdgeLines:
-    """Fits lines in the region of one camera's pictures, and tells where on the road they are."""
+    """Fits lines in the region of one camera's pictures, and tells where on the road they are.
+
+    `scale` is m to the pixel in each row of the region.
+    """
 
     def __init__(self, model: CameraModel, region: RoadRegion) -> None:
         self._model = model
         self._region = region
         rows = np.arange(region.shape[0]) + region.first_row
-        self._scale = np.array([model.metres_per_pixel(row) for row in rows])
+        self.scale = np.array([model.metres_per_pixel(row) for row in rows])
 
     def nearest(
         self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
@@ -79,7 +83,7 @@ class EdgeLines:
             (row + region.first_row).astype(float),
             (column + region.first_column).astype(float),
             rising,
-            self._scale.take(row),
+            self.scale.take(row),
         )
 
     def _first_line(self, clusters: list[list[float]], points: Points) -> RoadLine | None:
@@ -158,7 +162,7 @@ def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
     down = row - mean_row
     power = dot(down, down)
     a = dot(down, column) / max(power, 1.0)
-    return (power / row.size) ** 0.5, a, mean_column - a * mean_row
+    return sqrt(power / row.size), a, mean_column - a * mean_row
 
 
 def _fit(

@@ -14,14 +14,17 @@ AT_ONCE = 32  # windows: memory for more is got anew from the system each time, 
 
 
 class LaneNet:
-    """Weights `hidden` (features x 10), `hidden_bias` (10), `out` (10) and `out_bias` (1), float32."""
+    """Weights `hidden` (features x 10), `hidden_bias` (10), `out` (10) and `out_bias` (1), float32.
+
+    `whole` has those of `hidden` in whole steps, float64.
+    """
 
     def __init__(
         self, hidden: np.ndarray, hidden_bias: np.ndarray, out: np.ndarray, out_bias: np.ndarray
     ) -> None:
-        self._hidden, self._hidden_bias = hidden, hidden_bias
-        self._out, self._out_bias = out, out_bias
-        self._whole = np.rint(hidden * float(WEIGHT_STEPS)).astype(float)
+        self.hidden, self.hidden_bias = hidden, hidden_bias
+        self.out, self.out_bias = out, out_bias
+        self.whole = np.rint(hidden * float(WEIGHT_STEPS)).astype(float)
 
     @classmethod
     def load(cls, path: Path = WEIGHTS) -> "LaneNet":
@@ -33,10 +36,10 @@ class LaneNet:
         """Write the weights; equal weights give equal bytes."""
         np.savez_compressed(
             path,
-            hidden=self._hidden,
-            hidden_bias=self._hidden_bias,
-            out=self._out,
-            out_bias=self._out_bias,
+            hidden=self.hidden,
+            hidden_bias=self.hidden_bias,
+            out=self.out,
+            out_bias=self.out_bias,
         )
 
     def score(self, features: np.ndarray) -> np.ndarray:
@@ -45,9 +48,9 @@ class LaneNet:
         Features and weights are rounded to whole numbers of steps, so that a double holds each sum exactly:
         then it does not matter in which order a processor adds.
         """
-        steps = np.empty((len(features), self._whole.shape[1]))
+        steps = np.empty((len(features), self.whole.shape[1]))
         for k in range(0, len(features), AT_ONCE):
             some = np.rint(features[k : k + AT_ONCE] * np.float32(FEATURE_STEPS)).astype(float)
-            np.matmul(some, self._whole, out=steps[k : k + AT_ONCE])
-        hidden = each(tanh, steps / (FEATURE_STEPS * WEIGHT_STEPS) + self._hidden_bias)
-        return (hidden * self._out).sum(axis=-1) + self._out_bias
+            np.matmul(some, self.whole, out=steps[k : k + AT_ONCE])
+        hidden = each(tanh, steps / (FEATURE_STEPS * WEIGHT_STEPS) + self.hidden_bias)
+        return (hidden * self.out).sum(axis=-1) + self.out_bias

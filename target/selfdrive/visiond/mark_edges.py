@@ -45,8 +45,12 @@ def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)
     power = cv2.multiply(gradient, gradient)
     tiles = width // STRIDE, rows // STRIDE
-    around = cv2.blur(cv2.resize(power, tiles, interpolation=cv2.INTER_AREA), (3, 3))
-    limit = np.repeat(np.maximum(RATIO**2 * around, FLOOR**2), STRIDE, axis=1)
+    limit = np.repeat(limits(cv2.resize(power, tiles, interpolation=cv2.INTER_AREA)), STRIDE, axis=1)
     steep = power.reshape(-1, STRIDE, width) > limit[:, np.newaxis]
     at = steep.ravel().nonzero()[0]
     return at, gradient.take(at) > 0.0
+
+
+def limits(power: np.ndarray) -> np.ndarray:
+    """Squared gradients above which edges in each tile are steep, given the tiles' mean ones (float32)."""
+    return np.maximum(RATIO**2 * cv2.blur(power, (3, 3)), FLOOR**2)

@@ -8,16 +8,16 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.visiond.compiled_hog import build_hog
 from selfdrive.visiond.dbscan import dbscan
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.edge_lines import EdgeLines
-from selfdrive.visiond.hog import FEATURES, windows
+from selfdrive.visiond.hog import FEATURES, Hog, windows
 from selfdrive.visiond.lane_net import LaneNet
 from selfdrive.visiond.mark_edges import edges, tile_numbers, tiles_with_mark, windows_on
 from selfdrive.visiond.road_region import RoadRegion
 
 EPS, MIN_SAMPLES = 4, 8  # pixels, edge pixels
+THRESHOLD = 0.0  # log odds above which a window has a mark
 NEED = 2  # marked windows of the four that share a tile
 
 
@@ -27,12 +27,12 @@ class PaperDetector:
     `calculated_by` tells which compiled code it calculates with, if any.
     """
 
+    calculated_by = ""
     state: tuple[float, ...] = ()  # nothing is remembered
 
     def __init__(self, model: CameraModel) -> None:
         self._region = RoadRegion(model)
-        self._hog = build_hog(*self._region.shape)
-        self.calculated_by = self._hog.calculated_by
+        self._hog = Hog(*self._region.shape)
         self._net = LaneNet.load()
         self._tile = tile_numbers(*self._region.shape)
         self._lines = EdgeLines(model, self._region)
@@ -45,10 +45,7 @@ class PaperDetector:
         inside = tiles_with_mark(self._marked(part, tile), NEED).take(tile)
         at, rising = at[inside], rising[inside]
         labels = dbscan(at, part.shape, EPS, MIN_SAMPLES)
-        left, right = self._lines.nearest(at, rising, labels)
-        left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
-        right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
-        return LaneLines(left=left, right=right, path=path_between(left, right))
+        return lane_between(*self._lines.nearest(at, rising, labels))
 
     def _marked(self, part: np.ndarray, tile: np.ndarray) -> np.ndarray:
         """Which windows (rows x columns, bool) on these tiles (numbers) hold a lane mark."""
@@ -60,5 +57,12 @@ class PaperDetector:
         if row.size:
             found = windows(self._hog.blocks(part))[row, column]
             score = self._net.score(found.reshape(-1, FEATURES))
-            marked[row, column] = score > 0.0
+            marked[row, column] = score > THRESHOLD
         return marked
+
+
+def lane_between(left: RoadLine | None, right: RoadLine | None) -> LaneLines:
+    """The lane between these lines. One that is not seen is where a lane's would be."""
+    left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
+    right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
+    return LaneLines(left=left, right=right, path=path_between(left, right))

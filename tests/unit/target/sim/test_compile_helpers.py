@@ -4,19 +4,20 @@ import shutil
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from selfdrive.common import compiled
+from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers
 from selfdrive.sim.run import main
-from selfdrive.visiond import compiled_hog
-from selfdrive.visiond.compiled_hog import C_SOURCE, CompiledHog, build_hog
-from selfdrive.visiond.hog import Hog
+from selfdrive.visiond import compiled_coded
+from selfdrive.visiond.coded_detector import CodedDetector
+from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
+from selfdrive.visiond.compiled_windows import C_SOURCE
 
 ROOT = Path(__file__).resolve().parents[4]
 SCENARIO = ROOT / "fault_library/scenarios/S1.yaml"
 COMPILER = compile_helpers.compiler()
-SIZE = 112, 480
+MODEL = CameraModel()
 NAME = compiled.file_name(C_SOURCE)
 
 needs_compiler = pytest.mark.skipif(not COMPILER, reason="there is no C compiler")
@@ -43,35 +44,6 @@ def helpers(made, tmp_path):
     return shutil.copytree(made, tmp_path / "own")
 
 
-def pictures(rows, width):
-    """Noise, an even grey, black and white stripes one pixel wide, a slope."""
-    row, column = np.mgrid[:rows, :width]
-    noise = np.random.default_rng(5).integers(0, 256, (rows, width))
-    every = noise, np.full_like(row, 93), 255 * (column % 2), (3 * row + 5 * column) % 256
-    return [picture.astype(np.uint8) for picture in every]
-
-
-@needs_compiler
-@pytest.mark.parametrize("size", [(32, 32), SIZE, (48, 100)])
-def test_compiled_gradients_have_the_same_bytes(helpers, size):
-    """Blocks of any picture, its border among it, are those of the Python code to the last bit."""
-    compiled.use(helpers)
-    plain, fast = Hog(*size), build_hog(*size)
-    assert isinstance(fast, CompiledHog) and fast.calculated_by != plain.calculated_by
-    for picture in pictures(*size):
-        for one in (picture, np.asfortranarray(picture), picture * np.float32(0.7)):
-            assert fast.blocks(one).tobytes() == plain.blocks(one).tobytes()
-
-
-@needs_compiler
-def test_a_picture_of_another_size_is_an_error_as_without(helpers):
-    """C code would read beyond its end."""
-    compiled.use(helpers)
-    for each in (build_hog(*SIZE), Hog(*SIZE)):
-        with pytest.raises(ValueError, match="broadcast"):
-            each.blocks(np.zeros((32, 32), np.uint8))
-
-
 def test_every_c_file_says_what_it_stands_for():
     """By Python files beside it, so that an edit of one of them is noticed."""
     sources = list(compile_helpers.PACKAGE.rglob("*.c"))
@@ -82,17 +54,17 @@ def test_every_c_file_says_what_it_stands_for():
 
 
 @needs_compiler
-@pytest.mark.parametrize("edited", ["hog.c", "hog.py"])
+@pytest.mark.parametrize("edited", ["mark_windows.c", "hog.py", "lane_net.py"])
 def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tmp_path, edited):
     """Of other C code, beside other Python code, or while none is to be used: none."""
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is not None
-    for name in ("hog.c", "hog.py"):
+    for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
         shutil.copy(C_SOURCE.with_name(name), tmp_path)
-    monkeypatch.setattr(compiled_hog, "C_SOURCE", tmp_path / "hog.c")
-    assert type(build_hog(*SIZE)) is CompiledHog
+    monkeypatch.setattr(compiled_coded, "C_SOURCE", tmp_path / C_SOURCE.name)
+    assert type(build_coded_detector(MODEL)) is CompiledCodedDetector
     (tmp_path / edited).write_text((tmp_path / edited).read_text() + "\n")
-    assert type(build_hog(*SIZE)) is Hog
+    assert type(build_coded_detector(MODEL)) is CodedDetector
     compiled.use(None)
     assert compiled.library(C_SOURCE) is None
 
@@ -104,7 +76,7 @@ def test_a_library_that_is_damaged_is_none(helpers, keep):
     (helpers / NAME).write_bytes((helpers / NAME).read_bytes()[:keep])
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is None
-    assert type(build_hog(*SIZE)) is Hog
+    assert type(build_coded_detector(MODEL)) is CodedDetector
 
 
 @needs_compiler
@@ -114,7 +86,7 @@ def test_a_changed_constant_of_a_library_is_noticed(helpers):
     data[len(data) // 2] ^= 1
     (helpers / NAME).write_bytes(data)
     compiled.use(helpers)
-    assert type(build_hog(*SIZE)) is Hog
+    assert type(build_coded_detector(MODEL)) is CodedDetector
 
 
 @pytest.mark.parametrize("folder", ["none", "x" * 300, "empty"])
@@ -128,7 +100,7 @@ def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
 @needs_compiler
 def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(made, tmp_path):
     """A library is named by what it stands for; one of something else is deleted."""
-    old = tmp_path / f"hog-0{compiled.SUFFIX}"
+    old = tmp_path / f"warp-0{compiled.SUFFIX}"
     old.touch()
     list(compile_helpers.compile_helpers(tmp_path))
     assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {

@@ -107,7 +107,7 @@ def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not any(compile_helpers.FOLDER.glob("hog-*")), reason="nothing is compiled")
+@pytest.mark.skipif(not any(compile_helpers.FOLDER.glob("mark_windows-*")), reason="nothing is compiled")
 def test_a_fault_in_code_that_was_compiled_acts(drive: Drive) -> None:
     """Compiled helpers do not stand for a mutant of the code that they were made of."""
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")

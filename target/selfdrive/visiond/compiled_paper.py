@@ -1,0 +1,156 @@
+"""The paper's lane detector with its arithmetic in C, where this was compiled: the same lines to the bit."""
+
+import ctypes
+from functools import cache
+from math import cos, tan
+from pathlib import Path
+
+import numpy as np
+
+from selfdrive.common import compiled
+from selfdrive.common.array_math import dot
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.visiond import compiled_windows
+from selfdrive.visiond.compiled_windows import MarkWindows
+from selfdrive.visiond.detector import LaneLines, RoadLine
+from selfdrive.visiond.hog import STRIDE
+from selfdrive.visiond.mark_edges import limits
+from selfdrive.visiond.paper_detector import EPS, THRESHOLD, PaperDetector, lane_between
+from selfdrive.visiond.road_region import RoadRegion
+
+C_SOURCE = Path(__file__).with_name("mark_lines.c")
+EXACT = 2**24  # whole numbers below this are the same in single precision, whatever the order of a sum
+NONE = 2**31 - 1
+
+
+class _Points(ctypes.Structure):
+    """`Points` of the C file."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in ("row", "column", "scale", "rising")]
+
+
+class _Paper(ctypes.Structure):
+    """`Paper` of the C file."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("rows", "width", "first_row", "first_column")),
+        *((name, ctypes.c_double) for name in ("cx", "horizon", "cos_pitch", "tan_pitch")),
+        *((name, ctypes.c_double) for name in ("fx", "fy", "height", "fx_cos")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("scale", "windows", "gradient", "sums", "limits", "looked_at")
+        ),
+        *((name, ctypes.c_void_p) for name in ("at", "label", "mask", "crowd", "number", "run", "named")),
+        *((name, ctypes.c_void_p) for name in ("sum", "room")),
+        ("all", _Points),
+        ("own", _Points),
+        ("count", ctypes.c_int64),
+        ("lines", ctypes.c_double * 4 * 2),
+    )
+
+
+def build_paper_detector(model: CameraModel) -> PaperDetector:
+    """The detector, compiled where it is to be used and has been."""
+    libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
+    if None in libraries or not adds_up_alike(libraries[0]):
+        return PaperDetector(model)
+    return CompiledPaperDetector(model, *libraries)
+
+
+class CompiledPaperDetector(PaperDetector):
+    """Does what PaperDetector does: `lines` is `mark_lines.c`, `windows` is `mark_windows.c`, compiled."""
+
+    def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
+        super().__init__(model)
+        self.calculated_by = lines.digest.hex() + windows.digest.hex()
+        self._windows = MarkWindows(self._region.shape, THRESHOLD, windows)
+        self._arrays, self._points = (
+            _rooms(self._region, self._lines.scale),
+            {"all": _points(self._region), "own": _points(self._region)},
+        )
+        self._paper = _Paper(
+            **dict(zip(("rows", "width"), self._region.shape, strict=True)),
+            first_row=self._region.first_row,
+            first_column=self._region.first_column,
+            **{name: getattr(model, name) for name in ("cx", "horizon", "fx", "fy", "height")},
+            cos_pitch=cos(model.pitch),
+            tan_pitch=tan(model.pitch),
+            fx_cos=model.fx * cos(model.pitch),
+            **{name: array.ctypes.data for name, array in self._arrays.items()},
+            **{
+                name: _Points(*[array.ctypes.data for array in arrays])
+                for name, arrays in self._points.items()
+            },
+        )
+        self._at = ctypes.addressof(self._paper)
+        self._looked_at = self._arrays["looked_at"].ctypes.data
+        code = lines.code
+        self._take_gradients, self._take_edges, self._take_lines = (
+            code.take_gradients,
+            code.take_edges,
+            code.take_lines,
+        )
+        for function, count in ((self._take_gradients, 2), (self._take_edges, 1), (self._take_lines, 1)):
+            function.argtypes, function.restype = [ctypes.c_void_p] * count, None
+
+    def detect(self, view: CameraView) -> LaneLines:
+        """The lines in `view.picture`, as PaperDetector sees them."""
+        part = np.ascontiguousarray(view.picture[self._region.part])
+        if part.dtype != np.uint8 or part.shape != self._region.shape:  # a fault may do that to a picture
+            return super().detect(view)
+        address, sums = part.ctypes.data, self._arrays["sums"]
+        self._take_gradients(self._at, address)
+        if sums.max() >= EXACT:
+            return super().detect(view)
+        mean = (sums * np.float32(1.0 / STRIDE**2)).astype(np.float32)
+        self._arrays["limits"][...] = limits(mean)
+        self._take_edges(self._at)
+        if not self._windows.decide(address, self._looked_at):
+            return super().detect(view)
+        self._take_lines(self._at)
+        return lane_between(*(RoadLine(*line[1:]) if line[0] else None for line in self._paper.lines))
+
+
+def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
+    """What C calculates with, and where it writes to, for pictures of that part of the road."""
+    rows, width = region.shape
+    tiles, size = (rows // STRIDE, width // STRIDE), rows * width
+    return {
+        "scale": scale,
+        "windows": region.windows.astype(np.uint8),
+        "gradient": np.zeros((rows, width), np.int16),
+        "sums": np.zeros(tiles, np.int32),
+        "limits": np.zeros(tiles, np.float32),
+        "looked_at": np.zeros(region.windows.shape, np.uint8),
+        "at": np.zeros(size + 8, np.int32),
+        "label": np.zeros(size, np.int32),
+        "mask": np.zeros((rows + 2 * EPS + 1, width + 2 * EPS), np.uint8),
+        "crowd": np.zeros((rows, width), np.uint8),
+        "number": np.full((rows, width), NONE, np.int32),
+        "run": np.zeros((size, 4), np.int32),
+        "named": np.zeros(size, np.int32),
+        "sum": np.zeros((size, 5)),
+        "room": np.zeros((5, size)),
+    }
+
+
+def _points(region: RoadRegion) -> list[np.ndarray]:
+    """Room for all pixels of that part as points."""
+    size = region.shape[0] * region.shape[1] + 1
+    return [np.zeros(size) for _ in range(3)] + [np.zeros(size, np.uint8)]
+
+
+@cache
+def adds_up_alike(library: compiled.Library) -> bool:
+    """Whether numpy adds up in the order of the C code: another version may do otherwise."""
+    values = np.sqrt(np.arange(1.0, 5001.0))
+    room = np.empty_like(values)
+    product = library.code.product
+    product.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_long, ctypes.c_void_p]
+    product.restype = ctypes.c_double
+    address, away = values.ctypes.data, room.ctypes.data
+    return all(
+        product(address, address, count, away) == dot(values[:count], values[:count])
+        for count in (7, 9, 100, 129, 1000, 5000)
+    )

@@ -1,0 +1,90 @@
+"""Which windows of a picture hold a lane mark, as Hog and LaneNet would tell, in C."""
+
+import ctypes
+from pathlib import Path
+
+import numpy as np
+
+from selfdrive.common import compiled
+from selfdrive.common.array_math import length
+from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
+from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, LaneNet
+
+C_SOURCE = Path(__file__).with_name("mark_windows.c")
+FINEST = 2**13  # steps in 1, at most, of a weight in the first of two scores
+PADDED = 1776  # steps of a window that are added up: features, and zeros up to whole vectors
+
+
+class _Net(ctypes.Structure):
+    """`Net` of the C file."""
+
+    _fields_ = (
+        ("rows", ctypes.c_int64),
+        ("width", ctypes.c_int64),
+        ("threshold", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("lengths", "coarse", "whole", "bias", "out")),
+        *((name, ctypes.c_float) for name in ("out_bias", "out_size", "coarse_steps")),
+        *((name, ctypes.c_void_p) for name in ("squares", "bins", "sums", "cells", "power", "blocks")),
+    )
+
+
+class MarkWindows:
+    """Looks at windows of pictures of one size. `library` is `mark_windows.c`, compiled."""
+
+    def __init__(self, size: tuple[int, int], threshold: float, library: compiled.Library) -> None:
+        net, (rows, width) = LaneNet.load(), size
+        coarse = np.zeros((HIDDEN, PADDED), np.int16)
+        coarse_steps = _coarse_steps(net)
+        coarse[:, :FEATURES] = np.rint(net.hidden.T * coarse_steps)
+        down, across = rows // CELL, width // CELL
+        self._arrays = {
+            "lengths": np.sqrt(np.arange(2 * 255**2 + 1)) / CELL**2,
+            "coarse": coarse,
+            "whole": net.whole,
+            "bias": net.hidden_bias,
+            "out": net.out,
+            "squares": np.zeros(width, np.int32),
+            "bins": np.zeros(width, np.int32),
+            "sums": np.zeros(across * BINS),
+            "cells": np.zeros((down, across, BINS), np.float32),
+            "power": np.zeros((down, across), np.float32),
+            "blocks": np.zeros((down - 1, across - 1, BLOCK_FEATURES), np.int16),
+        }
+        self.blocks = self._arrays["blocks"]  # of the last picture, where a window was looked at, in steps
+        pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
+        self._net = _Net(
+            rows=rows,
+            width=width,
+            threshold=threshold,
+            out_bias=net.out_bias[0],
+            out_size=float(np.abs(net.out).sum()) * 1.001,
+            coarse_steps=coarse_steps,
+            **pointers,
+        )
+        self._which = library.code.which
+        self._which.argtypes = [ctypes.c_void_p] * 3
+        self._which.restype = ctypes.c_long
+        self._at = ctypes.addressof(self._net)
+
+    def decide(self, part: int, windows: int) -> bool:
+        """Of the windows (bool, at the address `windows`) that are looked at, take out those without a mark.
+
+        `part` is the address of the picture (uint8). False where the Python must decide.
+        """
+        return bool(self._which(self._at, part, windows))
+
+
+def _coarse_steps(net: LaneNet) -> float:
+    """The most steps in 1, of a weight, with which weights fit into 16 bits and all sums into 32.
+
+    Features are not negative, and a block's have a length of 1 at most: its part of a sum is no larger than
+    the length of its positive, or negative, weights.
+    """
+    blocks = net.hidden.T.reshape(HIDDEN, -1, BLOCK_FEATURES).astype(float)
+    largest = max(
+        np.linalg.norm(np.maximum(part, 0.0), axis=2).sum(axis=1).max() for part in (blocks, -blocks)
+    )
+    steps = float(FINEST)
+    while steps * largest * FEATURE_STEPS > 0.99 * 2**31 or steps * np.abs(blocks).max() > 2**15 - 1:
+        steps *= 0.5
+    return steps

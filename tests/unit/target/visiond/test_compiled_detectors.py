@@ -1,0 +1,161 @@
+"""Detectors with their arithmetic in C see what the Python sees, to the last bit."""
+
+from dataclasses import replace
+from math import sin
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common import compiled
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.messages import CameraView
+from selfdrive.sim import compile_helpers
+from selfdrive.sim.effects.effect import Moment
+from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.road_renderer import RoadRenderer
+from selfdrive.visiond import compiled_windows
+from selfdrive.visiond.coded_detector import CodedDetector
+from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
+from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
+from selfdrive.visiond.compiled_windows import MarkWindows
+from selfdrive.visiond.hog import FEATURES, Hog, windows
+from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
+from selfdrive.visiond.paper_detector import PaperDetector
+
+pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
+MODEL = CameraModel()
+SMALL = CameraModel.from_view(width=512, rows=400, horizon=150.0, focal=400.0, height=1.3)
+DETECTORS = {
+    "paper": (PaperDetector, build_paper_detector, CompiledPaperDetector),
+    "as_coded": (CodedDetector, build_coded_detector, CompiledCodedDetector),
+}
+
+
+@pytest.fixture(scope="module", params=["", " -DPLAIN"], ids=["vectors", "plain"])
+def helpers(request, tmp_path_factory):
+    """A folder with all libraries: those of any processor, and those with the widest vectors of this one."""
+    folder = tmp_path_factory.mktemp("compiled")
+    with pytest.MonkeyPatch.context() as patch:
+        words = " ".join(compile_helpers.compiler())
+        patch.setenv("CC", words + request.param)
+        list(compile_helpers.compile_helpers(folder))
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def _found(helpers):
+    compiled.use(helpers)
+    yield
+    compiled.use(None)
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    """A road with either kind of marks from many poses, clean and under every effect; noise; nothing."""
+    chance, found = np.random.default_rng(3), []
+    roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
+    changes = [None] * 8 + [
+        kind(amount, 1, MODEL) for kind, each in LEVELS.items() for amount in (each[0], each[-1])
+    ]
+    for k, effect in enumerate(changes):
+        picture = roads[k % 2].grey(9.0 * k, 1.5 * sin(k), 0.03 * sin(1.7 * k))
+        if effect:
+            picture = effect.apply(picture, Moment(2.0 + k, 9.0 * k, 26.0))
+        found.append(picture)
+    clean = roads[0].grey(0.0)
+    found += [
+        np.clip(clean + chance.normal(0.0, size, clean.shape), 0, 255).astype(np.uint8)
+        for size in (5, 15, 60)
+    ]
+    found += [chance.integers(low, high, clean.shape).astype(np.uint8) for low, high in ((0, 256), (90, 96))]
+    return [*found, np.zeros_like(clean), np.full_like(clean, 255), clean // 8, 255 - clean]
+
+
+def view(picture) -> CameraView:
+    """A view of which only the picture is right."""
+    return CameraView(
+        left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture
+    )
+
+
+@pytest.mark.parametrize("name", DETECTORS)
+def test_lines_are_the_same_to_the_bit(name, pictures):
+    """In clean pictures, under all effects, in noise and in nothing, one after the other."""
+    plain, build, kind = DETECTORS[name]
+    slow, fast = plain(MODEL), build(MODEL)
+    assert type(fast) is kind and fast.calculated_by != slow.calculated_by
+    for picture in pictures:
+        assert repr(fast.detect(view(picture))) == repr(slow.detect(view(picture)))
+        assert repr(fast.state) == repr(slow.state)
+
+
+@pytest.mark.parametrize(
+    "model", [SMALL, replace(MODEL, width=320, rows=240, fx=154.7, fy=172.1, cx=159, cy=128)]
+)
+def test_lines_of_another_camera_are_the_same_to_the_bit(model):
+    """Whatever the size of its part of the road."""
+    slow, fast = PaperDetector(model), build_paper_detector(model)
+    road = RoadRenderer(model, "dashed", 2, periods=2)
+    for k in range(8):
+        picture = cv2.add(road.grey(7.0 * k, 0.8 * sin(k), 0.02 * sin(3 * k)), k)
+        assert repr(fast.detect(view(picture))) == repr(slow.detect(view(picture)))
+
+
+@pytest.mark.parametrize("name", DETECTORS)
+def test_what_a_fault_makes_of_a_picture_is_seen_or_refused_alike(name, pictures):
+    """Another type, order or size: the same lines, or the same error."""
+    plain, build, _ = DETECTORS[name]
+    slow, fast = plain(MODEL), build(MODEL)
+    odd = [
+        np.asfortranarray(pictures[0]),
+        pictures[0] * np.float32(0.7),
+        pictures[0][:300],
+        pictures[0][:, ::-1],
+    ]
+    odd += [
+        pictures[0].astype(np.int16),
+        pictures[0][:0],
+        np.dstack([pictures[0]] * 3),
+        pictures[0].astype(float),
+    ]
+    for picture in odd:
+        assert _outcome(fast, picture) == _outcome(slow, picture)
+
+
+def _outcome(detector, picture) -> str:
+    try:
+        return repr(detector.detect(view(picture)))
+    except (ValueError, cv2.error, IndexError, TypeError) as error:
+        return repr(type(error))
+
+
+def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
+    """Features of each window, in steps, are those of Hog; windows above any threshold those of the net."""
+    size = 112, 480
+    hog, net = Hog(*size), LaneNet.load()
+    for threshold in (0.0, 4.0, -2.5):
+        fast = MarkWindows(size, threshold, compiled.library(compiled_windows.C_SOURCE))
+        for picture in pictures[::3]:
+            part = np.ascontiguousarray(picture[200:312, 80:560])
+            found = hog.blocks(part)
+            looked_at = np.random.default_rng(int(part.sum())).random((6, 29)) < 0.4
+            marked = looked_at.copy()
+            assert fast.decide(part.ctypes.data, marked.ctypes.data)
+            row, column = looked_at.nonzero()
+            above = net.score(windows(found)[row, column].reshape(-1, FEATURES)) > threshold
+            assert (marked[row, column] == above).all() and not marked[~looked_at].any()
+            steps = np.rint(windows(found) * np.float32(FEATURE_STEPS))
+            assert (windows(fast.blocks)[looked_at] == steps[looked_at]).all()
+
+
+def test_a_score_too_close_to_the_threshold_is_left_to_python(pictures):
+    """C says that it cannot tell, and the detector asks the net."""
+    part = np.ascontiguousarray(pictures[0][200:232, 280:312])
+    score = float(LaneNet.load().score(windows(Hog(32, 32).blocks(part)).reshape(1, FEATURES))[0])
+    library = compiled.library(compiled_windows.C_SOURCE)
+    for threshold, decided in ((score, False), (score - 1e-8, True), (score + 1e-8, True)):
+        window = np.ones(1, bool)
+        assert (
+            MarkWindows((32, 32), threshold, library).decide(part.ctypes.data, window.ctypes.data) is decided
+        )
+        assert not decided or window[0] == (score > threshold)
