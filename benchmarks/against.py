@@ -1,59 +1,112 @@
 """A campaign by this version and by an older one: `python benchmarks/against.py CLONE [--campaign NAME]`.
 
-CLONE is a checkout of the older commit; both run in this environment, in turn, each time with an empty cache.
-What an old version compiles by a command of its own is compiled before its clock starts. CPU time is that of
-all processes. Wall time needs cores that nobody else uses. Exit code 1 when a run fails.
+CLONE is a checkout of the older commit, installed into its .venv as its README says. Both run in turn, each
+time with an empty cache. What an old version compiles by a command of its own is compiled before its clock
+starts. CPU time is that of
+all processes. Wall time needs cores that nobody else uses. The parts are the stages that the command tells
+of; idle is the time of cores that had nothing to do. Exit code 1 when a run fails.
 """
 
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from pathlib import Path
 from statistics import median
 
 ROOT = Path(__file__).resolve().parents[1]
 HELPERS = ("-m", "selfdrive.sim.compile_helpers")
+WHOLE = "whole"
+STAGES = ("planning", "checks", "golden runs", "experiments", "proof", "tables", "pictures", "report")
+TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+
+Parts = dict[str, dict[str, float]]  # by stage: wall_s, cpu_s
 
 
-def run(clone: Path, campaign: str, workers: int, more: list[str]) -> dict[str, float]:
-    """Run a campaign with the sources of `clone` and nothing kept; wall and CPU seconds."""
+def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
+    """Run a campaign with the version of `clone` and nothing kept; what each part of it takes."""
+    python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
-        paths = os.pathsep.join([str(clone), str(clone / "target")])
-        env = os.environ | {"PYTHONPATH": paths, "XDG_CACHE_HOME": f"{place}/cache"}
+        env = os.environ | {"XDG_CACHE_HOME": f"{place}/cache"}
         if clone != ROOT:
-            cache = f"{place}/cache/mutator/targets/openpilot"
-            said = subprocess.run(
-                [sys.executable, *HELPERS, "--help"], env=env, capture_output=True, text=True
-            )
-            if "--cache" in said.stdout:
-                subprocess.run(
-                    [sys.executable, *HELPERS, "--cache", cache], env=env, check=True, stdout=sys.stderr
-                )
-        command = [
-            sys.executable,
-            "-m",
-            "mutator",
-            "run",
-            campaign,
-            "--out",
-            f"{place}/run",
-            "-n",
-            str(workers),
-        ]
-        before, began = _cpu(), time.monotonic()
-        subprocess.run([*command, *more], cwd=clone, env=env, check=True, stdout=subprocess.DEVNULL)
-        return {"wall_s": time.monotonic() - began, "cpu_s": _cpu() - before}
+            compile_helpers(python, clone, env, f"{place}/cache/mutator/targets/openpilot")
+        command = [python, "-m", "mutator", "run", campaign, "--out", f"{place}/run"]
+        command += ["-n", str(workers), *more]
+        return followed(command, clone, env)
 
 
-def _cpu() -> float:
-    """CPU time (s) of all that this process waited for, and of all that those waited for."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def compile_helpers(python: str, clone: Path, env: dict[str, str], cache: str) -> None:
+    """Compile what an older version compiles by a command."""
+    command, env = [python, *HELPERS], env | {"PYTHONPATH": str(clone / "target")}
+    said = subprocess.run([*command, "--help"], env=env, capture_output=True, text=True)
+    if "--cache" in said.stdout:
+        subprocess.run([*command, "--cache", cache], env=env, check=True, stdout=sys.stderr)
+
+
+def followed(command: list[str], folder: Path, env: dict[str, str]) -> Parts:
+    """What each stage of a command takes, from when its lines name it to when they name the next."""
+    parts = {stage: {"wall_s": 0.0, "cpu_s": 0.0} for stage in STAGES}
+    stage, line, since, used = STAGES[0], "", time.monotonic(), 0.0
+
+    def ended(cpu: float) -> None:
+        nonlocal since, used
+        now = time.monotonic()
+        parts[stage]["wall_s"] += now - since
+        parts[stage]["cpu_s"] += cpu - used
+        since, used = now, cpu
+
+    with subprocess.Popen(
+        command, cwd=folder, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            begun = next((name for name in STAGES if line.startswith(name)), stage)
+            if begun != stage:
+                ended(cpu_of(process.pid))
+                stage = begun
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        ended(usage.ru_utime + usage.ru_stime)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(command)}: {line.strip()}")
+    whole = {key: sum(part[key] for part in parts.values()) for key in ("wall_s", "cpu_s")}
+    return parts | {WHOLE: whole}
+
+
+def cpu_of(root: int) -> float:
+    """CPU time (s) of a process, of those that it started, and of those that all of these waited for."""
+    children: dict[int, list[int]] = defaultdict(list)
+    used: dict[int, float] = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:  # it has just ended
+            continue
+        pid = int(path.parent.name)
+        children[int(fields[1])].append(pid)
+        used[pid] = TICK_S * sum(map(int, fields[11:15]))
+    todo, total = [root], 0.0
+    while todo:
+        pid = todo.pop()
+        total += used.get(pid, 0.0)
+        todo += children[pid]
+    return total
+
+
+def show(parts: dict[str, Parts], workers: int) -> None:
+    """Print what each part took in both versions, and how long cores had nothing to do."""
+    print(f"{'':14}" + "".join(f"{name:>9} wall s    CPU s   idle s" for name in parts) + "     CPU ratio")
+    for stage in (*STAGES, WHOLE):
+        cells = ""
+        for took in parts.values():
+            wall_s, cpu_s = took[stage]["wall_s"], took[stage]["cpu_s"]
+            cells += f"{wall_s:16.1f}{cpu_s:9.1f}{workers * wall_s - cpu_s:9.1f}"
+        older, this = (took[stage]["cpu_s"] for took in parts.values())
+        print(f"{stage:14}{cells}" + (f"{this / older:14.2f}" if older else ""))
 
 
 def main() -> int:
@@ -68,14 +121,23 @@ def main() -> int:
     options = parser.parse_args()
     more = ["--limit", options.limit] if options.limit else []
     clones = {"older": options.clone.resolve(), "this": ROOT}
-    figures: dict[str, list[dict[str, float]]] = {name: [] for name in clones}
+    figures: dict[str, list[Parts]] = {name: [] for name in clones}
     for number in range(options.rounds):
         for name in clones if number % 2 == 0 else reversed(clones):
             took = run(clones[name], options.campaign, options.workers, more)
             figures[name].append(took)
-            print(f"{name:8}{took['wall_s']:9.1f} s wall {took['cpu_s']:9.1f} s CPU", flush=True)
+            whole = took[WHOLE]
+            print(f"{name:8}{whole['wall_s']:9.1f} s wall {whole['cpu_s']:9.1f} s CPU", flush=True)
+    middle = {
+        name: {
+            stage: {key: median(one[stage][key] for one in runs) for key in ("wall_s", "cpu_s")}
+            for stage in (*STAGES, WHOLE)
+        }
+        for name, runs in figures.items()
+    }
+    show(middle, options.workers)
     for key, words in (("cpu_s", "CPU"), ("wall_s", "wall time")):
-        older, this = (median(one[key] for one in figures[name]) for name in clones)
+        older, this = (took[WHOLE][key] for took in middle.values())
         print(f"{words}: {older:.1f} s, now {this:.1f} s: ratio {this / older:.2f}")
     if options.json:
         options.json.write_text(json.dumps({"campaign": options.campaign, "runs": figures}, indent=1) + "\n")
