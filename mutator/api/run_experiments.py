@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 from mutator._common.files import ScratchFolder
-from mutator.api.experiment_results import ExperimentResult, TraceFrames, describe, trace_frame
+from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.mutants import built
 from mutator.api.run_contents import RunContents, from_here
 from mutator.api.trials import Trial, trial_of
@@ -15,7 +15,7 @@ from mutator.execution.single_run import rerun
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.paths import Path as FaultPath
 from mutator.outcomes.sampling import keep_series
-from mutator.report.film import Shot, film_experiment
+from mutator.report.film import Filming, Shot
 from mutator.store.series import SeriesFolder
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
@@ -92,10 +92,7 @@ class RunExperiment(ExperimentResult):
 
         MutatorError for a target that cannot be filmed, and a faulty run that left no film.
         """
-        run, facts = self.run, describe(self.experiment)
-        trigger = facts["trigger"].removesuffix(": True")
-        title = f"{facts['fault']}   {facts['scenario']}   {trigger}"
-        return film_experiment(run.workspace, run.bench.manifest, run.path, self.id, title, shots)
+        return Filming.of(self.run.workspace, self.run.folder).take(self.experiment, self.record, shots)
 
     @property
     def stretch(self) -> Stretch | None:

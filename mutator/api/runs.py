@@ -1,6 +1,5 @@
 """A run folder, and what can be made of it: report, pictures, exports, audit."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,9 +26,8 @@ from mutator.outcomes import rows as tables
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs, own_alerts
 from mutator.outcomes.golden import load_trace
 from mutator.report import building
-from mutator.report.stills import BUDGET_S, stills_due
+from mutator.report.stills import take_stills
 from mutator.store import cleaning
-from mutator.store.progress import Pace
 from mutator.store.run_folder import RunFolder, golden_key
 from mutator.verification import equivalence
 from mutator.verification.seal import not_verifiable, seal_of
@@ -148,27 +146,15 @@ class Run(RunContents):
         results_table.build(self.path)
         return building.write(self.path, workspace)
 
-    def take_stills(self, progress: Notify | None = None) -> str:
+    def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
         """Drive the worst few experiments that see pictures again, and keep what the camera saw at the
         activation, the first alert and the first hazard: the report shows it. At most ten experiments, one
-        of 20 that are planned, and none is begun after two minutes.
+        of 20 that are planned, `workers` at a time, and none is begun after two minutes.
 
         Returns why the first one that has no pictures has none; empty if there is no such.
         """
-        due, problem = stills_due(self.folder, self.bench.manifest), ""
-        pace, began = Pace("pictures", len(due)), time.monotonic()
-        for i, (name, shots) in enumerate(due.items()):
-            if time.monotonic() - began > BUDGET_S:
-                break
-            if progress:
-                progress(pace.at(i))
-            try:
-                same = self.experiment(name).film(shots)
-                wrong = "" if same else "driven again it is not what the campaign found"
-            except MutatorError as error:
-                wrong = str(error)
-            problem = problem or (f"{name}: {wrong}" if wrong else "")
-        return problem
+        notify = progress or (lambda _: None)
+        return take_stills(self.workspace, self.folder, workers=workers, notify=notify)
 
     def export(
         self,

@@ -194,6 +194,7 @@ def run(
     workspace = place.workspace()
     chosen = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard)
     chosen = replace(chosen, series_mb=series_mb)
+    workers = usable_cores() if workers is None else workers
     try:
         with campaign_progress(terminal) as notify, warnings.catch_warnings():
             warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_end` says it in full
@@ -201,7 +202,7 @@ def run(
                 campaign,
                 out,
                 choices=chosen,
-                workers=usable_cores() if workers is None else workers,
+                workers=workers,
                 engine=engine,
                 reviewed=reviewed,
                 accept_versions=accept_versions,
@@ -209,7 +210,7 @@ def run(
                 workspace=workspace,
             )
             if stills and made.summary and made.summary.exit_code == 0:
-                _take_stills(terminal, made, notify)
+                _take_stills(terminal, made, notify, workers)
             written = _report(out, made, notify)
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
@@ -219,9 +220,9 @@ def run(
         raise typer.Exit(made.summary.exit_code)
 
 
-def _take_stills(terminal: Terminal, run: "Run", notify: "Notify") -> None:
+def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
     """Pictures for the report; a run is no worse for lack of them."""
-    if problem := run.take_stills(notify):
+    if problem := run.take_stills(notify, workers=workers):
         terminal.note(f"no pictures of {problem}")
 
 

@@ -49,9 +49,7 @@ def run_single(
     `faulty` is an empty folder when the mutant was refused, and holds what the run left when it did not end
     well. CheckFailed when the golden run does not end well.
     """
-    check_requirements(manifest)
-    make_folder(out)
-    with alone_in(out), _engine(manifest, out, limits or Limits()) as engine:
+    with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
         goldens = Goldens(manifest, lambda scenario, changes: reference)
         runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
@@ -66,12 +64,20 @@ def run_single(
     )
 
 
+def run_golden(
+    workspace: Workspace, manifest: TargetManifest, experiment: Experiment, out: Path, *, limits: Limits
+) -> Path:
+    """Run `experiment` without its fault into the folder `out`; where its output is. CheckFailed when it does
+    not end well."""
+    with _engine(manifest, out, limits) as engine:
+        return _run_golden(workspace, engine, experiment, out / "golden")
+
+
 def rerun(
-    workspace: Workspace, run: Path, experiment_id: str, *, out: Path | None = None, film: bool = False
+    workspace: Workspace, run: Path, experiment_id: str, *, out: Path | None = None
 ) -> tuple[Single, bool]:
     """Run a planned experiment again into the folder `out` (default: traces/<id>/ of the run folder).
 
-    With `film` the golden run is driven again, too, and both leave a film.
     The flag says whether the record equals the one of the campaign (true if there is none yet).
     """
     folder = RunFolder.open(run)
@@ -81,17 +87,22 @@ def rerun(
     golden = folder.golden(experiment.scenario, experiment.changes)
     single = run_single(
         workspace,
-        manifest.filming() if film else manifest,
+        manifest,
         experiment,
         out or folder.path / "traces" / wanted,
         limits=folder.limits,
-        golden=golden if golden.is_dir() and not film else None,
+        golden=golden if golden.is_dir() else None,
     )
-    known = folder.records().get(wanted)
+    return single, is_same(folder, folder.records().get(wanted), single.record)
+
+
+def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
+    """Whether an experiment that was run again has the record of the campaign, true if there is none yet;
+    MutatorError when the patch of that record is damaged."""
     if known is None:
-        return single, True
-    folder.read_patch(wanted, known)
-    return single, known == folder.comparable(single.record)
+        return True
+    folder.read_patch(known.experiment_id, known)
+    return known == folder.comparable(found)
 
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
@@ -104,15 +115,18 @@ def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
 
 @contextmanager
 def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
-    """An engine whose scratch is in `out`, and gone afterwards."""
-    work = out / "work"
-    remove_folder(work)
-    try:
-        with raising_disk_full(work):
-            work.mkdir()
-        yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
-    finally:
+    """An engine alone in `out`, whose scratch is there, and gone afterwards."""
+    check_requirements(manifest)
+    make_folder(out)
+    with alone_in(out):
+        work = out / "work"
         remove_folder(work)
+        try:
+            with raising_disk_full(work):
+                work.mkdir()
+            yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
+        finally:
+            remove_folder(work)
 
 
 def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, place: Path) -> Path:

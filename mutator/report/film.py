@@ -11,9 +11,10 @@ from pathlib import Path
 from mutator._common.files import ScratchFolder, make_folder
 from mutator.engines import bytecode
 from mutator.errors import MutatorError
-from mutator.execution.single_run import rerun
+from mutator.execution.single_run import is_same, manifest_of, run_golden, run_single
 from mutator.figures.run_plot import marks_of
-from mutator.model import Record
+from mutator.model import Experiment, Record
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import FILM, TargetManifest
 from mutator.targets.placeholders import filled
 from mutator.workspace import Workspace
@@ -29,37 +30,64 @@ class Shot:
     t: float | None = None
 
 
-def film_experiment(
-    workspace: Workspace,
-    manifest: TargetManifest,
-    run: Path,
-    experiment_id: str,
-    title: str,
-    shots: Sequence[Shot],
-) -> bool:
-    """Drive a planned experiment's golden and faulty run again and write `shots` of them.
+@dataclass(frozen=True, slots=True)
+class Filming:
+    """Films of experiments of a run."""
 
-    Says whether the new record equals the campaign's (true if there is none yet). MutatorError for a target
-    that cannot be filmed, a faulty run that left no film, and with what the target's command complains of.
-    """
-    with ScratchFolder("mutator-film-") as folder:
-        single, same = rerun(workspace, run, experiment_id, out=folder, film=True)
-        if not (single.faulty / FILM).is_dir():
-            raise MutatorError(
-                f"the faulty run left no film: {single.record.status.value}, {single.record.detail}",
-                remedy="choose an experiment that drives",
+    workspace: Workspace
+    folder: RunFolder
+    target: TargetManifest
+    filmed: TargetManifest  # the same, its runs leaving a film
+
+    @classmethod
+    def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
+        """Of a run folder; MutatorError for a target that cannot be filmed, or is no longer the run's."""
+        manifest = manifest_of(workspace, folder)
+        return cls(workspace, folder, manifest, manifest.filming())
+
+    def golden(self, experiment: Experiment, out: Path) -> Path:
+        """Drive the golden run of an experiment into the folder `out`, for several films."""
+        return run_golden(self.workspace, self.filmed, experiment, out, limits=self.folder.limits)
+
+    def take(
+        self,
+        experiment: Experiment,
+        known: Record | None,
+        shots: Sequence[Shot],
+        *,
+        golden: Path | None = None,
+    ) -> bool:
+        """Drive an experiment's golden (unless given) and faulty run again and write `shots` of them.
+
+        Says whether the new record is the one that is `known` (true if there is none yet). MutatorError for
+        a faulty run that left no film, and with what the target's command complains of.
+        """
+        with ScratchFolder("mutator-film-") as scratch:
+            single = run_single(
+                self.workspace,
+                self.filmed,
+                experiment,
+                scratch,
+                limits=self.folder.limits,
+                golden=golden,
             )
-        events = folder / "events.json"
-        names = hazards_in_words(workspace, manifest)
-        events.write_text(json.dumps(_events(single.record, title, names)), encoding="utf-8")
-        places = {
-            "golden": str(single.golden / FILM),
-            "faulty": str(single.faulty / FILM),
-            "events": str(events),
-        }
-        for shot in shots:
-            _show(manifest, folder, places, shot)
-    return same
+            record = single.record
+            if not (single.faulty / FILM).is_dir():
+                raise MutatorError(
+                    f"the faulty run left no film: {record.status.value}, {record.detail}",
+                    remedy="choose an experiment that drives",
+                )
+            events = scratch / "events.json"
+            names = hazards_in_words(self.workspace, self.target)
+            events.write_text(json.dumps(_events(record, _title(experiment), names)), encoding="utf-8")
+            places = {
+                "golden": str(single.golden / FILM),
+                "faulty": str(single.faulty / FILM),
+                "events": str(events),
+            }
+            for shot in shots:
+                _show(self.target, scratch, places, shot)
+        return is_same(self.folder, known, record)
 
 
 def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
@@ -69,6 +97,11 @@ def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str
     about = known.hazards if known else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
     return names | {rule.name: rule.about for rule in manifest.rules if rule.about}
+
+
+def _title(experiment: Experiment) -> str:
+    trigger = f"{experiment.trigger.name}: {experiment.trigger.condition}".removesuffix(": True")
+    return "   ".join((experiment.fault.label, " ".join((experiment.scenario, *experiment.changes)), trigger))
 
 
 def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, object]:

@@ -1,34 +1,92 @@
-"""Which experiments get pictures as soon as a run is done: the worst few of those that see pictures."""
+"""Pictures of a run as soon as it is done: of the worst few experiments of those that see pictures."""
 
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from itertools import islice
+from pathlib import Path
 
-from mutator.model import Record, Status
+from mutator._common.files import ScratchFolder
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Record, Status
 from mutator.outcomes.ranking import worst
 from mutator.outcomes.reader import Results
-from mutator.report.film import Shot
+from mutator.report.film import Filming, Shot
 from mutator.store import plan_file
-from mutator.store.run_folder import RunFolder
-from mutator.targets.manifest import TargetManifest
+from mutator.store.progress import Pace, Progress
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.workspace import Workspace
 
 MOST, ONE_IN = 10, 20  # at most so many experiments, and one of so many that are planned
 BUDGET_S = 120.0  # after which no other experiment is begun
 
+Notify = Callable[[Progress], None]
 
-def stills_due(folder: RunFolder, manifest: TargetManifest) -> dict[str, list[Shot]]:
-    """The pictures that are not there yet, by experiment, the worst first: at the activation, the first alert
-    and the first hazard of the worst experiments that see pictures."""
+
+def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
+    """Take the pictures of a run that are not there yet, `workers` experiments at a time; none is begun after
+    `BUDGET_S`.
+
+    Returns why the first one that has no pictures has none; empty if there is no such.
+    """
+    manifest = workspace.manifest(folder.head["target"])
     if manifest.film is None or not manifest.film.pictures:
-        return {}
-    seeing = set(manifest.film.pictures)
+        return ""
     experiments = {e.id: e for e in plan_file.read_all(folder.path)}
+    records = folder.records()
+    due = _due(folder, manifest.film.pictures, experiments, records)
+    if not due:
+        return ""
+    try:
+        filming = Filming.of(workspace, folder)
+    except MutatorError as error:
+        return f"{next(iter(due))}: {error}"
+    ends = time.monotonic() + BUDGET_S
+
+    def wrong(name: str, golden: Future[Path]) -> str:
+        if time.monotonic() > ends:
+            return ""
+        try:
+            same = filming.take(experiments[name], records[name], due[name], golden=golden.result())
+        except MutatorError as error:
+            return f"{name}: {error}"
+        return "" if same else f"{name}: driven again it is not what the campaign found"
+
+    pool = ThreadPoolExecutor(max(1, workers))
+    with ScratchFolder("mutator-stills-") as scratch:
+        try:
+            driven = {_golden_key(experiments[name]): experiments[name] for name in due}
+            # begun first, so that what waits for a golden run waits for one that is under way
+            goldens = {key: pool.submit(filming.golden, one, scratch / key) for key, one in driven.items()}
+            found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
+            pace = Pace("pictures", len(found))
+            notify(pace.at(0))
+            for done, _ in enumerate(as_completed(found), 1):
+                notify(pace.at(done))
+            return next(filter(None, (one.result() for one in found)), "")
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _golden_key(experiment: Experiment) -> str:
+    return golden_key(experiment.scenario, experiment.changes)
+
+
+def _due(
+    folder: RunFolder,
+    pictures: Collection[str],
+    experiments: Mapping[str, Experiment],
+    records: Mapping[str, Record],
+) -> dict[str, list[Shot]]:
+    """The pictures that are not there yet, by experiment, the worst first: at the activation, the first alert
+    and the first hazard of the worst experiments that see `pictures`."""
+    seeing = set(pictures)
     rows = (row for row in worst(Results.of_run(folder.path).rows()) if row.status is Status.OK)
     wanted = (
         row.experiment_id
         for row in rows
         if row.t_manifest is not None and seeing & set(experiments[row.experiment_id].changes)
     )
-    records = folder.records()
     chosen = islice(wanted, min(MOST, folder.planned // ONE_IN))
     due = {name: _missing(folder, name, records[name]) for name in chosen}
     return {name: shots for name, shots in due.items() if shots}
