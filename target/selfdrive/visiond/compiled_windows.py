@@ -81,9 +81,8 @@ def _coarse_steps(net: LaneNet) -> float:
     the length of its positive, or negative, weights.
     """
     blocks = net.hidden.T.reshape(HIDDEN, -1, BLOCK_FEATURES).astype(float)
-    largest = max(
-        np.linalg.norm(np.maximum(part, 0.0), axis=2).sum(axis=1).max() for part in (blocks, -blocks)
-    )
+    signs = [np.maximum(part, 0.0) for part in (blocks, -blocks)]
+    largest = max(length(part).sum(axis=(1, 2)).max() for part in signs)
     steps = float(FINEST)
     while steps * largest * FEATURE_STEPS > 0.99 * 2**31 or steps * np.abs(blocks).max() > 2**15 - 1:
         steps *= 0.5
