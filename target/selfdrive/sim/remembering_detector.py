@@ -25,6 +25,7 @@ SEEING = (
     "common/ordered.py",
     "sim/compiled_warp.py",
     "sim/detection_memory.py",
+    "sim/effects/*.c",
     "sim/effects/*.py",
     "sim/image_folder.py",
     "sim/image_library.py",

@@ -48,6 +48,16 @@ def airlight(picture: np.ndarray | Picture, camera: CameraModel) -> float:
     return cv2.mean(picture[:rows, :])[0]
 
 
+def veiled(picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, air: float) -> np.ndarray:
+    """The picture through a veil that keeps its light, and particles that take of it; `air` takes its place.
+
+    All are uint8 of one shape, shares in parts of 255; `air` is a grey level.
+    """
+    kept = cv2.multiply(veil, cv2.bitwise_not(taken), scale=1.0 / 255.0)
+    lost = cv2.convertScaleAbs(kept, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
+    return cv2.add(cv2.multiply(picture, kept, scale=1.0 / 255.0), lost)
+
+
 class Fog(Effect):
     """Even fog of a given visibility."""
 

@@ -13,8 +13,12 @@ import cv2
 import numpy as np
 
 from selfdrive.sim.effects.canvas import filtered
+from selfdrive.sim.effects.compiled_gaussian import build_gaussian
+from selfdrive.sim.effects.compiled_scattered import build_scattered
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
+from selfdrive.sim.effects.gaussian import Gaussian
 from selfdrive.sim.effects.paper_weather import motion_kernel
+from selfdrive.sim.effects.scattered import Streak
 from selfdrive.sim.picture import Picture, Region, whole
 
 PICTURES_PER_SECOND = 20
@@ -22,8 +26,8 @@ CANVAS = 2  # times the picture's size each way: streaks are drawn on it
 CROP = 264 / 480  # of the picture's rows: where in the canvas the picture begins
 STREAKS = 100  # of each pass for each level
 STREAK_GAINS = tuple(0.10 + 0.01 * k for k in range(1, 11))  # a pass for each
+STREAK_LEVELS = np.array([round(WHITE * gain) for gain in STREAK_GAINS], np.uint8)
 STREAK_LENGTH, STREAK_LEAN = 32, radians(15.0)  # px; off the vertical
-MARGIN = STREAK_LENGTH  # px around the picture, so that no streak in it ends outside what is drawn
 DROPLETS = 15_000  # pixels for each level
 DROPLET_BLUR = 7.0  # px
 FLAKES = 250  # blocks in a layer
@@ -39,6 +43,10 @@ class _AsCoded(Effect):
 
     UNIT: ClassVar[str] = "level"
     LEAST, MOST, WHOLE = 1, 10, True
+
+    def _build(self) -> str:
+        self._scattered, by = build_scattered()
+        return by
 
     def _prepare(self, random: np.random.Generator) -> None:
         """Nothing is the same for all pictures."""
@@ -62,41 +70,55 @@ class _AsCoded(Effect):
 class CodedRain(_AsCoded):
     """Ten passes of streaks, each brighter than the last, on a blurred and darker picture."""
 
+    def _build(self) -> str:
+        self._blur = _gaussian(0.5 + self._level / 10.0)
+        return super()._build() + self._blur.calculated_by
+
     def _prepare(self, random: np.random.Generator) -> None:
-        self._streak, self._way = _streak()
+        self._streak = _streak()
 
     def _drawn(
         self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
     ) -> np.ndarray:
         level, (rows, columns) = self._level, picture.shape
-        wet = cv2.convertScaleAbs(blurred(picture, region, 0.5 + level / 10.0), alpha=0.75 - level / 100.0)
-        size = np.array([CANVAS * columns, CANVAS * rows])
-        first = np.array([region.left, round(CROP * rows) + region.top])
-        rows, columns = region.shape
-        layer = np.empty((rows + 2 * MARGIN, columns + 2 * MARGIN), np.uint8)
-        inside = layer[MARGIN:-MARGIN, MARGIN:-MARGIN]
-        pixels = self._streak[:, 1] * layer.shape[1] + self._streak[:, 0]
-        for gain in STREAK_GAINS:
-            start = (random.random((STREAKS * level, 2), np.float32) * size).astype(np.int32) - first
-            end = start + self._way
-            there = (end[:, 0] < columns) & (start[:, 0] >= 0) & (end[:, 1] >= 0) & (start[:, 1] < rows)
-            column, row = start[there].T + MARGIN
-            layer.fill(0)
-            layer.reshape(-1)[(row * layer.shape[1] + column)[:, np.newaxis] + pixels] = round(WHITE * gain)
-            cv2.add(wet, inside, dst=wet)
-        return wet
+        wet = filtered(picture, region, self._blur.size // 2, self._blur)
+        wet = cv2.convertScaleAbs(wet, alpha=0.75 - level / 100.0)
+        box = np.array([CANVAS * columns, CANVAS * rows, region.left, round(CROP * rows) + region.top])
+        chances = random.random((len(STREAK_GAINS), STREAKS * level, 2), np.float32)
+        light = self._scattered.streak_light(chances, self._streak, STREAK_LEVELS, box, region.shape)
+        return cv2.add(wet, light, dst=wet)
 
 
-class CodedFog(_AsCoded):
+class _Hazed(_AsCoded):
     """White pixels in random places, blurred, added to a picture with less contrast."""
+
+    def _build(self) -> str:
+        self._half_blur = _gaussian(DROPLET_BLUR / 2.0)
+        return super()._build() + self._half_blur.calculated_by
+
+    def _hazed(
+        self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
+    ) -> np.ndarray:
+        """The picture's region behind the fog, which is blurred at half its size."""
+        shape, blur = picture.shape, self._half_blur
+        droplets = self._scattered.droplets(random, shape, DROPLETS * self._level)
+        wide = _halved(region.around(2 * (blur.size // 2) + 2, shape), shape)
+        rows, columns = wide.shape
+        half = cv2.resize(droplets[wide.part], (columns // 2, rows // 2), interpolation=cv2.INTER_AREA)
+        fog = cv2.resize(blur(half), (columns, rows))[region.inside(wide)]
+        return cv2.addWeighted(picture[region.part], 0.9 - 0.05 * self._level, fog, 1.0, 0.0)
+
+
+class CodedFog(_Hazed):
+    """The haze alone."""
 
     def _drawn(
         self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
     ) -> np.ndarray:
-        return hazed(picture, region, self._level, random)
+        return self._hazed(picture, region, random)
 
 
-class CodedSnow(_AsCoded):
+class CodedSnow(_Hazed):
     """The fog, and in front of it one layer of flakes for each level, blurred ever more, then smeared."""
 
     def _prepare(self, random: np.random.Generator) -> None:
@@ -111,19 +133,19 @@ class CodedSnow(_AsCoded):
         wide = region.around(len(self._smear) // 2, picture.shape)
         # Only flakes that begin in these rows are seen; one at a row's end goes on in the next.
         first, end = max(wide.top + FLAKE_REACH - FLAKE, 0), wide.bottom + FLAKE_REACH
-        layer, number = ((places >= first * columns) & (places < end * columns)).nonzero()
-        pixels = (columns * np.arange(FLAKE)[:, np.newaxis] + np.arange(FLAKE)).ravel()
-        light = np.zeros((end - first + FLAKE + 1, columns), np.uint16)
-        begins = places[layer, number, np.newaxis] - first * columns
-        np.add.at(light.reshape(-1), (begins + pixels).ravel(), self._flakes[layer].ravel())
+        light = self._scattered.flake_light(places, self._flakes[: self._level], columns, first, end)
         down, right = wide.top + FLAKE_REACH - first, wide.left + FLAKE_REACH
         light = light[down : down + wide.shape[0], right : right + wide.shape[1]]
         flakes = cv2.filter2D(cv2.convertScaleAbs(light), -1, self._smear)[region.inside(wide)]
-        return cv2.add(hazed(picture, region, self._level, random), flakes)
+        return cv2.add(self._hazed(picture, region, random), flakes)
 
 
 class CodedOcclusion(_AsCoded):
     """One blob for each level in the picture's lower half: a black core, and a gray rim with a hard edge."""
+
+    def _build(self) -> str:
+        self._blur = _gaussian(BLOB_BLUR)
+        return self._blur.calculated_by
 
     def _drawn(
         self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
@@ -135,22 +157,8 @@ class CodedOcclusion(_AsCoded):
             lowest = rows - radius
             centre = round(across * (columns - 1)), round(rows / 2 + down * (lowest - rows / 2))
             cv2.circle(mask, centre, radius, 0, cv2.FILLED)
-        mask = blurred(mask, region, BLOB_BLUR)
+        mask = filtered(mask, region, self._blur.size // 2, self._blur)
         return np.where(mask < COVERED, mask, picture[region.part])
-
-
-def hazed(
-    picture: np.ndarray | Picture, region: Region, level: int, random: np.random.Generator
-) -> np.ndarray:
-    """The picture's region behind the fog of that level, which is blurred at half its size."""
-    shape = picture.shape
-    droplets = np.zeros(shape, np.uint8)
-    droplets.reshape(-1)[random.integers(0, droplets.size, DROPLETS * level)] = WHITE
-    wide = _halved(region.around(2 * _reach(DROPLET_BLUR / 2.0) + 2, shape), shape)
-    rows, columns = wide.shape
-    half = cv2.resize(droplets[wide.part], (columns // 2, rows // 2), interpolation=cv2.INTER_AREA)
-    fog = cv2.resize(gaussian(half, DROPLET_BLUR / 2.0), (columns, rows))[region.inside(wide)]
-    return cv2.addWeighted(picture[region.part], 0.9 - 0.05 * level, fog, 1.0, 0.0)
 
 
 def _halved(region: Region, shape: tuple[int, int]) -> Region:
@@ -161,15 +169,9 @@ def _halved(region: Region, shape: tuple[int, int]) -> Region:
     return Region(top - top % 2, bottom + bottom % 2, left - left % 2, right + right % 2)
 
 
-def gaussian(picture: np.ndarray, sigma: float) -> np.ndarray:
-    """Blurred by a Gaussian that is cut at two sigma."""
-    size = 2 * _reach(sigma) + 1
-    return cv2.GaussianBlur(picture, (size, size), sigma)
-
-
-def blurred(picture: np.ndarray | Picture, region: Region, sigma: float) -> np.ndarray:
-    """The picture's region, the same."""
-    return filtered(picture, region, _reach(sigma), lambda wide: gaussian(wide, sigma))
+def _gaussian(sigma: float) -> Gaussian:
+    """A Gaussian that is cut at two sigma."""
+    return build_gaussian(sigma, 2 * _reach(sigma) + 1)
 
 
 def _reach(sigma: float) -> int:
@@ -177,18 +179,18 @@ def _reach(sigma: float) -> int:
     return ceil(2.0 * sigma)
 
 
-def _streak() -> tuple[np.ndarray, np.ndarray]:
-    """Pixels (n, 2) of a streak, column and row from where it begins, and where it ends."""
-    way = np.rint(STREAK_LENGTH * np.array([-sin(STREAK_LEAN), cos(STREAK_LEAN)])).astype(np.int32)
-    canvas = np.zeros((2 * MARGIN, 2 * MARGIN), np.uint8)
-    cv2.line(canvas, (MARGIN, 0), (MARGIN + int(way[0]), int(way[1])), 1)
+def _streak() -> Streak:
+    """A streak's pixels, and where it ends."""
+    way = np.rint(STREAK_LENGTH * np.array([-sin(STREAK_LEAN), cos(STREAK_LEAN)])).astype(np.int_)
+    canvas = np.zeros((2 * STREAK_LENGTH, 2 * STREAK_LENGTH), np.uint8)
+    cv2.line(canvas, (STREAK_LENGTH, 0), (STREAK_LENGTH + int(way[0]), int(way[1])), 1)
     row, column = canvas.nonzero()
-    return np.column_stack((column - MARGIN, row)), way
+    return Streak(np.column_stack((column - STREAK_LENGTH, row)), way)
 
 
 def _flake(sigma: float) -> np.ndarray:
-    """Grey levels (FLAKE x FLAKE, flat, uint16) of a blurred white block."""
+    """Grey levels (FLAKE x FLAKE, uint16) of a blurred white block."""
     block = np.zeros((FLAKE + 2 * FLAKE_REACH,) * 2, np.uint8)  # a blur reflects what lies at a border
     block[2 * FLAKE_REACH : -2 * FLAKE_REACH, 2 * FLAKE_REACH : -2 * FLAKE_REACH] = WHITE
     inside = slice(FLAKE_REACH, -FLAKE_REACH)
-    return gaussian(block, sigma)[inside, inside].astype(np.uint16).ravel()
+    return _gaussian(sigma)(block)[inside, inside].astype(np.uint16)

@@ -64,7 +64,8 @@ class Effect(ABC):
         self.amount = amount
         self.seed = seed
         self.camera = camera
-        self._key = type(self).__module__, type(self).__name__, amount, seed, astuple(camera)
+        made_of = amount, seed, astuple(camera), self._build()
+        self._key = type(self).__module__, type(self).__name__, *made_of
         self._prepared = False
 
     def apply(self, picture: np.ndarray | Picture, scene: Scene) -> np.ndarray | Picture:
@@ -99,6 +100,10 @@ class Effect(ABC):
     def thickness(self) -> float:
         """The amount's place between least and most, 0 to 1."""
         return (self.amount - self.LEAST) / (self.MOST - self.LEAST)
+
+    def _build(self) -> str:
+        """Choose what it calculates with; says which compiled code that is, if any."""
+        return ""
 
     @abstractmethod
     def _prepare(self, random: np.random.Generator) -> None:

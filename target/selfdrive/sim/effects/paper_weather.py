@@ -16,6 +16,7 @@ import numpy as np
 
 from selfdrive.common.array_math import each
 from selfdrive.sim.effects.canvas import Tile, filtered, seamless, splat, strokes
+from selfdrive.sim.effects.compiled_gaussian import build_gaussian
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
@@ -49,6 +50,10 @@ class _PaperWeather(Effect):
 class PaperRain(_PaperWeather):
     """1,000 streaks for each thickness on a background that loses contrast and sharpness."""
 
+    def _build(self) -> str:
+        self._blur = build_gaussian(self._between(0.5, 1.5))
+        return self._blur.calculated_by
+
     def _prepare(self, random: np.random.Generator) -> None:
         alpha = self._between(0.1, 0.2)
         self._lengths = [
@@ -79,10 +84,8 @@ class PaperRain(_PaperWeather):
         return levels
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
-        sigma, alpha = self._between(0.5, 1.5), self._between(0.75, 0.65)
-        margin = int(4 * sigma) + 1
-        wet = filtered(picture, region, margin, lambda wide: cv2.GaussianBlur(wide, (0, 0), sigma))
-        wet = cv2.convertScaleAbs(wet, alpha=alpha)
+        wet = filtered(picture, region, self._blur.size // 2, self._blur)
+        wet = cv2.convertScaleAbs(wet, alpha=self._between(0.75, 0.65))
         lengths = RAIN_SPEED[0] * scene.t + RAIN_SPEED[1] * scene.position
         for tile, length in zip(self._tiles, self._lengths, strict=True):
             way = length * lengths

@@ -83,11 +83,15 @@ class Particles:
 
         They move by `along` for a metre driven and by `fall` for a metre fallen.
         """
-        driven = (along / tall * scene.position / self._reaches) % 1.0  # in full precision, however far
         moved = self._speed * float(fall / tall * scene.t) / self._reach
         moved += first
-        moved += np.repeat(driven.astype(np.float32), self._counts)
+        moved += np.repeat(self._driven(scene, tall, along), self._counts)
         return moved - np.floor(moved)
+
+    def _driven(self, scene: Scene, tall: float, along: float) -> np.ndarray:
+        """Share of each box that driving moves its particles by, float32."""
+        driven = (along / tall * scene.position / self._reaches) % 1.0  # in full precision, however far
+        return driven.astype(np.float32)
 
 
 class Cover:
@@ -107,19 +111,17 @@ class Cover:
 
     def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
         """Shares in parts of 255, uint8, in a region of the picture."""
-        full = Region(*(end + MARGIN for end in region))
-        half = _seen_through(full, self._sizes[1])
-        quarter = _seen_through(half, self._sizes[2])
-        windows = [
+        full, half, quarter = windows(region, self._sizes)
+        grids = [
             self._sheet[row + window.top : row + window.bottom, column + window.left : column + window.right]
             for (row, column), window in zip(self._places, (full, half, quarter), strict=True)
         ]
-        for window in windows:
-            window.fill(0.0)
+        for grid in grids:
+            grid.fill(0.0)
         self._draw(streaks, (full, half, quarter))
-        windows[1] += _enlarged(windows[2], quarter, half)
-        coarse = _enlarged(cv2.convertScaleAbs(windows[1], alpha=255.0), half, full)
-        return cv2.add(cv2.convertScaleAbs(windows[0], alpha=255.0), coarse)
+        grids[1] += _enlarged(grids[2], quarter, half)
+        coarse = _enlarged(cv2.convertScaleAbs(grids[1], alpha=255.0), half, full)
+        return cv2.add(cv2.convertScaleAbs(grids[0], alpha=255.0), coarse)
 
     def _draw(self, streaks: Streaks, windows: tuple[Region, ...]) -> None:
         """Each streak as points on its grid, as far as they lie in that grid's window."""
@@ -144,6 +146,13 @@ class Cover:
             (columns >= first[0]) & (columns < last[0]) & (rows >= first[1]) & (rows < last[1])
         )
         splat(self._sheet, columns[inside], rows[inside], np.repeat(share, counts)[inside])
+
+
+def windows(region: Region, sizes: list[tuple[int, int]]) -> tuple[Region, Region, Region]:
+    """The parts of the full, the half and the quarter grid, of these sizes, that make up a region."""
+    full = Region(*(end + MARGIN for end in region))
+    half = _seen_through(full, sizes[1])
+    return full, half, _seen_through(half, sizes[2])
 
 
 def _seen_through(fine: Region, size: tuple[int, int]) -> Region:

@@ -9,14 +9,15 @@ singly weighs as much.
 from abc import abstractmethod
 from math import exp, log
 
-import cv2
 import numpy as np
 
 from selfdrive.common.array_math import each
 from selfdrive.sim.effects.air import airlight, clearness
+from selfdrive.sim.effects.compiled_gaussian import build_gaussian
+from selfdrive.sim.effects.compiled_precipitation import build_parts
 from selfdrive.sim.effects.effect import Effect, Scene
-from selfdrive.sim.effects.particles import Box, Cover, Particles
-from selfdrive.sim.effects.windscreen import Windscreen
+from selfdrive.sim.effects.particles import Box
+from selfdrive.sim.effects.windscreen import BLUR, Windscreen
 from selfdrive.sim.picture import Picture, Region, whole
 
 EXPOSURE = 0.001  # s, under a grey sky
@@ -35,14 +36,18 @@ class _Precipitation(Effect):
     REACHES: tuple[tuple[float, float], ...]
     IN_BOX: int
 
+    def _build(self) -> str:
+        self._parts, by = build_parts(self.camera)
+        return by
+
     def _prepare(self, random: np.random.Generator) -> None:
-        self._cover = Cover(self.camera)
+        self._cover = self._parts.cover(self.camera)
         limits = [least for least, _ in self.REACHES] + [self.largest()]
         boxes = [
             self._box(random, least, most, reach)
             for (least, reach), most in zip(self.REACHES, limits[1:], strict=True)
         ]
-        self._particles = Particles(random, self.camera, boxes)
+        self._particles = self._parts.particles(random, self.camera, boxes)
         self._veil = np.rint(255.0 * clearness(self.extinction(), self.camera)).astype(np.uint8)
 
     def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Box:
@@ -66,10 +71,8 @@ class _Precipitation(Effect):
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         taken = self._cover.taken(self._particles.streaks(scene, EXPOSURE), region)
-        kept = cv2.multiply(self._veil[region.part], cv2.bitwise_not(taken), scale=1.0 / 255.0)
         air = airlight(picture, self.camera)
-        lost = cv2.convertScaleAbs(kept, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
-        return cv2.add(cv2.multiply(picture[region.part], kept, scale=1.0 / 255.0), lost)
+        return self._parts.veiled(picture[region.part], self._veil[region.part], taken, air)
 
     @abstractmethod
     def _spectrum(self) -> tuple[float, float]:
@@ -98,10 +101,15 @@ class Rain(_Precipitation):
     REACHES = (1.0, 1.2), (2.0, 2.0), (3.0, 3.0)
     IN_BOX = 900
 
+    def _build(self) -> str:
+        self._blur = build_gaussian(BLUR)
+        return super()._build() + self._blur.calculated_by
+
     def _prepare(self, random: np.random.Generator) -> None:
         limits = self.REACHES[0][0], self.largest()
         diameters = 0.001 * self._diameters(random, *limits, ON_GLASS)
-        self._glass = Windscreen(random, self.camera, self.density(*limits), diameters)
+        of = self.camera, self.density(*limits), diameters
+        self._glass = Windscreen(random, *of, self._parts.shrunk, self._blur)
         super()._prepare(random)
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:

@@ -5,6 +5,7 @@ import numpy as np
 
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.effects.canvas import filtered
+from selfdrive.sim.effects.compiled_gaussian import build_gaussian
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
@@ -69,9 +70,12 @@ class GaussianBlur(_OddKernel):
 
     UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 
+    def _build(self) -> str:
+        self._blur = build_gaussian(0.0, int(self.amount))
+        return self._blur.calculated_by
+
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
-        size = int(self.amount)
-        return filtered(picture, region, size, lambda wide: cv2.GaussianBlur(wide, (size, size), 0))
+        return filtered(picture, region, self._blur.size // 2, self._blur)
 
 
 class MedianBlur(_OddKernel):

@@ -1,5 +1,6 @@
 """Rain drops on the windscreen in front of the camera: they stay where they land until the wiper comes by."""
 
+from collections.abc import Callable
 from math import exp, tan
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from selfdrive.common.array_math import each
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import Scene
+from selfdrive.sim.effects.gaussian import Gaussian
 from selfdrive.sim.picture import Region
 
 DISTANCE = 0.05  # m from lens to glass
@@ -57,12 +59,19 @@ class Pixels(NamedTuple):
 class Windscreen:
     """Drops of `diameters` (m, of those that land one after the other) landing on a car in rain.
 
-    `density` is their number per m^3 of air.
+    `density` is their number per m^3 of air. What drops show is made by `shrink` and `blur`.
     """
 
     def __init__(
-        self, random: np.random.Generator, camera: CameraModel, density: float, diameters: np.ndarray
+        self,
+        random: np.random.Generator,
+        camera: CameraModel,
+        density: float,
+        diameters: np.ndarray,
+        shrink: Callable[[np.ndarray, tuple[int, int]], np.ndarray],
+        blur: Gaussian,
     ) -> None:
+        self._shrink, self._blur = shrink, blur
         self._size = camera.width // COARSE, camera.rows // COARSE
         area = DISTANCE**2 * camera.width / camera.fx * camera.rows / camera.fy
         self._per_metre = density * area  # drops for each metre of air that moves at the glass
@@ -78,8 +87,7 @@ class Windscreen:
         wipe, since = divmod(scene.t + self._start, WIPE)
         wholly, edges = self._landing(region, picture.shape[1])[int(wipe) % SETS]
         landed = int(self._per_metre * _speed(scene.v_ego) * since)
-        through = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
-        through = cv2.GaussianBlur(through, (0, 0), BLUR).reshape(-1)
+        through = self._blur(self._shrink(picture, self._size)).reshape(-1)
         seen = picture[region.part].copy()
         flat = seen.reshape(-1)
         places, sources, shares = edges.first(landed)
@@ -95,6 +103,11 @@ class Windscreen:
             self._seen = [tuple(part.within(region, columns) for part in drops) for drops in self._sets]
             self._region = region
         return self._seen
+
+
+def shrunk(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """The picture in so many columns and rows, each pixel the mean of what it stands for."""
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def _speed(v_ego: float) -> float:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.effects import CodedFog, CodedOcclusion, CodedRain, CodedSnow
-from selfdrive.sim.effects.as_coded import FLAKE, _flake, gaussian
+from selfdrive.sim.effects.as_coded import FLAKE, _flake, _gaussian
 
 EFFECTS = (CodedRain, CodedFog, CodedSnow, CodedOcclusion)
 
@@ -65,16 +65,16 @@ def test_a_flake_is_a_blurred_block():
     block = np.zeros((40, 40), np.uint8)
     block[19:21, 19:21] = 255
     for layer in range(1, 11):
-        blurred = gaussian(block, 0.5 + layer / 10.0)
+        blurred = _gaussian(0.5 + layer / 10.0)(block)
         middle = slice(20 - FLAKE // 2, 20 + FLAKE // 2)
-        assert np.array_equal(_flake(0.5 + layer / 10.0).reshape(FLAKE, FLAKE), blurred[middle, middle])
+        assert np.array_equal(_flake(0.5 + layer / 10.0), blurred[middle, middle])
         assert blurred.sum() == blurred[middle, middle].sum()
 
 
 def test_gaussians_end_at_two_sigma():
     """Beyond there is nothing of a point's light."""
-    point = np.zeros((41, 41), np.uint8)
-    point[20, 20] = 255
+    point = np.zeros((41, 41), np.float32)
+    point[20, 20] = 255.0
     for sigma, reach in ((0.6, 2), (1.5, 3), (7.0, 14)):
-        rows = cv2.reduce(gaussian(point.astype(np.float32), sigma), 1, cv2.REDUCE_SUM).ravel().nonzero()[0]
+        rows = cv2.reduce(_gaussian(sigma)(point), 1, cv2.REDUCE_SUM).ravel().nonzero()[0]
         assert (rows[0], rows[-1]) == (20 - reach, 20 + reach)

@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from selfdrive.sim.effects.windscreen import WIPE, Windscreen
+from selfdrive.sim.effects.gaussian import Gaussian
+from selfdrive.sim.effects.windscreen import BLUR, WIPE, Windscreen, shrunk
 from selfdrive.sim.picture import whole
 
 
 @pytest.fixture
 def glass(camera):
     """A windscreen in rain of 1,000 drops of 2 mm in a cubic metre."""
-    return Windscreen(np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002))
+    return Windscreen(np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002), shrunk, Gaussian(BLUR))
 
 
 def wet(glass, picture, moment, share, wipe=3):

@@ -1,0 +1,158 @@
+"""Rain and snow in C, where that was compiled and gives OpenCV's bits."""
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import astuple
+from functools import cache, partial
+from math import cos, sin
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from selfdrive.common import compiled
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim.effects.air import veiled
+from selfdrive.sim.effects.effect import Scene
+from selfdrive.sim.effects.particles import FAINTEST, NEAREST, Cover, Particles, Streaks, windows
+from selfdrive.sim.effects.windscreen import COARSE, shrunk
+from selfdrive.sim.picture import Region, whole
+
+C_SOURCE = Path(__file__).with_name("precipitation.c")
+AREA = 0.25 * np.pi
+PROBE = CameraModel(width=88, rows=64)
+AIRS = 93.75, 126.25, 11.9, 21.25  # levels of air at which a fused sum tells
+
+_POINTER, _LONG, _FLOAT = ctypes.c_void_p, ctypes.c_long, ctypes.c_float
+
+
+class Parts(NamedTuple):
+    """What precipitation is made with."""
+
+    particles: Callable[..., Particles]
+    cover: Callable[[CameraModel], Cover]
+    veiled: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
+    shrunk: Callable[[np.ndarray, tuple[int, int]], np.ndarray]
+
+
+PLAIN = Parts(Particles, Cover, veiled, shrunk)
+
+
+def build_parts(camera: CameraModel) -> tuple[Parts, str]:
+    """The parts for a camera, in C where they may be, and which compiled code they calculate with, if any."""
+    library = compiled.library(C_SOURCE)
+    # NumPy's numbers, unlike Python's, would have arrays calculated in double precision.
+    numbers = all(type(number) in (int, float) for number in astuple(camera))
+    if library is None or not numbers or not agrees(library):
+        return PLAIN, ""
+    return _compiled(library), library.digest.hex()
+
+
+def _compiled(library: compiled.Library) -> Parts:
+    return Parts(*(partial(part, library) for part in (CompiledParticles, CompiledCover, _veiled, _shrunk)))
+
+
+class CompiledParticles(Particles):
+    """Does what Particles does: `library` is `precipitation.c`, compiled. Its streaks are there until the
+    next ones are asked for."""
+
+    def __init__(self, library: compiled.Library, *of) -> None:
+        super().__init__(*of)
+        self._streaks = library.code.streaks
+        self._streaks.argtypes = [_POINTER, _LONG, _POINTER, _POINTER, _LONG, _POINTER, _POINTER]
+        self._streaks.restype = _LONG
+        of_all = self._reach, self._size, self._speed, self._across, self._down, self._ahead
+        self._all, self._number = np.stack(of_all), np.array(self._counts, np.int_)
+        self._made = np.empty((5, self._size.size), np.float32)
+
+    def streaks(self, scene: Scene, exposure: float) -> Streaks:
+        """The streaks of all particles in view in `exposure` seconds from the scene's moment."""
+        camera, lean, upright = self._camera, sin(self._camera.pitch), cos(self._camera.pitch)
+        tall, v_ego = camera.rows / camera.fy, float(scene.v_ego)
+        numbers = (
+            *(float(lean * scene.t), float(upright / tall * scene.t)),
+            *(camera.cx, camera.cy, camera.fx, camera.fy, camera.rows, camera.width),
+            *(lean, upright, exposure, upright * v_ego, lean * v_ego, NEAREST, FAINTEST, AREA),
+        )
+        moment = np.array(numbers, np.float32)
+        driven = np.stack([self._driven(scene, 1.0, -upright), self._driven(scene, tall, lean)], axis=1)
+        made, boxes = self._made, len(self._counts)
+        arrays = (self._number.ctypes.data, driven.ctypes.data, boxes, moment.ctypes.data, made.ctypes.data)
+        found = self._streaks(self._all.ctypes.data, made.shape[1], *arrays)
+        return Streaks(made[0:2, :found], made[2:4, :found], made[4, :found])
+
+
+class CompiledCover(Cover):
+    """Does what Cover does, likewise."""
+
+    def __init__(self, library: compiled.Library, camera: CameraModel) -> None:
+        super().__init__(camera)
+        self._taken = library.code.taken
+        self._taken.argtypes = [*[_POINTER] * 3, _LONG, *[_POINTER] * 3, _FLOAT, _POINTER, _LONG, _POINTER]
+        self._taken.restype = _LONG
+        # Places of grids: columns, then rows.
+        self._first, self._last = (np.ascontiguousarray(ends.T) for ends in (self._corners, self._ends))
+
+    def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
+        """Shares in parts of 255, uint8, in a region of the picture."""
+        start, end, width = map(np.ascontiguousarray, streaks)
+        seen = np.array(windows(region, self._sizes), np.int_)
+        out = np.empty(region.shape, np.uint8)
+        arrays = [array.ctypes.data for array in (seen, self._first, self._last)]
+        sheet = self._sheet.ctypes.data, self._sheet.shape[1]
+        ends = start.ctypes.data, end.ctypes.data, width.ctypes.data
+        if self._taken(*ends, width.size, *arrays, AREA, *sheet, out.ctypes.data):
+            raise MemoryError
+        return out
+
+
+def _veiled(
+    library: compiled.Library, picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, light: float
+) -> np.ndarray:
+    """Does what `veiled` does, likewise."""
+    code = library.code.veiled
+    code.argtypes = [_POINTER, _LONG, _POINTER, _LONG, _POINTER, _LONG, _LONG, _FLOAT, _FLOAT, _POINTER]
+    code.restype = None
+    picture, veil, taken = _rows(picture), _rows(veil), np.ascontiguousarray(taken)
+    out = np.empty(picture.shape, np.uint8)
+    arrays = picture.ctypes.data, picture.strides[0], veil.ctypes.data, veil.strides[0], taken.ctypes.data
+    code(*arrays, *picture.shape, -light / 255.0, light, out.ctypes.data)
+    return out
+
+
+def _shrunk(library: compiled.Library, picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Does what `shrunk` does, likewise."""
+    columns, rows = size
+    if picture.shape != (COARSE * rows, COARSE * columns):
+        return shrunk(picture, size)
+    code = library.code.coarse
+    code.argtypes = [_POINTER, _LONG, _LONG, _POINTER, _POINTER]
+    code.restype = None
+    picture = np.ascontiguousarray(picture)
+    out, sums = np.empty((rows, columns), np.uint8), np.empty(COARSE * columns, np.uint16)
+    code(picture.ctypes.data, rows, columns, sums.ctypes.data, out.ctypes.data)
+    return out
+
+
+def _rows(picture: np.ndarray) -> np.ndarray:
+    """The picture with the pixels of a row next to each other."""
+    return picture if picture.strides[1] == 1 else np.ascontiguousarray(picture)
+
+
+@cache
+def agrees(library: compiled.Library) -> bool:
+    """Whether compiled code has OpenCV's bits: one without fused sums, for instance, calculates otherwise."""
+    number = np.arange(120)
+    places = np.stack([number * 37 % 92 - 2.0, number * 53 % 68 - 2.0]).astype(np.float32)
+    ways = np.stack([number % 7 * 0.83 - 2.4, number % 5 * 1.37]).astype(np.float32)
+    streaks = Streaks(places, places + ways, (number % 12 * 0.53 + 0.2).astype(np.float32))
+    level, share = np.divmod(np.arange(64 * 88) * 11, 256)
+    picture, veil = (part.astype(np.uint8).reshape(64, 88) for part in (level, share))
+    seen = []
+    for parts in (PLAIN, _compiled(library)):
+        cover = parts.cover(PROBE)
+        taken = cover.taken(streaks, whole((PROBE.rows, PROBE.width)))
+        pictures = [parts.veiled(picture, veil, taken, light) for light in AIRS]
+        arrays = cover._sheet, parts.shrunk(veil, (11, 8)), *pictures
+        seen.append([array.tobytes() for array in arrays])
+    return seen[0] == seen[1]

@@ -1,0 +1,68 @@
+"""What chance scatters over a picture as coded: streaks, flakes and droplets, as the light that they add."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+WHITE = 255
+
+
+class Streak(NamedTuple):
+    """Pixels (n, 2) of a streak, column and row from where it begins, and where it ends; all int_."""
+
+    pixels: np.ndarray
+    way: np.ndarray
+
+
+def streak_light(
+    chances: np.ndarray, streak: Streak, levels: np.ndarray, box: np.ndarray, shape: tuple[int, int]
+) -> np.ndarray:
+    """Grey levels (uint8) of streaks in a region of that shape of a canvas.
+
+    `chances` (passes, n, 2), float32, are where streaks begin, as shares of the canvas' columns and rows,
+    which `box` has, and then where in the canvas the region begins. Each pass adds its level (uint8).
+    """
+    rows, columns = shape
+    margin = reach(streak)
+    layer = np.empty((rows + 2 * margin, columns + 2 * margin), np.uint8)
+    inside = layer[margin:-margin, margin:-margin]
+    pixels = streak.pixels[:, 1] * layer.shape[1] + streak.pixels[:, 0]
+    light = np.zeros(shape, np.uint8)
+    for chance, level in zip(chances, levels, strict=True):
+        start = (chance * box[:2]).astype(np.int32) - box[2:]
+        end = start + streak.way
+        there = (end[:, 0] < columns) & (start[:, 0] >= 0) & (end[:, 1] >= 0) & (start[:, 1] < rows)
+        column, row = start[there].T + margin
+        layer.fill(0)
+        layer.reshape(-1)[(row * layer.shape[1] + column)[:, np.newaxis] + pixels] = level
+        cv2.add(light, inside, dst=light)
+    return light
+
+
+def flake_light(places: np.ndarray, flakes: np.ndarray, columns: int, first: int, end: int) -> np.ndarray:
+    """Summed grey levels (uint16) of flakes that begin in rows `first` to `end` - 1 of so many columns.
+
+    `places` (layers, n) are numbers of pixels in row-major order; `flakes` (layers, size, size), uint16, are
+    the layers' flakes. A flake at a row's end goes on in the next. There are as many rows more below as a
+    flake has, and one.
+    """
+    layer, number = ((places >= first * columns) & (places < end * columns)).nonzero()
+    size = flakes.shape[1]
+    pixels = (columns * np.arange(size)[:, np.newaxis] + np.arange(size)).ravel()
+    light = np.zeros((end - first + size + 1, columns), np.uint16)
+    begins = places[layer, number, np.newaxis] - first * columns
+    np.add.at(light.reshape(-1), (begins + pixels).ravel(), flakes[layer].ravel())
+    return light
+
+
+def droplets(random: np.random.Generator, shape: tuple[int, int], count: int) -> np.ndarray:
+    """A black picture with white pixels in `count` random places. Draws the last numbers from `random`."""
+    picture = np.zeros(shape, np.uint8)
+    picture.reshape(-1)[random.integers(0, picture.size, count)] = WHITE
+    return picture
+
+
+def reach(streak: Streak) -> int:
+    """How many pixels far a streak reaches."""
+    return int(np.abs(streak.pixels).max()) + 1

@@ -1,0 +1,232 @@
+"""Effects in C: the bits of the Python code, at any level, of any size, whole and in part."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from selfdrive.common import compiled
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.sim import compile_helpers, effects
+from selfdrive.sim.effects import (
+    air,
+    compiled_gaussian,
+    compiled_precipitation,
+    compiled_scattered,
+    gaussian,
+    particles,
+    precipitation,
+    scattered,
+)
+from selfdrive.sim.effects.compiled_gaussian import CompiledGaussian, build_gaussian
+from selfdrive.sim.effects.effect import Moment
+from selfdrive.sim.effects.gaussian import Gaussian
+from selfdrive.sim.effects.levels import LEVELS
+from selfdrive.sim.picture import Picture, Region
+from selfdrive.sim.picture_camera import PictureCamera
+from selfdrive.sim.run import simulate, write
+from selfdrive.sim.scenario import load_scenario
+from selfdrive.sim.vision import AS_CODED, PAPER, Pictures
+
+SCENARIO = Path(__file__).resolve().parents[4] / "fault_library/scenarios/S1.yaml"
+CAMERAS = {
+    "usual": CameraModel(),
+    "large": CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5),
+    "odd": replace(CameraModel(), width=321, rows=243, cx=160.0, cy=130.0),
+}
+COMPILED = (
+    effects.CodedFog,
+    effects.CodedOcclusion,
+    effects.CodedRain,
+    effects.CodedSnow,
+    effects.GaussianBlur,
+    effects.PaperRain,
+    effects.Rain,
+    effects.Snow,
+)
+C_SOURCES = (compiled_gaussian.C_SOURCE, compiled_precipitation.C_SOURCE, compiled_scattered.C_SOURCE)
+
+pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with all helpers."""
+    made = tmp_path_factory.mktemp("compiled")
+    list(compile_helpers.compile_helpers(made))
+    return made
+
+
+@pytest.fixture
+def both(folder):
+    """An effect in Python and in C. The latter is skipped where OpenCV calculates in another way."""
+
+    def made(kind, amount, seed, camera):
+        compiled.use(None)
+        plain = kind(amount, seed, camera).ready()
+        compiled.use(folder)
+        fast = kind(amount, seed, camera).ready()
+        if fast._key == plain._key:
+            pytest.skip("OpenCV calculates in another way here")
+        return plain, fast
+
+    yield made
+    compiled.use(None)
+
+
+def pictures(random, shape):
+    """Noise, something smooth, and black, white and grey."""
+    noise = random.integers(0, 256, shape, np.uint8)
+    return [
+        noise,
+        cv2.GaussianBlur(noise, (0, 0), 6.0),
+        *(np.full(shape, level, np.uint8) for level in (0, 255)),
+    ]
+
+
+@pytest.mark.parametrize("size", CAMERAS)
+@pytest.mark.parametrize("kind", COMPILED)
+def test_compiled_effects_have_the_same_bits(both, kind, size):
+    """The whole picture and any region of it, mild and strong, with any seed, early, late, slow and fast."""
+    camera, random = CAMERAS[size], np.random.default_rng(7)
+    amounts = LEVELS[kind]
+    for seed, amount in enumerate({amounts[0], amounts[len(amounts) // 2], amounts[-1]}):
+        plain, fast = both(kind, amount, 123456789 * seed, camera)
+        for picture in pictures(random, (camera.rows, camera.width)):
+            scene = Moment(*random.uniform((-1.0, 0.0, 0.0), (60.0, 2000.0, 45.0)).tolist())
+            seen = plain.apply(picture, scene)
+            assert np.array_equal(fast.apply(picture, scene), seen)
+            lazy = fast.apply(
+                Picture(("any",), picture.shape, lambda region, p=picture: p[region.part]), scene
+            )
+            top, left = random.integers(0, picture.shape)
+            bottom, right = random.integers((top + 1, left + 1), np.add(picture.shape, 1))
+            part = Region(top, bottom, left, right).part
+            assert np.array_equal(lazy[part], seen[part])
+
+
+@pytest.mark.parametrize("speed", [np.float64(20.0), np.nan, np.inf, -5.0, 1e30])
+def test_impossible_speeds_are_drawn_alike(both, camera, speed):
+    """Also what is no number, as a fault may have it."""
+    plain, fast = both(effects.Snow, 10, 1, camera)
+    picture = np.full((camera.rows, camera.width), 90, np.uint8)
+    scene = Moment(3.0, 77.0, speed)
+    with np.errstate(all="ignore"):
+        assert np.array_equal(fast.apply(picture, scene), plain.apply(picture, scene))
+
+
+@pytest.mark.parametrize(("sigma", "size"), [(0.5, 0), (1.2, 0), (5.0, 0), (7.0, 29), (0.0, 3), (0.0, 31)])
+def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
+    """Of pictures of any size, as small as the kernel and smaller, and of cut and turned ones."""
+    compiled.use(folder)
+    fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
+    compiled.use(None)
+    if not isinstance(fast, CompiledGaussian):
+        pytest.skip("OpenCV calculates in another way here")
+    for shape in [(1, 1), (3, 90), (plain.size // 2 + 1,) * 2, (60, 80), *random.integers(1, 200, (12, 2))]:
+        for picture in pictures(random, tuple(shape)):
+            assert np.array_equal(fast(picture), plain(picture))
+            assert np.array_equal(fast(picture[::-1, ::2]), plain(picture[::-1, ::2]))
+
+
+def test_droplets_are_numpys_whatever_was_drawn_before(folder):
+    """Numbers are drawn from a new generator, and from one with half a number left; few and many."""
+    compiled.use(folder)
+    fast, by = compiled_scattered.build_scattered()
+    compiled.use(None)
+    assert by
+    for before in range(3):
+        for shape, count in (((480, 640), 1), ((480, 640), 15_000), ((1, 3), 40), ((720, 1279), 150_001)):
+            one, other = (np.random.Generator(np.random.PCG64([count, before])) for _ in range(2))
+            for random in (one, other):
+                random.random(before, np.float32)
+            seen = scattered.droplets(one, shape, count)
+            assert np.array_equal(fast.droplets(other, shape, count), seen)
+
+
+@pytest.mark.parametrize("source", C_SOURCES, ids=lambda source: source.stem)
+def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, source):
+    """Where any file that the C stands for has a fault there is no library."""
+    compiled.use(folder)
+    assert compiled.library(source) is not None
+    named = compiled.stands_for(source.read_bytes())
+    for name in (source.name, *named):
+        shutil.copy(source.with_name(name), tmp_path)
+    assert compiled.library(tmp_path / source.name) is not None
+    for name in named:
+        text = (tmp_path / name).read_text()
+        (tmp_path / name).write_text(text + "\n")
+        assert compiled.library(tmp_path / source.name) is None
+        (tmp_path / name).write_text(text)
+    compiled.use(None)
+
+
+def test_another_opencv_is_left_alone(folder, monkeypatch):
+    """Where it has other bits than the compiled code, Python calls it, and no library is named."""
+    compiled.use(folder)
+    darker = Gaussian.__call__
+    monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)
+    plain = compiled_precipitation.PLAIN
+    monkeypatch.setattr(
+        compiled_precipitation, "PLAIN", plain._replace(veiled=lambda *of: air.veiled(*of) // 2)
+    )
+    caches = compiled_gaussian.agrees, compiled_precipitation.agrees
+    for kept in caches:
+        kept.cache_clear()
+    assert type(build_gaussian(1.5)) is gaussian.Gaussian
+    parts, by = compiled_precipitation.build_parts(CameraModel())
+    assert parts.particles is particles.Particles and by == ""
+    for kept in caches:
+        kept.cache_clear()
+    compiled.use(None)
+
+
+def test_a_camera_of_numpys_numbers_is_left_to_python(folder):
+    """With these NumPy calculates in double precision."""
+    compiled.use(folder)
+    camera = replace(CameraModel(), cx=np.float64(317.9))
+    assert precipitation.build_parts(camera)[1] == ""
+    compiled.use(None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [effects.PaperRain, effects.PaperSnow, effects.Rain, effects.Snow])
+def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
+    """Record and trace of closed-loop runs are the same with and without compiled code."""
+    same_runs(folder, tmp_path, monkeypatch, kind, PAPER)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [effects.CodedRain, effects.CodedSnow])
+def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
+    """Likewise, seen by the detector as coded."""
+    same_runs(folder, tmp_path, monkeypatch, kind, AS_CODED)
+
+
+def same_runs(folder, tmp_path, monkeypatch, kind, detector):
+    """Drive twice through weather of middle strength."""
+    look, scenario = PictureCamera.look, load_scenario(SCENARIO)
+    amount = LEVELS[kind][4]
+
+    def driven(libraries):
+        compiled.use(libraries)
+        weather = []
+
+        def in_weather(camera, truth):
+            if not weather:
+                weather.append(kind(amount, 5, camera.model))
+            view = look(camera, truth)
+            return view._replace(picture=weather[0].apply(view.picture, truth))
+
+        monkeypatch.setattr(PictureCamera, "look", in_weather)
+        pictures = Pictures(detector=detector, cache=tmp_path / "frames")
+        (tmp_path / "frames" / "detections-1.table").unlink(missing_ok=True)
+        out = tmp_path / ("fast" if libraries else "plain")
+        write(simulate(scenario, 0, pictures), out)
+        assert bool(weather[0]._key[-1]) == (libraries is not None and kind is not effects.PaperSnow)
+        return [(out / name).read_bytes() for name in ("record.json", "trace.npz")]
+
+    assert driven(folder) == driven(None)
+    compiled.use(None)
