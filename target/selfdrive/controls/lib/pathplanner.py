@@ -1,8 +1,9 @@
 """Where the road goes: lane lines and the model's path, and the path to follow between them."""
 
 from selfdrive.common.interp import interp
+from selfdrive.controls.lib.compiled_fit import build_fit
 from selfdrive.controls.lib.lateral_mpc import Lanes
-from selfdrive.controls.lib.polynomial import ZERO, CubicFit, Poly, blend, shifted
+from selfdrive.controls.lib.polynomial import ZERO, Poly, blend, shifted
 from selfdrive.messages import ModelData
 
 WIDTH_RATE = 0.005  # share of a new width that enters the estimate, each model message
@@ -20,7 +21,7 @@ class ModelFit:
     """
 
     def __init__(self) -> None:
-        self._fit = CubicFit()
+        self._fit = build_fit()
         self._model: ModelData | None = None
         self._polys = (ZERO, ZERO, ZERO)
 

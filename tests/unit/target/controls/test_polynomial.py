@@ -1,7 +1,15 @@
 """Cubics and their fit."""
 
+import math
+import random
+from pathlib import Path
+
 import pytest
-from selfdrive.controls.lib.polynomial import ZERO, CubicFit, blend, shifted, slope, value
+from selfdrive.common import compiled
+from selfdrive.controls.lib.compiled_fit import CompiledFit, build_fit
+from selfdrive.controls.lib.cubic_fit import CubicFit
+from selfdrive.controls.lib.polynomial import ZERO, blend, shifted, slope, value
+from selfdrive.sim.compile_helpers import compile_helpers, compiler
 
 CURVE = (1e-5, -2e-3, 0.05, 1.85)
 
@@ -19,6 +27,30 @@ def test_fit_is_least_squares() -> None:
         assert sum((y - value(curve, x)) * x**power for x, y in enumerate(points)) == pytest.approx(
             0, abs=1e-6
         )
+
+
+@pytest.mark.skipif(not compiler(), reason="there is no C compiler")
+def test_a_compiled_fit_has_the_same_bits(tmp_path: Path) -> None:
+    """Of any points, also where there are too few or too many of them, or infinite ones, or whole numbers."""
+    list(compile_helpers(tmp_path))
+    compiled.use(tmp_path)
+    fast = build_fit()
+    compiled.use(None)
+    assert isinstance(fast, CompiledFit) and type(build_fit()) is CubicFit
+    draw = random.Random(3)
+    cases: list[list[float]] = [[draw.gauss(0.0, 10.0**size) for _ in range(50)] for size in range(-3, 12)]
+    cases += [[0.0] * 50, [-0.0] * 50, list(range(50)), cases[0][:7], [*cases[0], 1.0], []]
+    cases += [[*cases[0][:20], odd, *cases[0][21:]] for odd in (math.inf, 1e308, 10**400)]
+    for points in cases:
+        try:
+            wanted = repr(CubicFit()(points))
+        except OverflowError as error:
+            with pytest.raises(OverflowError, match=str(error)):
+                fast(points)
+        else:
+            assert repr(fast(points)) == wanted
+    with pytest.raises(TypeError, match="unsupported operand"):
+        fast([*cases[0][:20], None])  # type: ignore[list-item]
 
 
 def test_slope() -> None:

@@ -1,0 +1,42 @@
+"""Fitting a cubic in C, where that was compiled."""
+
+import ctypes
+from array import array
+from collections.abc import Sequence
+from itertools import chain
+from pathlib import Path
+
+from selfdrive.common import compiled
+from selfdrive.controls.lib.cubic_fit import N_POINTS, POWERS, CubicFit, weights
+from selfdrive.controls.lib.polynomial import Poly
+
+C_SOURCE = Path(__file__).with_name("cubic_fit.c")
+
+
+def build_fit() -> CubicFit:
+    """A CubicFit, compiled where it is to be used and has been."""
+    library = compiled.library(C_SOURCE)
+    return CompiledFit(library) if library else CubicFit()
+
+
+class CompiledFit(CubicFit):
+    """Does what CubicFit does: `library` is `cubic_fit.c`, compiled."""
+
+    def __init__(self, library: compiled.Library) -> None:
+        self._fit = library.code.fit
+        self._fit.restype = None
+        self._points, self._poly = array("d", bytes(8 * N_POINTS)), array("d", bytes(8 * len(POWERS)))
+        arrays = array("d", chain(*weights(N_POINTS))), self._points, self._poly
+        self._held = [ctypes.c_double.from_buffer(values) for values in arrays]
+        of, points, poly = (ctypes.c_void_p(ctypes.addressof(first)) for first in self._held)
+        self._arguments = of, points, ctypes.c_long(N_POINTS), poly
+
+    def __call__(self, points: Sequence[float]) -> Poly:
+        """The cubic through `points` (m)."""
+        try:
+            self._points[:] = array("d", points)
+        except (TypeError, OverflowError, BufferError):  # a fault may make them no numbers, or fewer
+            return super().__call__(points)
+        self._fit(*self._arguments)
+        a, b, c, d = self._poly
+        return a, b, c, d
