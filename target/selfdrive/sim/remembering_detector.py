@@ -38,7 +38,7 @@ SEEING = (
     "sim/warp.*",
     "visiond/[!v]*.py",
     "visiond/voting.py",
-    "visiond/*.c",
+    "visiond/*.[ch]",
     "visiond/lane_net.npz",
 )
 _NUMBERS = 9  # of three lines

@@ -5,6 +5,7 @@ the two clusters next to the picture's middle are the lane's lines, whatever the
 as theirs is not published.
 """
 
+from collections.abc import Sequence
 from math import pi, sqrt
 
 import cv2
@@ -64,8 +65,12 @@ class CodedDetector:
         """The lines in `view.picture`. Where no edge is seen at all they stay where they were."""
         part = np.ascontiguousarray(view.picture[PART])
         points = self._points(part)
-        if points.size:
-            left, right = _columns_of_lines(points)
+        return self._kept(_columns_of_lines(points) if points.size else None)
+
+    def _kept(self, columns: Sequence[float] | None) -> LaneLines:
+        """The lines that are read in these columns; those seen last where there are none."""
+        if columns:
+            left, right = columns
             self.state = metres(left + INWARD), metres(right - INWARD)
         left, right = (RoadLine(y=y) for y in self.state)
         return LaneLines(left=left, right=right, path=RoadLine(y=0.0))
@@ -77,15 +82,11 @@ class CodedDetector:
         looked_at = np.flatnonzero(edges.sum(axis=(1, 2)) >= LEAST_EDGES)
         if not looked_at.size:
             return np.empty((0, 2), np.intp)
-        marked = self._marked(part, looked_at)
+        found = windows(self._hog.blocks(part))[np.divmod(looked_at, WINDOWS[1])]
+        marked = looked_at[self._net.score(found.reshape(-1, FEATURES)) > self._threshold]
         which, row, column = edges[marked].nonzero()
         down, across = np.divmod(marked[which], WINDOWS[1])
         return np.column_stack((FIRST_ROW + STRIDE * down + row, FIRST_COLUMN + STRIDE * across + column))
-
-    def _marked(self, part: np.ndarray, looked_at: np.ndarray) -> np.ndarray:
-        """Those of the windows with these numbers that hold a lane mark."""
-        found = windows(self._hog.blocks(part))[np.divmod(looked_at, WINDOWS[1])]
-        return looked_at[self._net.score(found.reshape(-1, FEATURES)) > self._threshold]
 
 
 def edges_in_windows(part: np.ndarray) -> np.ndarray:

@@ -1,17 +1,16 @@
 """The paper's lane detector with its arithmetic in C, where this was compiled: the same lines to the bit."""
 
 import ctypes
-from functools import cache
 from math import cos, tan
 from pathlib import Path
 
 import numpy as np
 
 from selfdrive.common import compiled
-from selfdrive.common.array_math import dot
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.visiond import compiled_windows
+from selfdrive.visiond.compiled_sums import adds_up_alike
 from selfdrive.visiond.compiled_windows import MarkWindows
 from selfdrive.visiond.detector import LaneLines, RoadLine
 from selfdrive.visiond.hog import STRIDE
@@ -139,18 +138,3 @@ def _points(region: RoadRegion) -> list[np.ndarray]:
     """Room for all pixels of that part as points."""
     size = region.shape[0] * region.shape[1] + 1
     return [np.zeros(size) for _ in range(3)] + [np.zeros(size, np.uint8)]
-
-
-@cache
-def adds_up_alike(library: compiled.Library) -> bool:
-    """Whether numpy adds up in the order of the C code: another version may do otherwise."""
-    values = np.sqrt(np.arange(1.0, 5001.0))
-    room = np.empty_like(values)
-    product = library.code.product
-    product.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_long, ctypes.c_void_p]
-    product.restype = ctypes.c_double
-    address, away = values.ctypes.data, room.ctypes.data
-    return all(
-        product(address, address, count, away) == dot(values[:count], values[:count])
-        for count in (7, 9, 100, 129, 1000, 5000)
-    )

@@ -1,4 +1,4 @@
-/* Stands for: mark_edges.py, dbscan.py, edge_lines.py, paper_detector.py, ../common/array_math.py, ../common/camera_model.py.
+/* Stands for: mark_edges.py, dbscan.py, edge_lines.py, paper_detector.py, ../common/array_math.py, ../common/camera_model.py, sums.h.
  * Edges of a picture, their clusters, and the lines next to the car: the numbers of the Python to the bit. Pixels
  * and clusters are whole numbers; what is not is calculated by the same operations in the same order, and sums
  * are added up in numpy's. */
@@ -7,8 +7,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define INLINE static inline __attribute__((always_inline))
+#include "sums.h"
 
 enum { STRIDE = 16, EPS = 4, SQUARE = 2 * EPS + 1, MIN_SAMPLES = 8, NEED = 2, MIN_PIXELS = 24, TRIES = 8 };
 enum { NONE = INT32_MAX };
@@ -265,38 +264,6 @@ INLINE int32_t clusters(Paper *p)
     return found;
 }
 
-/* Numpy's sum of values next to each other. */
-static double sum_of(const double *values, long count)
-{
-    if (count < 8) {
-        double sum = 0.0;
-        for (long k = 0; k < count; k++)
-            sum += values[k];
-        return sum;
-    }
-    if (count > 128) {
-        long half = count / 2 - count / 2 % 8;
-        return sum_of(values, half) + sum_of(values + half, count - half);
-    }
-    double s[8];
-    long k = 8;
-    memcpy(s, values, sizeof s);
-    for (; k < count - count % 8; k += 8)
-        for (long lane = 0; lane < 8; lane++)
-            s[lane] += values[k + lane];
-    double sum = ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
-    for (; k < count; k++)
-        sum += values[k];
-    return sum;
-}
-
-static double dot(const double *a, const double *b, long count, double *room)
-{
-    for (long k = 0; k < count; k++)
-        room[k] = a[k] * b[k];
-    return sum_of(room, count);
-}
-
 INLINE void on_road(const Paper *p, double a, double b, double *y, double *slope)
 {
     *slope = (p->cx - a * p->horizon - b) * p->cos_pitch / p->fx;
@@ -541,10 +508,4 @@ void take_edges(Paper *p)
 void take_lines(Paper *p)
 {
     CHOOSE(lines, p);
-}
-
-/* The scalar product as it is calculated here. */
-double product(const double *a, const double *b, long count, double *room)
-{
-    return dot(a, b, count, room);
 }

@@ -1,4 +1,4 @@
-/* Stands for: hog.py, lane_net.py, coded_detector.py.
+/* Stands for: hog.py, lane_net.py.
  * Which windows of a picture hold a lane mark. The features are the Python's to the bit, as whole numbers of
  * steps: the same operations in the same order, a cell's votes added in double precision, pixel by pixel. The
  * net's score is not, but its sign is: a coarse one decides where it is further from the threshold than it can be

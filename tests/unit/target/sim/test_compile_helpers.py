@@ -9,7 +9,7 @@ from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers
 from selfdrive.sim.run import main
-from selfdrive.visiond import compiled_coded
+from selfdrive.visiond import compiled_windows
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
 from selfdrive.visiond.compiled_windows import C_SOURCE
@@ -61,7 +61,7 @@ def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tm
     assert compiled.library(C_SOURCE) is not None
     for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
         shutil.copy(C_SOURCE.with_name(name), tmp_path)
-    monkeypatch.setattr(compiled_coded, "C_SOURCE", tmp_path / C_SOURCE.name)
+    monkeypatch.setattr(compiled_windows, "C_SOURCE", tmp_path / C_SOURCE.name)
     assert type(build_coded_detector(MODEL)) is CompiledCodedDetector
     (tmp_path / edited).write_text((tmp_path / edited).read_text() + "\n")
     assert type(build_coded_detector(MODEL)) is CodedDetector
