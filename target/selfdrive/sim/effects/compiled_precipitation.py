@@ -21,6 +21,7 @@ from selfdrive.sim.picture import Region, whole
 C_SOURCE = Path(__file__).with_name("precipitation.c")
 AREA = 0.25 * np.pi
 PROBE = CameraModel(width=88, rows=64)
+ALL = whole((PROBE.rows, PROBE.width))
 AIRS = 93.75, 126.25, 11.9, 21.25  # levels of air at which a fused sum tells
 
 _POINTER, _LONG, _FLOAT = ctypes.c_void_p, ctypes.c_long, ctypes.c_float
@@ -62,8 +63,12 @@ class CompiledParticles(Particles):
         self._streaks.argtypes = [_POINTER, _LONG, _POINTER, _POINTER, _LONG, _POINTER, _POINTER]
         self._streaks.restype = _LONG
         of_all = self._reach, self._size, self._speed, self._across, self._down, self._ahead
-        self._all, self._number = np.stack(of_all), np.array(self._counts, np.int_)
-        self._made = np.empty((5, self._size.size), np.float32)
+        self._arrays = (
+            np.stack(of_all),
+            np.array(self._counts, np.int_),
+            np.empty((5, self._size.size), np.float32),
+        )
+        self._places = [array.ctypes.data for array in self._arrays]
 
     def streaks(self, scene: Scene, exposure: float) -> Streaks:
         """The streaks of all particles in view in `exposure` seconds from the scene's moment."""
@@ -75,10 +80,11 @@ class CompiledParticles(Particles):
             *(lean, upright, exposure, upright * v_ego, lean * v_ego, NEAREST, FAINTEST, AREA),
         )
         moment = np.array(numbers, np.float32)
-        driven = np.stack([self._driven(scene, 1.0, -upright), self._driven(scene, tall, lean)], axis=1)
-        made, boxes = self._made, len(self._counts)
-        arrays = (self._number.ctypes.data, driven.ctypes.data, boxes, moment.ctypes.data, made.ctypes.data)
-        found = self._streaks(self._all.ctypes.data, made.shape[1], *arrays)
+        driven = np.empty((len(self._counts), 2), np.float32)
+        driven[:, 0], driven[:, 1] = self._driven(scene, 1.0, -upright), self._driven(scene, tall, lean)
+        (of_all, counts, out), made = self._places, self._arrays[2]
+        moving = driven.ctypes.data, len(self._counts), moment.ctypes.data
+        found = self._streaks(of_all, made.shape[1], counts, *moving, out)
         return Streaks(made[0:2, :found], made[2:4, :found], made[4, :found])
 
 
@@ -151,8 +157,8 @@ def agrees(library: compiled.Library) -> bool:
     seen = []
     for parts in (PLAIN, _compiled(library)):
         cover = parts.cover(PROBE)
-        taken = cover.taken(streaks, whole((PROBE.rows, PROBE.width)))
+        taken = cover.taken(streaks, ALL)
         pictures = [parts.veiled(picture, veil, taken, light) for light in AIRS]
-        arrays = cover._sheet, parts.shrunk(veil, (11, 8)), *pictures
+        arrays = cover.half(ALL), parts.shrunk(veil, (11, 8)), *pictures
         seen.append([array.tobytes() for array in arrays])
     return seen[0] == seen[1]

@@ -112,16 +112,24 @@ class Cover:
     def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
         """Shares in parts of 255, uint8, in a region of the picture."""
         full, half, quarter = windows(region, self._sizes)
-        grids = [
-            self._sheet[row + window.top : row + window.bottom, column + window.left : column + window.right]
-            for (row, column), window in zip(self._places, (full, half, quarter), strict=True)
-        ]
+        grids = self._grids((full, half, quarter))
         for grid in grids:
             grid.fill(0.0)
         self._draw(streaks, (full, half, quarter))
         grids[1] += _enlarged(grids[2], quarter, half)
         coarse = _enlarged(cv2.convertScaleAbs(grids[1], alpha=255.0), half, full)
         return cv2.add(cv2.convertScaleAbs(grids[0], alpha=255.0), coarse)
+
+    def half(self, region: Region) -> np.ndarray:
+        """What the half grid has of a region, and the quarter one, after the last picture."""
+        return self._grids(windows(region, self._sizes))[1]
+
+    def _grids(self, seen: tuple[Region, ...]) -> list[np.ndarray]:
+        """Windows of the grids, on the sheet."""
+        return [
+            self._sheet[row + window.top : row + window.bottom, column + window.left : column + window.right]
+            for (row, column), window in zip(self._places, seen, strict=True)
+        ]
 
     def _draw(self, streaks: Streaks, windows: tuple[Region, ...]) -> None:
         """Each streak as points on its grid, as far as they lie in that grid's window."""

@@ -16,7 +16,7 @@
 #define IS_FAST 0
 #endif
 
-enum { MARGIN = 2, GRIDS = 3 };
+enum { MARGIN = 2, GRIDS = 3, BLOCK = 32 };
 #define SPACING 1.3f
 
 /* --- Particles.streaks ------------------------------------------------------------------------------------ */
@@ -40,6 +40,11 @@ INLINE float larger(float one, float other) /* as NumPy's maximum: what is no nu
     return one >= other || one != one ? one : other;
 }
 
+INLINE float smaller(float one, float other)
+{
+    return one < other ? one : other;
+}
+
 /* Where a particle is in its box, as a share of it: it falls, and the car drives. */
 INLINE float moved(float first, float speed, float reach, float fall, float driven)
 {
@@ -60,27 +65,14 @@ INLINE void places(const Particles *all, const Moment *m, float driven, long fro
     }
 }
 
-FAST static void places_fast(const Particles *all, const Moment *m, float driven, long from, long to, float *ahead,
-                             float *left)
-{
-    places(all, m, driven, from, to, ahead, left);
-}
-
-static void places_plain(const Particles *all, const Moment *m, float driven, long from, long to, float *ahead,
-                         float *left)
-{
-    places(all, m, driven, from, to, ahead, left);
-}
-
-/* The streaks that n particles draw: start's and end's columns and rows, and widths, `out` five rows of n. Boxes
- * hold `counts` particles, and have passed by the shares `driven`, ahead and down. Returns how many there are. */
-long streaks(const float *of, long n, const long *counts, const float *driven, long boxes, const Moment *m, float *out)
+INLINE long seen_streaks(const float *of, long n, const long *counts, const float *driven, long boxes, const Moment *m,
+                         float *out)
 {
     Particles all = {of, of + n, of + 2 * n, of + 3 * n, of + 4 * n, of + 5 * n};
     float *ahead = out + 3 * n, *left = out + 4 * n; /* overwritten behind what is read */
     long found = 0;
     for (long box = 0, from = 0; box < boxes; from += counts[box++])
-        (IS_FAST ? places_fast : places_plain)(&all, m, driven[2 * box], from, from + counts[box], ahead, left);
+        places(&all, m, driven[2 * box], from, from + counts[box], ahead, left);
     for (long box = 0, i = 0; box < boxes; box++)
         for (long last = i + counts[box]; i < last; i++) {
             float away = ahead[i], column = left[i];
@@ -110,6 +102,25 @@ long streaks(const float *of, long n, const long *counts, const float *driven, l
     return found;
 }
 
+FAST static long streaks_fast(const float *of, long n, const long *counts, const float *driven, long boxes,
+                              const Moment *m, float *out)
+{
+    return seen_streaks(of, n, counts, driven, boxes, m, out);
+}
+
+static long streaks_plain(const float *of, long n, const long *counts, const float *driven, long boxes, const Moment *m,
+                          float *out)
+{
+    return seen_streaks(of, n, counts, driven, boxes, m, out);
+}
+
+/* The streaks that n particles draw: start's and end's columns and rows, and widths, `out` five rows of n. Boxes
+ * hold `counts` particles, and have passed by the shares `driven`, ahead and down. Returns how many there are. */
+long streaks(const float *of, long n, const long *counts, const float *driven, long boxes, const Moment *m, float *out)
+{
+    return (IS_FAST ? streaks_fast : streaks_plain)(of, n, counts, driven, boxes, m, out);
+}
+
 /* --- Cover.taken ------------------------------------------------------------------------------------------ */
 
 typedef struct {
@@ -132,9 +143,15 @@ typedef struct {
     float shares[4];
 } Point;
 
-/* Add the streaks to the sheet; which grids they lie on. */
-static int draw(const float *start, const float *end, const float *widths, long n, const Region *windows,
-                const Place *corners, const Place *ends, float area, float *sheet, long width, int *error)
+typedef struct {
+    Point *points; /* NULL where there is no memory */
+    long count;
+    int grids; /* on which there are some, a bit for each */
+} Drawn;
+
+/* Add the streaks to the sheet. */
+static Drawn draw(const float *start, const float *end, const float *widths, long n, const Region *windows,
+                const Place *corners, const Place *ends, float area, float *sheet, long width)
 {
     static const float scales[GRIDS] = {1.0f, 2.0f, 4.0f};
     Place least[GRIDS], most[GRIDS];
@@ -142,12 +159,12 @@ static int draw(const float *start, const float *end, const float *widths, long 
         Place corner = corners[k];
         least[k].across = larger((float)(windows[k].left - 1) + corner.across, corner.across);
         least[k].down = larger((float)(windows[k].top - 1) + corner.down, corner.down);
-        most[k].across = fminf((float)windows[k].right + corner.across, ends[k].across);
-        most[k].down = fminf((float)windows[k].bottom + corner.down, ends[k].down);
+        most[k].across = smaller((float)windows[k].right + corner.across, ends[k].across);
+        most[k].down = smaller((float)windows[k].bottom + corner.down, ends[k].down);
     }
     Stroke *strokes = malloc((size_t)(n + 1) * sizeof *strokes);
+    Drawn drawn = {NULL, 0, 0};
     long near = 0, total = 0;
-    int on = 0;
     for (long i = 0; strokes && i < n; i++) {
         int grid = widths[i] <= 1.5f ? 0 : widths[i] <= 3.0f ? 1 : 2;
         float scale = scales[grid];
@@ -155,8 +172,8 @@ static int draw(const float *start, const float *end, const float *widths, long 
         Place from = {(start[i] + 0.5f) / scale + corner.across, (start[n + i] + 0.5f) / scale + corner.down};
         Place to = {(end[i] + 0.5f) / scale + corner.across, (end[n + i] + 0.5f) / scale + corner.down};
         Place low = least[grid], high = most[grid];
-        if (!(fmaxf(from.across, to.across) >= low.across && fminf(from.across, to.across) < high.across &&
-              fmaxf(from.down, to.down) >= low.down && fminf(from.down, to.down) < high.down))
+        if (!(larger(from.across, to.across) >= low.across && smaller(from.across, to.across) < high.across &&
+              larger(from.down, to.down) >= low.down && smaller(from.down, to.down) < high.down))
             continue;
         float across = to.across - from.across, down = to.down - from.down;
         long count = (long)(sqrtf(across * across + down * down) / SPACING) + 1;
@@ -164,11 +181,9 @@ static int draw(const float *start, const float *end, const float *widths, long 
         strokes[near++] =
             (Stroke){from, {across / points, down / points}, low, high, area * (wide * wide) / points, count};
         total += count;
-        on |= 1 << grid;
+        drawn.grids |= 1 << grid;
     }
-    Point *points = malloc((size_t)(total + 1) * sizeof *points);
-    *error = !strokes || !points;
-    long inside = 0;
+    Point *points = strokes ? malloc((size_t)(total + 1) * sizeof *points) : NULL;
     for (long k = 0; points && k < near; k++) {
         const Stroke *stroke = &strokes[k];
         for (long number = 0; number < stroke->count; number++) {
@@ -181,17 +196,27 @@ static int draw(const float *start, const float *end, const float *widths, long 
             long left = (long)column, top = (long)row; /* the floor of what is not negative */
             float right = column - (float)left, low = stroke->share * (row - (float)top), high = stroke->share - low;
             float high_right = high * right, low_right = low * right;
-            points[inside++] =
+            points[drawn.count++] =
                 (Point){top * width + left, {high - high_right, high_right, low - low_right, low_right}};
         }
     }
     const long beside[4] = {0, 1, width, width + 1};
     for (int corner = 0; corner < 4; corner++) /* the order of sums */
-        for (long k = 0; k < inside; k++)
+        for (long k = 0; k < drawn.count; k++)
             sheet[points[k].place + beside[corner]] += points[k].shares[corner];
     free(strokes);
-    free(points);
-    return on;
+    drawn.points = points;
+    return drawn;
+}
+
+/* Leave the first `size` numbers of the sheet, those of the full grid, black. */
+static void wipe(const Drawn *drawn, float *sheet, long width, long size)
+{
+    for (long k = 0; k < drawn->count; k++) {
+        float *place = sheet + drawn->points[k].place;
+        if (drawn->points[k].place < size)
+            place[0] = place[1] = place[width] = place[width + 1] = 0.0f;
+    }
 }
 
 INLINE long within(long place, long size)
@@ -258,6 +283,22 @@ INLINE void add_quarter(float *half, const float *quarter, long width, Region fi
     }
 }
 
+/* Levels of the full grid and of two rows of the half one; most are 0. */
+INLINE void add_block(const float *shares, const uint16_t *near, const uint16_t *far, long count, uint8_t *out)
+{
+    int any = 0;
+    for (long x = 0; x < count; x++)
+        any |= (shares[x] != 0.0f) | near[x] | far[x];
+    if (!any) {
+        memset(out, 0, (size_t)count);
+        return;
+    }
+    for (long x = 0; x < count; x++) {
+        int coarse = ((3 * near[x] >> 2) + (far[x] >> 2) + 2) >> 2, level = level_of(shares[x]) + coarse;
+        out[x] = (uint8_t)(level < 255 ? level : 255);
+    }
+}
+
 /* Levels of the full grid and of the half one, enlarged. */
 INLINE void add_up(const float *full, const float *half, long width, Region fine, Region seen, uint8_t *levels,
                    uint16_t *two, uint8_t *out)
@@ -273,19 +314,26 @@ INLINE void add_up(const float *full, const float *half, long width, Region fine
             long source = within(upper + k, rows);
             if (which[source & 1] != source) {
                 const float *shares = half + source * width;
+                int any = 0;
                 for (long x = 0; x < size; x++)
-                    levels[x] = level_of(shares[x]);
-                widened_levels(levels, size, made[source & 1]);
+                    any |= shares[x] != 0.0f;
+                if (any) {
+                    for (long x = 0; x < size; x++)
+                        levels[x] = level_of(shares[x]);
+                    widened_levels(levels, size, made[source & 1]);
+                } else
+                    memset(made[source & 1], 0, (size_t)(2 * size) * sizeof(uint16_t));
                 which[source & 1] = source;
             }
             row[k] = made[source & 1] + right;
         }
         const uint16_t *near = row[!((y + down) & 1)], *far = row[(y + down) & 1];
         const float *shares = full + y * width;
-        for (long x = 0; x < columns; x++) {
-            int coarse = ((3 * near[x] >> 2) + (far[x] >> 2) + 2) >> 2, level = level_of(shares[x]) + coarse;
-            out[x] = (uint8_t)(level < 255 ? level : 255);
-        }
+        for (long x = 0; x < columns; x += BLOCK)
+            if (columns - x >= BLOCK)
+                add_block(shares + x, near + x, far + x, BLOCK, out + x);
+            else
+                add_block(shares + x, near + x, far + x, columns - x, out + x);
     }
 }
 
@@ -319,22 +367,23 @@ static void enlarge_plain(float *sheet, long width, const Region *windows, const
 long taken(const float *start, const float *end, const float *widths, long n, const Region *windows,
            const Place *corners, const Place *ends, float area, float *sheet, long width, uint8_t *out)
 {
-    for (int k = 0; k < GRIDS; k++) {
+    for (int k = 1; k < GRIDS; k++) { /* the full grid was left black */
         float *row = on_sheet(sheet, width, corners[k], windows[k]);
         for (long y = windows[k].top; y < windows[k].bottom; y++, row += width)
             memset(row, 0, (size_t)(windows[k].right - windows[k].left) * sizeof *row);
     }
-    int error;
-    int on = draw(start, end, widths, n, windows, corners, ends, area, sheet, width, &error);
+    Drawn drawn = draw(start, end, widths, n, windows, corners, ends, area, sheet, width);
     long columns = 1; /* enough for two rows of either enlarged grid, and one of levels */
     for (int k = 1; k < GRIDS; k++)
         columns += windows[k].right - windows[k].left;
     float *scratch = malloc((size_t)(4 * columns) * sizeof *scratch);
-    if (scratch && !error)
-        (IS_FAST ? enlarge_fast : enlarge_plain)(sheet, width, windows, corners, on, scratch, out);
-    error |= !scratch;
+    int failed = !drawn.points || !scratch;
+    if (!failed)
+        (IS_FAST ? enlarge_fast : enlarge_plain)(sheet, width, windows, corners, drawn.grids, scratch, out);
+    wipe(&drawn, sheet, width, (long)corners[1].down * width);
+    free(drawn.points);
     free(scratch);
-    return error;
+    return failed;
 }
 
 /* --- veiled and Windscreen -------------------------------------------------------------------------------- */
