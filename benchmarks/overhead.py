@@ -1,14 +1,17 @@
 """What an experiment costs beyond its simulation: faults that first act in the last steps of a 30 s run.
 
-`python benchmarks/overhead.py [--experiments 200] [--json FILE]`. The fork engine runs faults of the paper's
-campaign with ideal vision, each at a time of its own shortly before the end, and does with them all that a
-worker does: mutant, run, comparison with golden, patch, record. CPU of the worker, of the children and of the
-processes that they are forks of; beside it what 30 s of the same driving cost in this run. Exit code 1 where
-the overhead is more than its goal.
+`python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The fork engine runs
+faults of the paper's campaign with ideal vision, each at a time of its own shortly before the end, and does
+with them all that a worker does: mutant, run, comparison with golden, patch, record. CPU of the worker, of
+the children and of the processes that they are forks of; beside it what 30 s of the same driving cost in this
+run. With `--against` a checkout of an older commit does the same in turn, and the ratio is what counts. Exit
+code 1 where the overhead is more than its goal.
 """
 
 import argparse
 import json
+import os
+import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -16,6 +19,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from itertools import cycle, islice
 from pathlib import Path
+from statistics import median
 from time import process_time
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -34,6 +38,7 @@ from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_MS = 5.0
+GOAL_OF_OLDER = 0.65
 END_S, LAST_STEPS, STEP_S = 30.0, 10, 0.01
 SCENARIO = "S1"
 FEW = 5  # experiments that come first and are not counted: they do what is done once
@@ -118,11 +123,50 @@ class Bench:
         return found
 
 
+def against(clone: Path, options: argparse.Namespace) -> int:
+    """This version and the one in `clone` in turn, each in processes of its own; the ratios of medians."""
+    found: dict[str, list[dict[str, float]]] = {"older": [], "this": []}
+    for number in range(options.rounds):
+        for name in found if number % 2 == 0 else reversed(found):
+            root = ROOT if name == "this" else clone.resolve()
+            found[name].append(_told_by(root, options.experiments))
+            print(f"{name:8} {found[name][-1]['all']:6.2f} ms of CPU an experiment", flush=True)
+    ratios = {
+        part: median(one[part] for one in found["this"]) / median(one[part] for one in found["older"])
+        for part in found["this"][0]
+    }
+    print(*(f"{part} {ratio:.2f}" for part, ratio in ratios.items()), sep=", ", end="")
+    print(f" of the older version's (goal of all: {GOAL_OF_OLDER})")
+    if options.json:
+        options.json.write_text(json.dumps({"ms": found, "ratios": ratios}, indent=1) + "\n")
+    return int(ratios["all"] > GOAL_OF_OLDER)
+
+
+def _told_by(root: Path, experiments: int) -> dict[str, float]:
+    """What the benchmark in that checkout says, ms by part."""
+    with tempfile.TemporaryDirectory() as folder:
+        told = Path(folder) / "told.json"
+        words = ["--experiments", str(experiments), "--json", str(told)]
+        paths = os.pathsep.join([str(root), str(root / "target")])
+        subprocess.run(
+            [sys.executable, str(root / "benchmarks" / "overhead.py"), *words],
+            env=os.environ | {"PYTHONPATH": paths},
+            stdout=subprocess.DEVNULL,
+            check=False,  # 1: over its goal
+        )
+        facts = json.loads(told.read_text())
+    return {**facts["ms"], "all": facts["total_ms"]}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--experiments", type=int, default=200, metavar="N")
+    parser.add_argument("--against", type=Path, metavar="CLONE", help="checkout of an older commit")
+    parser.add_argument("--rounds", type=int, default=3, help="of both versions, with --against")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args(arguments)
+    if options.against:
+        return against(options.against, options)
     workspace = Workspace.find(root=ROOT)
     known = late(workspace, options.experiments + FEW)
     with tempfile.TemporaryDirectory() as folder:

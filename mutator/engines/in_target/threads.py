@@ -18,6 +18,8 @@ def others() -> list[str]:
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
     if not _TASKS.is_dir():  # not on Linux
         return sorted(name for name in known.values() if name != threading.main_thread().name)
+    if _TASKS.stat().st_nlink == 3:  # one folder in it: ., .., and that of the main thread
+        return []
     own = _system_name(os.getpid())
     found = []
     for task in _TASKS.iterdir():
