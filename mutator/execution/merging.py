@@ -157,7 +157,7 @@ def _check_complete(folder: RunFolder) -> None:
             remedy="run it to its end with the command it was begun with",
         )
     equivalence.judge(folder, records)
-    if left := sum(len(piece.ids) for piece in equivalence.left(folder)):
+    if left := len(equivalence.left(folder)):
         raise MutatorError(
             f"unfinished: of its proof {counted(left, 'experiment')} left to run",
             where=folder.path,

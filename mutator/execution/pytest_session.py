@@ -33,8 +33,8 @@ class HarnessErrors(Exception):
 
 
 class WorkItem(pytest.Item):
-    """One chunk of the plan, or a piece of the proof. It fails for harness errors only: a hazard is a result,
-    not a failure."""
+    """One chunk of the plan, or one experiment of the proof. It fails for harness errors only: a hazard is a
+    result, not a failure."""
 
     def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
         super().__init__(**keywords)
@@ -108,7 +108,10 @@ def configure(
 
 
 def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
-    """Make chunks, then pieces of the proof, the session's items; nothing is read but what is here."""
+    """Make chunks, then experiments of the proof, the session's items; nothing is read but what is here.
+
+    The proof comes last, in the smallest items: workers without a chunk go on with it, and end together.
+    """
     session.items = []
     for work in works:
         name = f"chunk-{work.chunk:05d}" if isinstance(work, Pending) else f"proof-{work.number:05d}"
@@ -138,7 +141,7 @@ class WorkerSide:
         self._registration = register_worker(run)
         self._work: list[Pending | Sample] = [
             *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
-            *(Sample(number, tuple(ids)) for number, ids in given["proof"]),
+            *(Sample(number, name) for number, name in given["proof"]),
         ]
         self._worker = LazyWorker(workspace, assignment)
 

@@ -152,7 +152,7 @@ class Session:
             "workspace": {k: str(v) if v else None for k, v in asdict(self.workspace).items()},
             "engine": self.engine,
             "pending": [[item.chunk, list(item.places)] for item in self.pending],
-            "proof": [[piece.number, list(piece.ids)] for piece in self.proof],
+            "proof": [[sample.number, sample.id] for sample in self.proof],
         }
 
     def finish(self) -> Summary:

@@ -4,7 +4,6 @@ import signal
 import socket
 import sys
 from dataclasses import asdict, dataclass
-from itertools import chain
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full
@@ -59,7 +58,7 @@ class Worker:
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
         self._needs_proof: bool | None = None  # None: nothing that it ran itself says so
-        self._planned: tuple[Experiment, ...] = ()
+        self._planned: dict[str, Experiment] = {}
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
         self._head = {"schema": SCHEMA, "plan": plan}
@@ -81,7 +80,7 @@ class Worker:
         return errors
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:
-        """Run a piece of the proof's sample on the reference engine; harness errors as `run`.
+        """Run an experiment of the proof's sample on the reference engine; harness errors as `run`.
 
         Each has a run of its own, which takes nothing from others: what they share is to be proved, too.
         Where it is known that nothing was forked, none is run.
@@ -93,10 +92,9 @@ class Worker:
         if self._prover is None or self._proofs is None:
             self._prover = self._make_runner(self._independent_engine())
             self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)
-            self._planned = plan_file.read_all(self.folder.path)
-        wanted = [experiment for experiment in self._planned if experiment.id in sample.ids]
+            self._planned = {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
         errors = []
-        for finished in chain.from_iterable(self._prover.run([experiment]) for experiment in wanted):
+        for finished in self._prover.run([self._planned[sample.id]]):
             self._proofs.append(asdict(finished.record))
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))

@@ -168,6 +168,9 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
     """Write a figure into each of `paths` (.svg or .png by suffix), the same bytes each time."""
     import matplotlib
 
+    if figure.get_layout_engine() is not None:  # once for all of them: it takes as long as drawing
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
     # A salt and no date: the same run draws the same SVG.
     with matplotlib.rc_context({"svg.hashsalt": "mutator", "svg.fonttype": "none"}):
         for path in paths:

@@ -31,10 +31,11 @@ def example_drawings(
     `frame` is of `statistics.frame.load`. Without a workspace there are no traces. They are the experiments'
     series: nothing is driven.
     """
+    traces = Traces(workspace, folder) if workspace else None
     made = []
     for one in wanted:
         try:
-            made.append(_drawing(folder, frame, workspace, one))
+            made.append(_drawing(frame, traces, one))
         except MutatorError as err:
             made.append(_none(one, f"the traces it needs cannot be had: {err.got}"))
     return tuple(made)
@@ -53,13 +54,12 @@ def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
     return found.sort_values([wanted.order, "experiment_id"], ascending=[False, True])
 
 
-def _drawing(folder: RunFolder, frame: pd.DataFrame, workspace: Workspace | None, wanted: Wanted) -> Drawing:
+def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Drawing:
     found = candidates(frame, wanted)
     if found.empty:
         return _none(wanted, "no experiment of this run fits the query")
-    if workspace is None:
+    if traces is None:
         return _none(wanted, "no fault library was found here, which says what the channels are")
-    traces = Traces(workspace, folder)
     manifest = traces.manifest
     recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
     if missing := [name for name in wanted.actions if name not in recorded]:

@@ -27,9 +27,9 @@ from mutator.outcomes.rows import Row
 from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
 from mutator.report.series import sample_kept_traces, series_facts
+from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
 from mutator.review.groups import Shape, shapes
-from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.web import embedded
 
@@ -50,20 +50,15 @@ class Browse:
     scripts: tuple[Markup, ...]
 
 
-def browse_data(
-    folder: RunFolder,
-    rows: Sequence[Row],
-    out: Path,
-    workspace: "Workspace | None",
-    paths: FoundPaths | None = None,
-) -> Browse:
-    """Of a run folder and the rows of its results.csv; the page will be in the folder `out`."""
+def browse_data(run: ReportedRun) -> Browse:
+    """What the page of a run gets; it will be in the folder of the report."""
+    folder, workspace = run.folder, run.workspace
     if workspace:
         sample_kept_traces(folder, workspace)
-    data: dict[str, Any] = {"table": None, "details": None, "media": media(folder, out, STILLS_BYTES)}
-    data["table"], data["details"] = tables_of(folder, rows, paths)
-    if paths:
-        data["paths"] = paths.data([row.experiment_id for row in sorted(rows, key=reading_order)])
+    data: dict[str, Any] = {"table": None, "details": None, "media": media(folder, run.out, STILLS_BYTES)}
+    data["table"], data["details"] = _tables(run)
+    if run.paths:
+        data["paths"] = run.paths.data([row.experiment_id for row in sorted(run.rows, key=reading_order)])
     facts = {
         **_of_target(folder, workspace),
         "series": series_facts(folder),
@@ -88,17 +83,14 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
     return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
 
 
-def tables_of(
-    folder: RunFolder, rows: Sequence[Row], paths: FoundPaths | None = None
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The table and the details of a run folder with these rows in its results.csv."""
-    lines = list(Results.of_run(folder.path).lines())
-    order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
-    rows, lines = [rows[i] for i in order], [lines[i] for i in order]
-    experiments = {e.id: e for e in plan_file.read_all(folder.path)}
-    planned = [experiments.get(row.experiment_id) for row in rows]
-    made = table(rows, lines, paths, alerts=folder.has_alerts)
-    return made, details(planned, shapes(_patches(folder, rows)), rows)
+def _tables(run: ReportedRun) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The table and the details."""
+    lines = list(Results.of_run(run.folder.path).lines())
+    order = sorted(range(len(run.rows)), key=lambda i: reading_order(run.rows[i]))
+    rows, lines = [run.rows[i] for i in order], [lines[i] for i in order]
+    planned = [run.experiments.get(row.experiment_id) for row in rows]
+    made = table(rows, lines, run.paths, alerts=run.folder.has_alerts)
+    return made, details(planned, shapes(_patches(run, rows)), rows)
 
 
 def reading_order(row: Row) -> tuple[str, ...]:
@@ -224,11 +216,10 @@ def _setting(experiment: Experiment) -> str:
     return json.dumps({"hold": hold.value, **told, "changes": experiment.changes})
 
 
-def _patches(folder: RunFolder, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
+def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
     """(experiment, nothing more that a shape must have in common, its patch without the probe)."""
-    records = folder.records()
     for row in rows:
-        data = folder.read_patch(row.experiment_id, records.get(row.experiment_id))
+        data = run.folder.read_patch(row.experiment_id, run.records.get(row.experiment_id))
         if data is not None:
             yield row.experiment_id, "", readable(data.decode("utf-8", "replace"))[0]
 

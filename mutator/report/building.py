@@ -91,7 +91,7 @@ def _content(run: ReportedRun) -> Content:
         study=run.study.about if run.study and run.compared else "",
         answers=answers_panel(run),
         panels=panels,
-        browse=browse_data(run.folder, run.rows, run.out, run.workspace, run.paths),
+        browse=browse_data(run),
     )
 
 

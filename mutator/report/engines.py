@@ -1,13 +1,14 @@
 """How the experiments of a run were run, and what their equivalence check found."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from mutator._common.tables import Table
 from mutator.engines.jobs import RunMode
 from mutator.engines.registry import WORTH_IT
 from mutator.errors import CheckFailed
+from mutator.model import Record
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
 
@@ -34,12 +35,13 @@ class EngineSummary:
     failed: bool
 
 
-def engine_summary(folder: RunFolder) -> EngineSummary | None:
-    """What the timings and `proof/` of a run folder say; None if neither names an engine."""
+def engine_summary(folder: RunFolder, records: Mapping[str, Record]) -> EngineSummary | None:
+    """What the timings and `proof/` of a run folder with these records say; None if neither names an
+    engine."""
     ways = _ways(folder)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
-    sentence, state, failed = _proof(folder)
+    sentence, state, failed = _proof(folder, records)
     table = Table(heads=("how", "experiments"), rows=list(_lines(ways)))
     return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
 
@@ -62,10 +64,10 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
             yield [f"{words}, for other reasons, which are in timings/", str(rest)]
 
 
-def _proof(folder: RunFolder) -> tuple[str, str, bool]:
+def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
     """What is said of the proof, the same in few words, and whether it failed."""
     try:
-        found = equivalence.judge(folder, folder.records())
+        found = equivalence.judge(folder, records)
     except CheckFailed as err:
         said = f"The proof failed, so nothing here is to be trusted: {err.got}."
         return said, f"FAILED: {err.got}", True

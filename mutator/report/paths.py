@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from mutator.model import Record
+from mutator.model import Experiment, Record
 from mutator.outcomes.paths import Passage, Path, State, Ways, ways_of
 from mutator.outcomes.rows import Row, by_fault_type
-from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "report-paths/1"
@@ -27,14 +26,14 @@ class FoundPaths:
     records: Mapping[str, Record]
 
     @classmethod
-    def of(cls, folder: RunFolder) -> "FoundPaths | None":
-        """Those of a run folder; None where no path can be known."""
+    def of(
+        cls, folder: RunFolder, experiments: Mapping[str, Experiment], records: Mapping[str, Record]
+    ) -> "FoundPaths | None":
+        """Those of a run folder with these plan and records; None where no path can be known."""
         ways = ways_of(folder.head)
         if ways is None:
             return None
-        records = folder.records()
-        planned = (e for e in plan_file.read_all(folder.path) if e.id in records)
-        found = ((e.id, ways.path(e, records[e.id])) for e in planned)
+        found = ((name, ways.path(e, records[name])) for name, e in experiments.items() if name in records)
         by_id = {name: path for name, path in found if path is not None}
         return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records)
 

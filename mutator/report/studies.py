@@ -1,14 +1,14 @@
 """What a study adds to the report of a campaign that asks for it."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from mutator.campaigns.studies import find_study
 from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
-from mutator.model import Status
+from mutator.model import Experiment, Record, Status
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
 from mutator.outcomes.golden import load_trace
 from mutator.outcomes.reader import Results
@@ -18,6 +18,7 @@ from mutator.report.panel import FOLDER, Panel
 from mutator.report.paths import FoundPaths
 from mutator.statistics.frame import load
 from mutator.statistics.published import Published
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -29,9 +30,10 @@ if TYPE_CHECKING:
 class ReportedRun:
     """What a report is made from.
 
-    `rows` are all experiments of results.csv, `frame` the usable ones. Without a workspace nothing can be
-    driven again, and no study can be asked. `study` is None if the campaign asks for none or if it is not
-    installed here. `compared`: the study has something to say of these results, on a page of its own.
+    Plan and records are read once. `rows` are all experiments of results.csv, `frame` the usable ones.
+    Without a workspace nothing can be driven again, and no study can be asked. `study` is None if the
+    campaign asks for none or if it is not installed here. `compared`: the study has something to say of these
+    results, on a page of its own.
     """
 
     folder: RunFolder
@@ -42,18 +44,24 @@ class ReportedRun:
     study: "Study | None"
     compared: bool = False
     paths: FoundPaths | None = None
+    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all that are planned, by id
+    records: Mapping[str, Record] = field(default_factory=dict)  # by experiment id
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
         """A run folder whose results.csv is up to date."""
+        experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
+        records = folder.records()
         return cls(
             folder=folder,
             workspace=workspace,
             rows=Results.of_run(folder.path).rows(),
             frame=load(folder.path / "results.csv"),
-            engines=engine_summary(folder),
+            engines=engine_summary(folder, records),
             study=_study(folder) if workspace else None,
-            paths=FoundPaths.of(folder),
+            paths=FoundPaths.of(folder, experiments, records),
+            experiments=experiments,
+            records=records,
         )
 
     @property

@@ -7,7 +7,7 @@ run folder, as records. Where no experiment was forked after all there is nothin
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,15 +23,14 @@ from mutator.store.run_folder import RunFolder
 FOLDER = "proof"
 _LEAST = 20
 _SHARE = 100  # one experiment in so many
-_PIECE = 5  # experiments of one piece of work
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A piece of the sample that is still to be run: its number, and its experiments' ids."""
+    """An experiment of the sample that is still to be run: its number among these, and its id."""
 
     number: int
-    ids: tuple[str, ...]
+    id: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,8 +108,7 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
     ids = [name for name in sampled(folder) if name not in found or not _counts(found[name])]
     if ids and needless(folder) is not None:
         return ()
-    pieces = range(0, len(ids), _PIECE)
-    return tuple(Sample(number, tuple(ids[i : i + _PIECE])) for number, i in enumerate(pieces))
+    return tuple(Sample(number, name) for number, name in enumerate(ids))
 
 
 def sampled(folder: RunFolder) -> list[str]:
@@ -119,7 +117,7 @@ def sampled(folder: RunFolder) -> list[str]:
     return [name for name in folder.share() if name in wanted]
 
 
-def judge(folder: RunFolder, records: dict[str, Record]) -> Proof | None:
+def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
     """How far the proof is, None where none is needed; CheckFailed at a record that is another one on the
     reference engine."""
     if not (folder.path / FOLDER).is_dir():

@@ -122,7 +122,7 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
 
 def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
     """What can be compared by method and scenario, beside published counts if there are some."""
-    alerts = {name: record.alerts for name, record in run.folder.records().items()}
+    alerts = {name: record.alerts for name, record in run.records.items()}
     return run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
 
 

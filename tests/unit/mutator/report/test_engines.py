@@ -80,9 +80,14 @@ def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
     writer.close()
 
 
+def summary(run: Path) -> engines.EngineSummary | None:
+    folder = RunFolder.open(run)
+    return engines.engine_summary(folder, folder.records())
+
+
 def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
     """There is a line for each way, and one for each reason why an experiment was not forked."""
-    told = engines.engine_summary(RunFolder.open(finish(4)))
+    told = summary(finish(4))
     assert told is not None
     ways = dict(told.table.rows)
     assert list(ways.values()) == ["1"] * 4
@@ -95,7 +100,7 @@ def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
     run = finish(None)
     more = [timing(f"{i}") | {"engine": "reference", "why": f"crash {i:02}"} for i in range(30)]
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
-    told = engines.engine_summary(RunFolder.open(run))
+    told = summary(run)
     assert told is not None
     assert len(told.table.rows) == 3 + engines.LISTED + 1
     assert sum(int(count) for _, count in told.table.rows) == 34
@@ -106,7 +111,7 @@ def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
     run = finish(4)
     again = timing(record_ids(run)[0]) | {"engine": "reference", "why": "it leaves threads behind"}
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
-    told = engines.engine_summary(RunFolder.open(run))
+    told = summary(run)
     assert told is not None
     assert sum(int(count) for _, count in told.table.rows) == 4
     assert not any("fork of the golden run" in way for way, _ in told.table.rows)
@@ -130,7 +135,7 @@ def record_ids(run: Path) -> list[str]:
 )
 def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
     """A whole proof, one with something left, and none."""
-    told = engines.engine_summary(RunFolder.open(finish(proven)))
+    told = summary(finish(proven))
     assert told is not None
     assert said in told.proof
     assert told.proof.endswith(said) == (proven != 3)
@@ -143,7 +148,7 @@ def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
 ) -> None:
     """Whoever had many experiments run on the reference engine wanted so."""
     monkeypatch.setattr(engines, "WORTH_IT", 4)
-    told = engines.engine_summary(RunFolder.open(finish(None)))
+    told = summary(finish(None))
     assert told is not None
     assert told.proof.endswith("so there is nothing to prove.")
 
@@ -186,11 +191,11 @@ def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Pat
 
 def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:
     """A failed proof is no secret of a run whose timings say nothing of engines."""
-    told = engines.engine_summary(RunFolder.open(finish(4, lambda r: replace(r, tree="x"), ways=())))
+    told = summary(finish(4, lambda r: replace(r, tree="x"), ways=()))
     assert told is not None
     assert told.failed
 
 
 def test_runs_of_before_there_were_engines_say_nothing_of_them(finish: Finish) -> None:
     """Their timings do not say what ran an experiment, and neither does the report."""
-    assert engines.engine_summary(RunFolder.open(finish(None, ways=()))) is None
+    assert summary(finish(None, ways=())) is None

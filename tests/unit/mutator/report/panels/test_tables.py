@@ -9,6 +9,7 @@ from markupsafe import escape
 
 from mutator.report.panels.tables import tables_panel
 from mutator.report.studies import ReportedRun
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -24,6 +25,7 @@ def run(tmp_path: Path) -> RunFolder:
     """A run folder with a guided chaff run, its random partner, and the golden run of 30 s."""
     head = {"schema": "run/1", "target": "openpilot", "goldens": [["S1", []]]}
     (tmp_path / "run.json").write_text(json.dumps(head))
+    plan_file.write(tmp_path, [], [])
     line = "{0},a,radar,chaff,distance,35,m,S1,{0},C2,1,ok,hazard,5,6,1,9,fcw,8,1,"
     (tmp_path / "results.csv").write_text("\n".join([HEADER, *map(line.format, ("guided", "random")), ""]))
     (tmp_path / "golden" / "S1").mkdir(parents=True)
