@@ -34,9 +34,9 @@ class _State:
         "counter",
         "counter_mask",
         "counter_shift",
-        "deadline",
         "fields",
         "name",
+        "newest",
         "read",
         "size",
         "timeout",
@@ -53,7 +53,7 @@ class _State:
         self.body = -1  # the payload's bits that matter, of the last valid frame
         self.read: dict[bytes, int] = {}  # counters of right payloads with that body, which often stays
         self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # the excess keeps rounding of t out
-        self.deadline = float("-inf")  # s, after which the message is overdue
+        self.newest = float("-inf")  # s, when the last valid frame was received
         self.counter: int | None = None  # of the next frame
         self.bad_counters = 0
 
@@ -116,11 +116,11 @@ class CanParser:
                     continue
                 if state.takes(data, word):
                     self.values[state.name] = decode(state.fields, word)
-            state.deadline = t + state.timeout
+            state.newest = t
             updated.append(state.name)
         self.updated = updated
         if t > self._valid_until:
-            self._valid_until = min([state.deadline for state in states.values()])
+            self._valid_until = min([state.newest + state.timeout for state in states.values()])
         self.valid = t <= self._valid_until
 
 

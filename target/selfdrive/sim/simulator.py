@@ -137,16 +137,16 @@ class Simulator:
         plant, lateral, lead = self._plant, self._plant.lateral, self._lead
         d_rel = plant.distance_to(lead.position) if lead else FREE_ROAD_DISTANCE
         return GroundTruth(
-            t=t,
-            d_rel=d_rel,
-            v_ego=plant.speed,
-            v_lead=lead.speed if lead else plant.speed,
-            a_ego=plant.acceleration,
-            lateral_offset=lateral.offset,
-            heading=lateral.heading,
-            steer_angle=lateral.steer_angle,
-            steer_rate=lateral.steer_rate,
-            position=plant.position,
-            hwt=plant.headway(d_rel),
-            free_road=lead is None,
+            t,
+            d_rel,
+            plant.speed,
+            lead.speed if lead else plant.speed,
+            plant.acceleration,
+            lateral.offset,
+            lateral.heading,
+            lateral.steer_angle,
+            lateral.steer_rate,
+            plant.position,
+            plant.headway(d_rel),
+            lead is None,
         )

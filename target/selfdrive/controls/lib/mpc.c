@@ -752,6 +752,7 @@ typedef struct {
 typedef double Matrix[STATES][STATES + 1];
 
 #define INLINE static inline __attribute__((always_inline))
+#define UNROLL _Pragma("GCC unroll 8") /* so that the compiler knows which terms there are */
 
 INLINE double larger(double a, double b) /* of a number and what may be none */
 {
@@ -793,9 +794,12 @@ INLINE void integrate(
         Matrix was;
         memcpy(was, m, sizeof was);
         model.rk4(end, zu + nx, p, next, a, b, over);
+        UNROLL
         for (int i = 0; i < nx; i++) {
+            UNROLL
             for (int j = 0; j <= nx; j++) {
                 double sum = 0.0;
+                UNROLL
                 for (int r = i; r < width(model, i); r++)
                     if (model.linear && step == 1 && i == 3 && r == 4 && j == 5)
                         sum += a[i * nx + r] * model.sixth * over[r * nx + j];
@@ -831,30 +835,37 @@ INLINE double weighed(const Model model, const Cost *cost, int k, int i, double 
     return product ? weight * 0.1 * cost->over[k * (model.nx + 1) + i] : by(model, cost, k, i, weight);
 }
 
-/* Hessian and gradient of a cost by state and control, the gradient after a change of the state. Only the last
-   residual of a stage depends on the control: no other has a part in its derivatives, not even as 0 * NaN. */
+/* Hessian (of a stage its upper half) and gradient of a cost by state and control, the gradient after a change of
+   the state. Only the last residual of a stage depends on the control: no other has a part in its derivatives, not even as 0 * NaN. */
 INLINE void gauss_newton(
-    const Model model, int count, const Cost *cost, const double *weights, const double *change,
+    const Model model, int stage, const Cost *cost, const double *weights, const double *change,
     double hess[STATES + 1][STATES + 1], double *slope)
 {
-    const int nx = model.nx;
+    const int nx = model.nx, count = stage ? model.residuals : model.end_residuals;
     double cw[STATES + 1][RESIDUALS], moved[RESIDUALS];
+    UNROLL
     for (int k = 0; k < count; k++) {
         double sum = 0.0;
+        UNROLL
         for (int j = 0; j < nx; j++)
             sum += by(model, cost, k, j, change[j]);
         moved[k] = cost->r[k] + sum;
+        UNROLL
         for (int i = 0; i <= nx; i++)
             cw[i][k] = weighed(model, cost, k, i, weights[k]);
     }
+    UNROLL
     for (int i = 0; i <= nx; i++) {
-        for (int j = 0; j <= nx; j++) {
+        UNROLL
+        for (int j = stage ? i : 0; j <= nx; j++) {
             double sum = 0.0;
+            UNROLL
             for (int k = i == nx || j == nx ? count - 1 : 0; k < count; k++)
                 sum += by(model, cost, k, j, cw[i][k]);
             hess[i][j] = sum;
         }
         slope[i] = 0.0;
+        UNROLL
         for (int k = i == nx ? count - 1 : 0; k < count; k++)
             slope[i] += cw[i][k] * moved[k];
     }
@@ -900,7 +911,7 @@ INLINE void condense(
             for (int r = i; r < width(model, i); r++) {
                 const int constant = !model.linear && k < SHORT_INTERVALS && i < 3 && r == 3; /* the derivative */
                 sum += m[k][i][r] * change[k][r];
-                for (int j = 0; j < k; j++)
+                for (int j = 0; j < k && i < behind(model, nx); j++)
                     by[j] += constant ? to->derivative[k][r][j] * model.sixth * over[i * nx + r]
                                       : m[k][i][r] * to->derivative[k][r][j];
             }
@@ -914,33 +925,42 @@ INLINE void condense(
     double hess[STATES + 1][STATES + 1], grad[STATES + 1];
     Cost cost = {0};
     model.end(zu[N], p, cost.r, cost.c, cost.over, cost.under);
-    gauss_newton(model, model.end_residuals, &cost, weights, change[N], hess, grad);
+    gauss_newton(model, 0, &cost, weights, change[N], hess, grad);
     for (int k = N - 1; k >= 0; k--) {
         double block[STATES + 1][STATES + 1], slope[STATES + 1], hm[STATES][STATES + 1], scaled[RESIDUALS];
         for (int i = 0; i < model.residuals; i++)
             scaled[i] = (k < SHORT_INTERVALS ? 1.0 : 3.0) * weights[i];
         memset(&cost, 0, sizeof cost);
         model.stage(zu[k], p, cost.r, cost.c, cost.over, cost.under);
-        gauss_newton(model, model.residuals, &cost, scaled, change[k], block, slope);
+        gauss_newton(model, 1, &cost, scaled, change[k], block, slope);
+        UNROLL
         for (int i = 0; i < nx; i++)
+            UNROLL
             for (int j = 0; j <= nx; j++) {
                 hm[i][j] = 0.0;
+                UNROLL
                 for (int l = first(model, j); l < behind(model, j); l++)
                     hm[i][j] += hess[i][l] * m[k][l][j];
             }
+        UNROLL
         for (int i = 0; i <= nx; i++) {
             double sum = 0.0;
+            UNROLL
             for (int j = i; j <= nx; j++) {
                 double product = 0.0;
+                UNROLL
                 for (int l = first(model, i); l < behind(model, i); l++)
                     product += m[k][l][i] * hm[l][j];
                 block[i][j] += product;
             }
+            UNROLL
             for (int l = first(model, i); l < behind(model, i); l++)
                 sum += m[k][l][i] * grad[l];
             slope[i] += sum;
         }
+        UNROLL
         for (int i = 0; i < nx; i++) {
+            UNROLL
             for (int j = 0; j < nx; j++)
                 hess[i][j] = i <= j ? block[i][j] : block[j][i];
             grad[i] = slope[i];

@@ -98,6 +98,8 @@ class Cluster:
         self.v_lat = self._mean([t.v_lat for t in tracks])
 
     def _mean(self, values: Sequence[float]) -> float:
+        if len(values) == 1:  # as nearly always
+            return 0.0 + values[0]
         return total(values) / len(self._tracks)
 
     def is_lead(self, v_ego: float) -> bool:
