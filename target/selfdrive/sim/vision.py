@@ -107,9 +107,9 @@ def build_detector(name: str, model: CameraModel):
         from selfdrive.visiond.compiled_coded import build_coded_detector
 
         return build_coded_detector(model)
-    from selfdrive.visiond.robust_detector import RobustDetector
+    from selfdrive.visiond.compiled_robust import build_robust_detector
 
-    return RobustDetector(model)
+    return build_robust_detector(model)
 
 
 def _detector(pictures: Pictures, camera) -> LaneDetector:

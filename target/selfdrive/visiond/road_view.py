@@ -29,15 +29,10 @@ class RoadView:
     """
 
     def __init__(self, model: CameraModel) -> None:
-        self._levels: list[tuple[np.ndarray, np.ndarray]] = []
         self.y = np.arange(REACH, -REACH, -CELL, dtype=np.float32)
-        rows, shares = [], []
-        for level in range(LEVELS):
-            of_level = _rows_of(model, level)
-            if of_level:
-                self._levels.append(_maps(model, of_level, self.y, level))
-                rows += of_level
-                shares += [2.0**level] * len(of_level)
+        found = [(level, rows) for level in range(LEVELS) if (rows := _rows_of(model, level))]
+        rows = [row for _, of_level in found for row in of_level]
+        shares = [2.0**level for level, of_level in found for _ in of_level]
         if len(rows) < LEAST_ROWS:
             raise ConfigError(
                 f"{len(rows)} rows in which marks are wide enough, up to {FARTHEST:.0f} m ahead",
@@ -45,12 +40,16 @@ class RoadView:
                 expected=f"at least {LEAST_ROWS}",
                 remedy="use larger pictures, or a camera that sees the road before the car",
             )
+        # Nothing is looked at above this row. It begins a row of every level, so the levels stay the same.
+        self._first = int(min(rows)) >> LEVELS << LEVELS
+        self._levels = [_maps(model, of_level, self.y, level, self._first) for level, of_level in found]
         self.drop = np.array(rows, np.float32) - np.float32(model.horizon)
         self.scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows], np.float32)
         self.share = np.array(shares, np.float32)
 
     def map(self, picture: np.ndarray) -> np.ndarray:
         """The map (uint8, rows x columns) of a grey picture (uint8)."""
+        picture = np.asarray(picture[self._first :, :])
         parts = []
         for level, (columns, rows) in enumerate(self._levels):
             if level:
@@ -78,10 +77,12 @@ def _rows_of(model: CameraModel, level: int) -> list[float]:
     ]
 
 
-def _maps(model: CameraModel, rows: list[float], y: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
-    """Columns and rows of the level's picture to take each point of the map from."""
+def _maps(
+    model: CameraModel, rows: list[float], y: np.ndarray, level: int, first: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows of the level's picture, which begins at a row, to take each point of the map from."""
     scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows])
     columns = model.cx - scale[:, None] * y
-    there = np.broadcast_to(np.array(rows)[:, None], columns.shape)
+    there = np.broadcast_to(np.array(rows)[:, None] - first, columns.shape)
     small = [((full + 0.5) / 2**level - 0.5).astype(np.float32) for full in (columns, there)]
     return cv2.convertMaps(small[0], small[1], cv2.CV_16SC2)

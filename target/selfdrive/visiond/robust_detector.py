@@ -4,14 +4,12 @@ What it saw last tells where to look next, so that rain, snow or dirt, which giv
 count; a line that is not seen stays where the other one puts it, and both stay for a while when none is.
 """
 
-import numpy as np
-
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.visiond.band_filter import mark_points
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.road_view import RoadView
-from selfdrive.visiond.voting import Belief, Pose, Voters, elect, fit
+from selfdrive.visiond.voting import Belief, Pose, Settle, Voters, elect, fit, settled
 
 SEEN = 0.5  # probability from which on a line is believed to be where it was found
 FADING = 0.92  # by how much a line not seen is less probable with each picture
@@ -23,11 +21,13 @@ BEYOND = 0.3  # m over a line from which on the car is in the next lane
 
 
 class RobustDetector:
-    """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last."""
+    """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last.
 
-    calculated_by = ""  # no compiled code
+    `calculated_by` tells which compiled code it calculates with, if any: that of `settle`.
+    """
 
-    def __init__(self, model: CameraModel) -> None:
+    def __init__(self, model: CameraModel, settle: Settle = settled, calculated_by: str = "") -> None:
+        self.calculated_by, self._settle = calculated_by, settle
         self._model = model
         self._view = RoadView(model)
         self._pose: Pose | None = None
@@ -47,10 +47,10 @@ class RobustDetector:
 
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in the view's picture, which is of the camera's size."""
-        road = self._view.map(np.asarray(view.picture))
+        road = self._view.map(view.picture)
         voters = Voters(self._view, mark_points(road), self._view.rows_with_content(road))
         belief = self._belief()
-        pose = fit(elect(voters, belief), voters, belief)
+        pose = fit(elect(voters, belief), voters, belief, self._settle)
         self._remember(pose)
         return self._lines()
 

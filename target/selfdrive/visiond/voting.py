@@ -5,6 +5,7 @@ pitched otherwise than it was calibrated moves it up or down. A line `y` m besid
 px below the known horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
 """
 
+from collections.abc import Callable
 from math import exp
 from typing import NamedTuple
 
@@ -129,18 +130,31 @@ def _votes(voters: Voters, left: np.ndarray, dip: np.ndarray) -> np.ndarray:
     return cv2.filter2D(votes, -1, np.float32([[0.5, 1.0, 0.5]]), borderType=cv2.BORDER_CONSTANT)
 
 
-def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
-    """`pose` moved to where the points around its lines are, by weighted Gauss-Newton steps.
+class Fitted(NamedTuple):
+    """Where the fit came to, `state` (4), and what its last step had before it moved that.
 
-    Unknown are left, dip, y_left and y_right; belief decides what points leave open.
+    `metre` is px to the m at each of n points; `error` (px) and `count` (how much it counts) are by line and
+    point (2, n).
     """
-    means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
-    expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
-    believed = means / sigmas
-    state = np.array(pose[:4])
+
+    state: np.ndarray
+    metre: np.ndarray
+    error: np.ndarray
+    count: np.ndarray
+
+
+Settle = Callable[[np.ndarray, Voters, np.ndarray, np.ndarray], Fitted]
+
+
+def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: np.ndarray) -> Fitted:
+    """`state` (left, dip, y_left, y_right) moved by weighted Gauss-Newton steps.
+
+    A point counts less the further it is away. `expected` (4, 4) times the state should be `believed`.
+    """
     n = len(voters.left)
     terms = np.zeros((5, 2, n))  # what error changes with each unknown, and the error
     terms[0] = 1.0
+    prior = product(expected.T, expected)
     for near in ROUNDS:
         metre = voters.metre * (voters.drop + state[1])
         y = state[2:, None]
@@ -151,10 +165,18 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
         terms[4] = error
         design = terms.reshape(5, 2 * n)
         sums = product(design, (design[:4] * (count * voters.precision).reshape(-1)).T)
-        information = sums[:4] + product(expected.T, expected)
         surprise = believed - (expected * state).sum(axis=1)
         pull = sums[4] + (expected.T * surprise).sum(axis=1)
-        state = state + _solved(information, pull)
+        state = state + _solved(sums[:4] + prior, pull)
+    return Fitted(state, metre, error, count)
+
+
+def fit(pose: Pose, voters: Voters, belief: Belief, settle: Settle = settled) -> Pose:
+    """`pose` moved to where the points around its lines are; belief decides what points leave open."""
+    means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
+    expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
+    state, metre, error, count = settle(np.array(pose[:4]), voters, expected, means / sigmas)
+    near = ROUNDS[-1]
     off = np.abs(error / metre)
     beside = (((off > near) & (off < BESIDE)) * voters.weight).sum(axis=1) / voters.rows
     chance = beside * (4.0 / 3.0 * near / (2.0 * (BESIDE - near)))

@@ -17,10 +17,12 @@ from selfdrive.visiond import compiled_windows
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
 from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
+from selfdrive.visiond.compiled_robust import build_robust_detector
 from selfdrive.visiond.compiled_windows import MarkWindows
 from selfdrive.visiond.hog import FEATURES, Hog, windows
 from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
 from selfdrive.visiond.paper_detector import PaperDetector
+from selfdrive.visiond.robust_detector import RobustDetector
 
 pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
 MODEL = CameraModel()
@@ -28,6 +30,7 @@ SMALL = CameraModel.from_view(width=512, rows=400, horizon=150.0, focal=400.0, h
 DETECTORS = {
     "paper": (PaperDetector, build_paper_detector, CompiledPaperDetector),
     "as_coded": (CodedDetector, build_coded_detector, CompiledCodedDetector),
+    "robust": (RobustDetector, build_robust_detector, RobustDetector),
 }
 
 
