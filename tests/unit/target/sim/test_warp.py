@@ -1,6 +1,7 @@
 """Regions of warped pictures: OpenCV's bits of the whole, from C as from OpenCV."""
 
 import ctypes
+import subprocess
 
 import cv2
 import numpy as np
@@ -77,6 +78,20 @@ def test_compiled_warps_have_the_same_bits(library):
             assert np.array_equal(fast(source, matrix, region), expected[region.part])
             wide = np.repeat(source, 2, axis=1)[:, ::2]
             assert np.array_equal(fast(wide, matrix, region), expected[region.part])
+
+
+@needs_compiler
+@pytest.mark.parametrize("option", ["-DIS_FAST=0", "-DIS_WIDE=0"])
+def test_processors_without_wide_vectors_warp_the_same(library, tmp_path, option):
+    """The bits do not depend on the instructions that a processor has."""
+    words = [*compile_helpers.compiler(), option, compiled_warp.C_SOURCE, "-o", tmp_path / "warp.so"]
+    subprocess.run([*words, *compile_helpers.OPTIONS], check=True)
+    narrow = compiled.Library(ctypes.CDLL(str(tmp_path / "warp.so")), b"")
+    random, fast = np.random.default_rng(5), CompiledWarp(library)
+    for matrix in moves(random):
+        for source in sources(random):
+            expected = fast(source, matrix, whole(SHAPE))
+            assert np.array_equal(CompiledWarp(narrow)(source, matrix, whole(SHAPE)), expected)
 
 
 @needs_compiler
