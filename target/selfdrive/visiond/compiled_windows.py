@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from selfdrive.common import compiled
+from selfdrive.common.array_math import length
 from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
 from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, LaneNet
 
