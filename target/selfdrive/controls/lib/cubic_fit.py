@@ -1,9 +1,7 @@
 """Cubics fitted to points one metre apart."""
 
 from collections.abc import Sequence
-from fractions import Fraction
 from functools import cache
-from math import lcm
 from operator import mul
 
 from selfdrive.common.ordered import total
@@ -32,23 +30,22 @@ def weights(n: int) -> tuple[tuple[float, ...], ...]:
     """What each of `n` points has to do with each coefficient: worked out exactly, so that it is the same on
     every machine."""
     normal = [[total(x ** (i + j) for x in range(n)) for j in POWERS] for i in POWERS]
-    found = []
-    for row in _inverse(normal):
-        divisor = lcm(*(share.denominator for share in row))
-        a, b, c, d = (int(share * divisor) for share in row)
-        found.append(tuple((((a * x + b) * x + c) * x + d) / divisor for x in range(n)))
-    return tuple(found)
+    return tuple(
+        tuple((((a * x + b) * x + c) * x + d) / divisor for x in range(n))
+        for (a, b, c, d), divisor in _inverse(normal)
+    )
 
 
-def _inverse(matrix: list[list[int]]) -> list[list[Fraction]]:
-    """Inverse of a positive definite matrix, by elimination, exact."""
+def _inverse(matrix: list[list[int]]) -> list[tuple[list[int], int]]:
+    """Rows of the inverse of a positive definite matrix, and what each is to be divided by: exact."""
     n = len(matrix)
-    rows = [[Fraction(x) for x in row] + [Fraction(i == j) for j in range(n)] for i, row in enumerate(matrix)]
+    rows = [row + [int(i == j) for j in range(n)] for i, row in enumerate(matrix)]
+    before = 1  # the last pivot, which divides all (E. H. Bareiss, Math. Comp. 22, 1968)
     for i in range(n):
         pivot = rows[i][i]
-        rows[i] = [x / pivot for x in rows[i]]
         for j in range(n):
             if j != i:
                 factor = rows[j][i]
-                rows[j] = [x - factor * y for x, y in zip(rows[j], rows[i], strict=True)]
-    return [row[n:] for row in rows]
+                rows[j] = [(pivot * x - factor * y) // before for x, y in zip(rows[j], rows[i], strict=True)]
+        before = pivot
+    return [(row[n:], row[i]) for i, row in enumerate(rows)]
