@@ -1,15 +1,18 @@
 """Digests of all that a run's bytes depend on: pictures, what detectors see in them, and traces.
 
-`python tests/differential/arithmetic.py` prints them as JSON, on whatever Python and processor it runs.
+`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON, on whatever Python and processor it
+runs, with the compiled code in FOLDER or without any.
 """
 
 import json
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
+from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
 from selfdrive.sim import vision
@@ -99,4 +102,5 @@ def digest(picture: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
+    compiled.use(Path(sys.argv[1]) if sys.argv[1:] else None)
     print(json.dumps(dict(digests()), indent=1))

@@ -1,4 +1,5 @@
-"""The same bytes on every Python, and on processors with narrower vectors: pictures, detections, traces."""
+"""The same bytes on every Python, on processors with narrower vectors, with and without compiled code:
+pictures, detections, traces."""
 
 import json
 import os
@@ -7,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from selfdrive.sim.compile_helpers import compile_helpers, compiler
 
 pytestmark = pytest.mark.slow
 
@@ -20,9 +22,15 @@ PROCESSORS = {
 
 
 @pytest.mark.parametrize("processor", PROCESSORS)
-def test_bytes_are_those_that_were_recorded(processor: str) -> None:
+@pytest.mark.parametrize("code", ["plain", "compiled"])
+def test_bytes_are_those_that_were_recorded(processor: str, code: str, tmp_path: Path) -> None:
     """Who changes results on purpose records them anew, with `python tests/differential/arithmetic.py`."""
     command = [sys.executable, str(HERE / "arithmetic.py")]
+    if code == "compiled":
+        if not compiler():
+            pytest.skip("there is no C compiler")
+        list(compile_helpers(tmp_path))
+        command.append(str(tmp_path))
     environment = os.environ | PROCESSORS[processor] | {"PYTHONPATH": str(HERE.parents[1] / "target")}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     recorded, found = json.loads(RECORDED.read_text()), json.loads(done.stdout)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import pytest
+from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import compile_helpers
 from selfdrive.sim.detection_memory import FILE
@@ -93,6 +94,23 @@ def test_the_manifest_names_every_file_that_sees() -> None:
         "selfdrive/sim/simulator.py",
     ):
         assert not matches(path, manifest.reads_itself)
+
+
+def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
+    """A mutant of one is run where it is on the disk, so that the compiled code is not found; what chooses
+    between the two takes no faults."""
+    manifest = Workspace.find(root=ROOT).manifest("openpilot")
+    target = ROOT / "target"
+    stood_for = {
+        (source.parent / name).resolve().relative_to(target).as_posix()
+        for source in target.rglob("*.c")
+        for name in compiled.stands_for(source.read_bytes())
+        if name.endswith(".py")
+    }
+    assert len(stood_for) > 6
+    assert [path for path in sorted(stood_for) if not matches(path, manifest.reads_itself)] == []
+    choosing = [path.relative_to(target).as_posix() for path in target.rglob("compiled_*.py")]
+    assert [path for path in sorted(choosing) if not matches(path, manifest.forbid)] == []
 
 
 def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> None:
