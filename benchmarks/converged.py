@@ -1,0 +1,114 @@
+"""What ending runs early could save: of those whose fault is over and that are golden's again.
+
+`python benchmarks/converged.py RUN [--json FILE]`. A fork whose state equals golden's after its fault is over
+could end there with golden's rest. This prints an upper bound of what that saves, as a share of the CPU of
+all runs: of a run whose trace has golden's bytes everything after the last activation counts as saved, of the
+others everything after that from which on no channel of the series (six digits, 20 values a second) differs
+from golden. Equal channels are needed for equal states, and do not suffice; and as long as a fault may act
+again, what it has done so far says nothing of what it will do.
+"""
+
+import argparse
+import json
+import math
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from mutator.model import Record, Status  # noqa: E402
+from mutator.outcomes.golden import trace_digest  # noqa: E402
+from mutator.store import plan_file  # noqa: E402
+from mutator.store.run_folder import RunFolder  # noqa: E402
+from mutator.store.series import SeriesFolder  # noqa: E402
+from mutator.store.series_format import Series  # noqa: E402
+from mutator.workspace import Workspace  # noqa: E402
+
+WORTH_IT = 0.02  # of the CPU
+_LAST_S = (
+    0.06  # a fault that was active so shortly before the end was so to the end: it may act in each 5th step
+)
+
+
+@dataclass
+class Saved:
+    """Runs, and CPU (s) that could be saved, by the kind of run."""
+
+    runs: Counter[str] = field(default_factory=Counter)
+    cpu_s: Counter[str] = field(default_factory=Counter)
+
+
+def last_difference(golden: Series, faulty: Series) -> float:
+    """Time (s) of the last sample or point in which a channel differs from golden; -inf: none does."""
+    last = -math.inf
+    for number, (one, other) in enumerate(zip(golden.rows, faulty.rows, strict=True)):
+        times, known = faulty.times(number), golden.times(number)
+        rows = min(len(one), len(other))
+        if len(one) != len(other) or not np.array_equal(times[:rows], known[:rows]):
+            return math.inf  # a run of another length
+        differs = np.flatnonzero(one.view("<u4") != other.view("<u4"))
+        if differs.size:
+            last = max(last, float(times[differs[-1]]))
+    points = faulty.points
+    differs = np.flatnonzero(points.golden.view("<u4") != points.faulty.view("<u4"))
+    return max(last, float(points.t[differs].max(initial=-math.inf)))
+
+
+def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
+    """What could be saved of a campaign at most, and the CPU (s) of all its runs."""
+    manifest, series = workspace.manifest(folder.head["target"]), SeriesFolder(folder.path)
+    timings, records = folder.timings(), folder.records()
+    digests: dict[Path, str] = {}
+    saved, total = Saved(), 0.0
+    for experiment in plan_file.read_all(folder.path):
+        record = records[experiment.id]
+        cpu_s = timings[experiment.id]["cpu_s"]
+        total += cpu_s
+        golden = folder.golden(experiment.scenario, experiment.changes)
+        digests[golden] = digests.get(golden) or trace_digest(manifest, golden)
+        if cpu_s and record.status is Status.OK and record.activation:
+            kind, share = _saved(record, digests[golden], series)
+            saved.runs[kind] += 1
+            saved.cpu_s[kind] += share * cpu_s
+    return saved, total
+
+
+def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
+    """The kind of a run, and which share of what was driven of it could be saved."""
+    found, active = series.read(record.experiment_id), record.activation
+    if found is None or active is None:
+        return "without a series", 0.0
+    end = float(found[0].about["end"])
+    same = record.trace_digest == golden
+    over = max(active.last, -math.inf if same else last_difference(*found))
+    kind = "golden's all the time" if same else "golden's again"
+    if over >= end - _LAST_S:
+        return f"{kind}, at fault to the end" if same else "different, or at fault, to the end", 0.0
+    return f"{kind}, and the fault is over", (end - over) / (end - active.first)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("run", type=Path, help="folder of a finished campaign")
+    parser.add_argument("--library", type=Path, metavar="DIR", help="its fault library, if it is another one")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    options = parser.parse_args(arguments)
+    saved, total = bound(RunFolder.open(options.run), Workspace.find(root=ROOT, library=options.library))
+    for kind, count in saved.runs.most_common():
+        print(f"{count:6} runs {kind}: at most {saved.cpu_s[kind] / total:6.2%} of the CPU of all runs")
+    share = sum(saved.cpu_s.values()) / total
+    print(f"all together at most {share:.2%} of {total:.1f} s (worth it from {WORTH_IT:.0%} on)")
+    if options.json:
+        facts = {"runs": saved.runs, "cpu_s": saved.cpu_s, "total_cpu_s": total, "share": share}
+        options.json.write_text(json.dumps(facts, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
