@@ -1,5 +1,6 @@
 """Where the map of the road is brighter, in a band as wide as a mark, than on both sides of it."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import cv2
@@ -15,6 +16,7 @@ NEIGHBOURHOOD = (51, 9)  # columns and rows in which texture is measured
 DARK = 12.0  # grey levels added to the road's brightness, so that noise in the dark is no contrast
 LEAST = 0.006  # contrast below which nothing is a mark, on the cleanest road
 QUIET, CLEAR = 1.6, 5.0  # response in units of the texture: below the first nothing, from the second on all
+STEEPNESS = 1.0 / (CLEAR - QUIET)
 STRONGEST = 1500  # points kept
 ACROSS = np.ones((1, 5), np.uint8)
 
@@ -27,17 +29,21 @@ class Points(NamedTuple):
     weight: np.ndarray
 
 
-def mark_points(road: np.ndarray) -> Points:
-    """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
-    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
-    side = _mean(road, SIDE)
-    single = _inner(_mean(road, SINGLE[0]))
+Crests = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def crests(side: np.ndarray, single: np.ndarray, double: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (row-major, without the edge columns) and weights of the points on the crests of bright bands.
+
+    The arrays are the map's means (float32) over the width of its sides and of both kinds of marks.
+    """
+    single = _inner(single)
     sides = _sides(side, SINGLE[1])
     # Most results take the place of one that is not needed any more: new memory costs as much as the sums.
     contrast = np.maximum(*sides)
     np.subtract(single, contrast, out=contrast)
     other = np.maximum(*_sides(side, DOUBLE[1]))
-    np.subtract(_inner(_mean(road, DOUBLE[0])), other, out=other)
+    np.subtract(_inner(double), other, out=other)
     np.maximum(contrast, other, out=contrast)
     ground = np.add(*sides)
     ground *= np.float32(0.5)
@@ -50,8 +56,22 @@ def mark_points(road: np.ndarray) -> Points:
     texture += np.float32(LEAST)
     sure = np.divide(contrast, texture, out=texture)
     sure -= np.float32(QUIET)
-    sure *= np.float32(1.0 / (CLEAR - QUIET))
-    return _crests(sure, contrast)
+    sure *= np.float32(STEEPNESS)
+    # A crest is the highest of the five columns around.
+    crest = (sure > 0.0) & (contrast >= cv2.dilate(contrast, ACROSS))
+    at = np.flatnonzero(crest)  # np.nonzero of two dimensions takes four times as long
+    return at, np.minimum(sure.ravel()[at], 1.0)
+
+
+def mark_points(road: np.ndarray, find: Crests = crests) -> Points:
+    """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
+    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
+    at, weight = find(_mean(road, SIDE), _mean(road, SINGLE[0]), _mean(road, DOUBLE[0]))
+    if len(at) > STRONGEST:
+        keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
+        at, weight = at[keep], weight[keep]
+    row, column = np.divmod(at, road.shape[1] - 2 * EDGE)
+    return Points(row, column + EDGE, weight)
 
 
 def _mean(road: np.ndarray, columns: int) -> np.ndarray:
@@ -67,15 +87,3 @@ def _sides(side: np.ndarray, apart: int) -> tuple[np.ndarray, np.ndarray]:
     """The road to the left and to the right of each inner point."""
     end = side.shape[1]
     return side[:, EDGE - apart : end - EDGE - apart], side[:, EDGE + apart : end - EDGE + apart]
-
-
-def _crests(sure: np.ndarray, contrast: np.ndarray) -> Points:
-    """The points in which contrast is the highest of the five columns around."""
-    crest = (sure > 0.0) & (contrast >= cv2.dilate(contrast, ACROSS))
-    at = np.flatnonzero(crest)  # np.nonzero of two dimensions takes four times as long
-    weight = np.minimum(sure.ravel()[at], 1.0)
-    if len(at) > STRONGEST:
-        keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
-        at, weight = at[keep], weight[keep]
-    row, column = np.divmod(at, sure.shape[1])
-    return Points(row, column + EDGE, weight)

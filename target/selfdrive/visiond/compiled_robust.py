@@ -1,27 +1,64 @@
-"""The geometric lane detector with its fit in C, where this was compiled: the same lines to the bit."""
+"""The geometric lane detector with its filter and fit in C, where compiled: the same lines to the bit."""
 
 import ctypes
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from selfdrive.common import compiled
 from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.visiond.band_filter import STRONGEST
+from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, crests
 from selfdrive.visiond.compiled_sums import adds_up_alike
 from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond.voting import Fitted, Voters
 
-C_SOURCE = Path(__file__).with_name("voting.c")
+C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c")]
 
 
 def build_robust_detector(model: CameraModel) -> RobustDetector:
     """The detector, compiled where it is to be used and has been."""
-    library = compiled.library(C_SOURCE)
-    if library is None or not adds_up_alike(library):
+    libraries = [compiled.library(source) for source in C_SOURCES]
+    if None in libraries or not adds_up_alike(libraries[1]):
         return RobustDetector(model)
-    return RobustDetector(model, CompiledSettle(library), library.digest.hex())
+    digests = "".join(library.digest.hex() for library in libraries)
+    return RobustDetector(model, CompiledCrests(libraries[0]), CompiledSettle(libraries[1]), digests)
+
+
+class CompiledCrests:
+    """Does what `crests` does: `library` is `band_filter.c`, compiled."""
+
+    def __init__(self, library: compiled.Library) -> None:
+        self._bands, self._crests, pointer = library.code.bands, library.code.crests, ctypes.c_void_p
+        self._bands.argtypes, self._bands.restype = (
+            [*[pointer] * 3, *[ctypes.c_long] * 2, *[pointer] * 2],
+            None,
+        )
+        self._crests.argtypes = [*[pointer] * 2, *[ctypes.c_long] * 2, ctypes.c_float, *[pointer] * 3]
+        self._crests.restype = ctypes.c_long
+        self._shape: tuple[int, ...] = ()
+
+    def __call__(
+        self, side: np.ndarray, single: np.ndarray, double: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers and weights of the points."""
+        if side.ndim != 2 or not (side.dtype == single.dtype == double.dtype == np.float32):
+            return crests(side, single, double)  # a fault may do that to a picture
+        rows, width = side.shape
+        inner = width - 2 * EDGE
+        if self._shape != side.shape:
+            self._shape = side.shape
+            self._contrast, self._rough, self._texture = np.empty((3, rows, inner), np.float32)
+            self._sure, self._weight = np.empty(inner, np.float32), np.empty(rows * inner + 1, np.float32)
+            self._at = np.empty(rows * inner + 1, np.int64)
+        given = [np.ascontiguousarray(part) for part in (side, single, double)]
+        contrast = self._contrast.ctypes.data
+        self._bands(*[part.ctypes.data for part in given], rows, width, contrast, self._rough.ctypes.data)
+        texture = cv2.blur(self._rough, NEIGHBOURHOOD, dst=self._texture)
+        room = [part.ctypes.data for part in (self._sure, self._at, self._weight)]
+        count = self._crests(contrast, texture.ctypes.data, rows, inner, STEEPNESS, *room)
+        return self._at[:count].copy(), self._weight[:count].copy()
 
 
 class CompiledSettle:

@@ -6,7 +6,7 @@ count; a line that is not seen stays where the other one puts it, and both stay 
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.visiond.band_filter import mark_points
+from selfdrive.visiond.band_filter import Crests, crests, mark_points
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.voting import Belief, Pose, Settle, Voters, elect, fit, settled
@@ -23,11 +23,13 @@ BEYOND = 0.3  # m over a line from which on the car is in the next lane
 class RobustDetector:
     """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last.
 
-    `calculated_by` tells which compiled code it calculates with, if any: that of `settle`.
+    `calculated_by` tells which compiled code it calculates with, if any: that of `find` and `settle`.
     """
 
-    def __init__(self, model: CameraModel, settle: Settle = settled, calculated_by: str = "") -> None:
-        self.calculated_by, self._settle = calculated_by, settle
+    def __init__(
+        self, model: CameraModel, find: Crests = crests, settle: Settle = settled, calculated_by: str = ""
+    ) -> None:
+        self._find, self._settle, self.calculated_by = find, settle, calculated_by
         self._model = model
         self._view = RoadView(model)
         self._pose: Pose | None = None
@@ -48,7 +50,7 @@ class RobustDetector:
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in the view's picture, which is of the camera's size."""
         road = self._view.map(view.picture)
-        voters = Voters(self._view, mark_points(road), self._view.rows_with_content(road))
+        voters = Voters(self._view, mark_points(road, self._find), self._view.rows_with_content(road))
         belief = self._belief()
         pose = fit(elect(voters, belief), voters, belief, self._settle)
         self._remember(pose)
