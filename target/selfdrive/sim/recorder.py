@@ -54,8 +54,8 @@ class Recorder:
             self.engaged_to = t
             if self.engaged_from is None:
                 self.engaged_from = t
-        self._rows.extend(
-            (
+        self._rows.fromlist(
+            [
                 *(t, v_ego, truth.a_ego, d_rel, v_lead - v_ego, v_lead),
                 *(truth.hwt, actuators.gas, actuators.brake, actuators.steer),
                 *(truth.steer_angle, truth.lateral_offset, truth.heading),
@@ -64,7 +64,7 @@ class Recorder:
                 *(plan.v_target, plan.a_target, state.angle_desired),
                 *(_PLAN_SOURCE[plan.source], _LONG_STATE[state.long_state]),
                 *(state.enabled, self._alert_bits),
-            )
+            ]
         )
 
     def newest(self) -> dict[str, float]:
