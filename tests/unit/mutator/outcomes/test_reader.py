@@ -1,5 +1,6 @@
 """The one reader of a run's results."""
 
+import os
 import re
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from mutator.outcomes.reader import Results
 from mutator.report import building
 from mutator.statistics.frame import load
 from mutator.store import plan_file
+from mutator.targets.environment import THREADS
 from mutator.workspace import Workspace
 
 SOURCES = Path(mutator.__file__).parent
@@ -70,10 +72,10 @@ print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/com
 
 def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
     """A thread of pyarrow that gives bytes back to Python while that ends kills the process after its work:
-    whatever reads tables starts none. That of its allocator knows nothing of Python."""
+    whatever reads tables starts none. Those of its allocator and of BLAS know nothing of Python."""
     results.build(run)
-    words = [sys.executable, "-c", ALONE, str(run)]
-    ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
+    words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
+    ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
     assert [name for name in ended.stdout.split() if name != "jemalloc_bg_thd"] == [ended.stdout.split()[0]]
 
 
