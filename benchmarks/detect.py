@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
+from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim.effects import PaperRain, PaperSnow  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.dbscan import dbscan  # noqa: E402
@@ -50,8 +51,8 @@ def pictures(model: CameraModel) -> dict[str, np.ndarray]:
     moment = SimpleNamespace(t=2.0, position=3.0, v_ego=26.8)
     found = {"clean": clean}
     for level in (1, 3, 5, 10):
-        found[f"rain {level}"] = PaperRain(level, 1, model).apply(clean, moment)
-    found["snow 10"] = PaperSnow(10, 1, model).apply(clean, moment)
+        found[f"rain {level}"] = np.asarray(PaperRain(level, 1, model).apply(clean, moment))
+    found["snow 10"] = np.asarray(PaperSnow(10, 1, model).apply(clean, moment))
     noise = np.random.default_rng(0).normal(0.0, 12.0, clean.shape)
     found["noise"] = np.clip(clean + noise, 0, 255).astype(np.uint8)
     return found
@@ -65,7 +66,7 @@ def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]
     at, rising = edges(part)
     labels = dbscan(at, part.shape, EPS, MIN_SAMPLES)
     steps: tuple[Callable[[], object], ...] = (
-        lambda: detector.detect(SimpleNamespace(picture=picture)),
+        lambda: detector.detect(CameraView(0.0, 0.0, 0.0, (), 0.0, picture)),
         lambda: hog.blocks(part),
         lambda: edges(part),
         lambda: dbscan(at, part.shape, EPS, MIN_SAMPLES),

@@ -7,6 +7,7 @@ work on the machine matters little, but for the caches it shares. Exit code 1 wh
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -58,7 +59,7 @@ def main() -> int:
             effect = kind(amount, 1, camera).ready()
             made = 1000.0 * (process_time() - start)
             moments = [Moment(2.0 + 0.05 * k, 50.0 + 1.341 * k, 26.82) for k in range(given.repeat)]
-            times = [milliseconds(lambda m=m, e=effect: e.apply(picture, m)) for m in moments]
+            times = [milliseconds(partial(effect.apply, picture, moment)) for moment in moments]
             print(
                 f"{kind.__name__:<16}{amount:>8g}{made:>9.1f} ms{median(times):>9.2f} ms{min(times):>9.2f} ms"
                 f"{median(times) / GOAL:>13.2f}"

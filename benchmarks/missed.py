@@ -18,21 +18,24 @@ sys.path.insert(0, str(ROOT / "target"))
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim.effects import PaperOcclusion, PaperRain, PaperSnow  # noqa: E402
-from selfdrive.sim.effects.effect import Moment  # noqa: E402
+from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
+from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.evaluate import TUSIMPLE, UDACITY  # noqa: E402
 from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
 from selfdrive.visiond.training_looks import random_look  # noqa: E402
 
 CAMERAS = CameraModel(), UDACITY, TUSIMPLE
-EFFECTS = PaperRain, PaperSnow, PaperOcclusion
+EFFECTS: tuple[type[Effect], ...] = PaperRain, PaperSnow, PaperOcclusion
 AHEAD, ERROR = 10.0, 0.3  # m
 ROAD_SEED = 11
 
 
-def is_found(model: CameraModel, picture: np.ndarray, truth: tuple) -> bool:
+def is_found(
+    model: CameraModel, picture: np.ndarray | Picture, truth: tuple[tuple[float, float], ...]
+) -> bool:
     """Whether a detector without a past finds both lines."""
-    lines = RobustDetector(model).detect(CameraView(0.0, 0.0, 0.0, (), 0.0, picture))
+    lines = RobustDetector(model).detect(CameraView(0.0, 0.0, 0.0, (), 0.0, np.asarray(picture)))
     return all(
         line.prob > 0.0 and abs(line.y - y + (line.slope - slope) * AHEAD) <= ERROR
         for line, (y, slope) in zip((lines.left, lines.right), truth, strict=True)

@@ -44,8 +44,8 @@ def steer(mpc: LateralMpc) -> None:
     """Come back to the middle of a lane that bends slowly."""
     for k in range(UPDATES):
         y, bend = 0.4 * (1 - k / UPDATES), 2e-4
-        lines = [(0.0, bend, 0.01, y + side) for side in (1.85, -1.85, 0.0)]
-        mpc.update(Lanes(*lines, 0.95, 0.95, 3.7), 25.0, 0.02, 0.0, 0.2)
+        left, right, path = ((0.0, bend, 0.01, y + side) for side in (1.85, -1.85, 0.0))
+        mpc.update(Lanes(left, right, path, 0.95, 0.95, 3.7), 25.0, 0.02, 0.0, 0.2)
 
 
 def cpu_us(task: Callable[[], object], divisor: int = 1) -> float:
@@ -59,7 +59,7 @@ def measure(rounds: int) -> dict[str, list[float]]:
     """Microseconds of each subject in each round; the first build also loads the solver's plug-in."""
     first = cpu_us(lambda: LongitudinalMpc(1))
     long_mpc, lateral_mpc = LongitudinalMpc(1), LateralMpc(get_params())
-    subjects = {
+    subjects: dict[str, Callable[[], float]] = {
         "longitudinal update": lambda: cpu_us(lambda: follow(long_mpc), UPDATES),
         "longitudinal solver": lambda: cpu_us(lambda: repeat(long_mpc._iteration._evaluate), UPDATES),
         "lateral update": lambda: cpu_us(lambda: steer(lateral_mpc), UPDATES),

@@ -19,6 +19,10 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import process_time
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from selfdrive.sim.truth import GroundTruth
 
 ROOT = Path(__file__).resolve().parents[1]
 HELPERS = ("-m", "selfdrive.sim.compile_helpers")
@@ -49,8 +53,9 @@ class Version:
         )
         self.detectors, self.effects = self.ask("has")
 
-    def ask(self, *words: object):
+    def ask(self, *words: object) -> Any:
         """The process's answer."""
+        assert self._process.stdout is not None
         print(json.dumps(words), file=self._process.stdin, flush=True)
         return json.loads(self._process.stdout.readline())
 
@@ -95,8 +100,8 @@ class Drive:
         self._offset = 0.1 * list(EFFECTS).index(effect)  # cases share no poses
         self._number = 0
         self._effect = None
-        if EFFECTS[effect]:
-            name, amount = EFFECTS[effect]
+        if made := EFFECTS[effect]:
+            name, amount = made
             self._effect = getattr(effects, name)(amount, 1, self._seen.model).ready()
 
     def pictures(self, count: int) -> tuple[list[float], str]:
@@ -113,13 +118,13 @@ class Drive:
             lines.update(repr([tuple(line[:3]) for line in found]).encode())
         return times, lines.hexdigest()
 
-    def _truth(self):
+    def _truth(self) -> "GroundTruth":
         from selfdrive.sim.truth import GroundTruth
 
         k = self._number = self._number + 1
         place = {"t": 2.0 + 0.05 * k, "v_ego": 26.82, "position": 1.341 * k}
         pose = {"lateral_offset": 0.4 * sin(0.071 * k + self._offset), "heading": 0.01 * sin(0.113 * k)}
-        others = dict.fromkeys(GroundTruth._fields, 0.0)
+        others: dict[str, Any] = dict.fromkeys(GroundTruth._fields, 0.0)
         return GroundTruth(**others | place | pose)
 
 
@@ -155,7 +160,9 @@ def main() -> int:
     return 0
 
 
-def _compared(versions: list[Version], detector: str, effect: str, options: argparse.Namespace) -> list:
+def _compared(
+    versions: list[Version], detector: str, effect: str, options: argparse.Namespace
+) -> list[list[float]]:
     """Times of the older version and of this one, in turn; a line of the table."""
     times: list[list[float]] = [[], []]
     same = True

@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import cv2
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
@@ -29,6 +30,7 @@ from selfdrive.sim import effects, simulator  # noqa: E402
 from selfdrive.sim.effects.effect import Effect, Moment  # noqa: E402
 from selfdrive.sim.effects.levels import LEVELS  # noqa: E402
 from selfdrive.sim.moved_picture import CodedView  # noqa: E402
+from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.picture_camera import PictureCamera  # noqa: E402
 from selfdrive.sim.reference_plant import ReferencePlant  # noqa: E402
 from selfdrive.sim.scenario import REFERENCE, load_scenario, on_plant  # noqa: E402
@@ -152,7 +154,7 @@ class FaultyCamera(PictureCamera):
         picture = self._move.seen(frame, truth.lateral_offset, truth.heading)
         if self._active and PLACE not in self._parts:
             picture = self._affected(picture, truth)
-        return self._geometry.look(truth)._replace(picture=picture)
+        return self._geometry.look(truth)._replace(picture=np.asarray(picture))
 
     def _update(self, truth: GroundTruth) -> None:
         if ARMING in self._parts or truth.t >= ARMED_FROM:
@@ -161,13 +163,15 @@ class FaultyCamera(PictureCamera):
             self.reached |= here
             self._active = self._case.context in (self.reached if LATCHING in self._parts else here)
 
-    def _affected(self, picture, truth: GroundTruth):
+    def _affected(self, picture: Picture, truth: GroundTruth) -> Picture:
         case, redrawn = self._case, REDRAWING in self._parts
         coded = (RIM if case.effect == "occlusion" else MARKS) in self._parts
         number = round(truth.t / CYCLE) % DRAWINGS if redrawn and not coded else 0
         effect = drawing(case.effect, case.level, coded, number, self.model)
         moment = Moment(0.0, truth.position, truth.v_ego) if coded and not redrawn else truth
-        return effect.apply(picture, moment)
+        affected = effect.apply(picture, moment)
+        assert isinstance(affected, Picture), "made of a picture"
+        return affected
 
 
 @cache
@@ -196,8 +200,9 @@ class MixedDetector:
             lines = [self._unseen(*pair) for pair in enumerate(lines)]
         if MISSING in self._parts and CLUSTERS not in self._parts:
             lines = self._sent(lines)
-        path = RoadLine(y=0.0) if PATH in self._parts else path_between(*lines)
-        return LaneLines(*lines, path)
+        left, right = lines
+        path = RoadLine(y=0.0) if PATH in self._parts else path_between(left, right)
+        return LaneLines(left, right, path)
 
     def _unseen(self, side: int, line: RoadLine) -> RoadLine:
         """The line, without probability where the detector as coded has no cluster."""
@@ -219,6 +224,7 @@ def drive(case: Case) -> tuple[Case, Ending]:
     scenario = load_scenario(ROOT / "fault_library" / "scenarios" / f"{case.scenario}.yaml")
     run = simulator.Simulator()
     run.reset(on_plant(scenario, REFERENCE), 1, Pictures(cache=Path(os.environ[FRAMES])))
+    assert isinstance(run._camera, PictureCamera)
     run._camera = camera = FaultyCamera(run._camera, case)
     detector = MixedDetector(case.row, camera.model)
     run.manager.visiond._detector = MirroredDetector(detector) if labels else detector
@@ -247,7 +253,7 @@ def report(runs: dict[Case, Ending], rows: Sequence[Row]) -> None:
             found = [bool(end.hazard) for case, end in ends.items() if case.effect == effect]
             cells.append(f"{sum(found)} of {len(found)}" if found else "")
         told = [
-            f"{case.scenario}: {' and '.join(filter(None, (end.hazard, end.alert and 'alert')))}"
+            f"{case.scenario}: {' and '.join(filter(None, (end.hazard, 'alert' if end.alert else '')))}"
             for case, end in ends.items()
             if not case.effect and (end.hazard or end.alert)
         ]

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from time import process_time
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
@@ -113,7 +114,7 @@ class Stopwatch:
         original, key = getattr(owner, name), part_name(owner, name)
         self.seconds[key], self.calls[key] = 0.0, 0
 
-        def timed(*args, **kwargs):
+        def timed(*args: Any, **kwargs: Any) -> Any:
             self._inner.append(0.0)
             start = process_time()
             result = original(*args, **kwargs)
