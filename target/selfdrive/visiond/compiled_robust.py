@@ -1,6 +1,7 @@
-"""The geometric lane detector with its filter and fit in C, where compiled: the same lines to the bit."""
+"""The geometric lane detector with filter, election and fit in C, where compiled: the same lines to the bit."""
 
 import ctypes
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -9,21 +10,24 @@ import numpy as np
 from selfdrive.common import compiled
 from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, crests
+from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, Points, crests
 from selfdrive.visiond.compiled_sums import adds_up_alike
+from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond.voting import Fitted, Voters
+from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Fitted, Pose, Voters, elect
 
+CANDIDATES = 512  # points where lines may meet, MOST of the C file
 C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c")]
 
 
 def build_robust_detector(model: CameraModel) -> RobustDetector:
     """The detector, compiled where it is to be used and has been."""
     libraries = [compiled.library(source) for source in C_SOURCES]
-    if None in libraries or not adds_up_alike(libraries[1]):
+    if None in libraries or not (adds_up_alike(libraries[1]) and elects_alike(libraries[1], model)):
         return RobustDetector(model)
     digests = "".join(library.digest.hex() for library in libraries)
-    return RobustDetector(model, CompiledCrests(libraries[0]), CompiledSettle(libraries[1]), digests)
+    find, voting = CompiledCrests(libraries[0]), libraries[1]
+    return RobustDetector(model, find, CompiledElect(voting), CompiledSettle(voting), digests)
 
 
 class CompiledCrests:
@@ -59,6 +63,41 @@ class CompiledCrests:
         room = [part.ctypes.data for part in (self._sure, self._at, self._weight)]
         count = self._crests(contrast, texture.ctypes.data, rows, inner, STEEPNESS, *room)
         return self._at[:count].copy(), self._weight[:count].copy()
+
+
+class CompiledElect:
+    """Does what `elect` does: `library` is `voting.c`, compiled."""
+
+    def __init__(self, library: compiled.Library) -> None:
+        pointer, number, real = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
+        self._elect = library.code.elect
+        self._elect.argtypes = [*[pointer] * 4, number, real, *[pointer] * 3]
+        self._elect.restype = number
+        self._room = np.empty((CANDIDATES, round(2 * SIDEWAYS / BIN)))
+        self._belief, self._pose = (ctypes.c_double * 8)(), (ctypes.c_double * 4)()
+
+    def __call__(self, voters: Voters, belief: Belief) -> Pose:
+        """The pair of lines with the most support."""
+        points = voters.left, voters.drop, voters.metre, voters.weight
+        given = [np.ascontiguousarray(part, np.float32) for part in points]
+        self._belief[:] = [*belief.left, *belief.dip, *belief.middle, *belief.width]
+        used = [part.ctypes.data for part in given], len(voters.left), voters.rows
+        room = self._room.ctypes.data
+        if not self._elect(*used[0], *used[1:], self._belief, room, self._pose):
+            return elect(voters, belief)
+        return Pose(*self._pose)
+
+
+@cache
+def elects_alike(library: compiled.Library, model: CameraModel) -> bool:
+    """Whether an election has the bits of OpenCV's filters: those of another version may add up otherwise."""
+    view = RoadView(model)
+    number = np.arange(400)
+    row, column = number * 7 % len(view.drop), number * number * 13 % len(view.y)
+    points = Points(row, column, np.sqrt(number / 400).astype(np.float32))
+    voters = Voters(view, points, 100.0)
+    beliefs = Belief(), Belief(left=(3.3, 7.1), width=(3.4, 0.02), dip=(0.7, 1.5))
+    return all(CompiledElect(library)(voters, belief) == elect(voters, belief) for belief in beliefs)
 
 
 class CompiledSettle:

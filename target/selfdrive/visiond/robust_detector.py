@@ -9,7 +9,7 @@ from selfdrive.messages import CameraView
 from selfdrive.visiond.band_filter import Crests, crests, mark_points
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.road_view import RoadView
-from selfdrive.visiond.voting import Belief, Pose, Settle, Voters, elect, fit, settled
+from selfdrive.visiond.voting import Belief, Elect, Pose, Settle, Voters, elect, fit, settled
 
 SEEN = 0.5  # probability from which on a line is believed to be where it was found
 FADING = 0.92  # by how much a line not seen is less probable with each picture
@@ -23,13 +23,18 @@ BEYOND = 0.3  # m over a line from which on the car is in the next lane
 class RobustDetector:
     """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last.
 
-    `calculated_by` tells which compiled code it calculates with, if any: that of `find` and `settle`.
+    `calculated_by` tells which compiled code `find`, `choose` and `settle` calculate with, if any.
     """
 
     def __init__(
-        self, model: CameraModel, find: Crests = crests, settle: Settle = settled, calculated_by: str = ""
+        self,
+        model: CameraModel,
+        find: Crests = crests,
+        choose: Elect = elect,
+        settle: Settle = settled,
+        calculated_by: str = "",
     ) -> None:
-        self._find, self._settle, self.calculated_by = find, settle, calculated_by
+        self._find, self._choose, self._settle, self.calculated_by = find, choose, settle, calculated_by
         self._model = model
         self._view = RoadView(model)
         self._pose: Pose | None = None
@@ -52,7 +57,7 @@ class RobustDetector:
         road = self._view.map(view.picture)
         voters = Voters(self._view, mark_points(road, self._find), self._view.rows_with_content(road))
         belief = self._belief()
-        pose = fit(elect(voters, belief), voters, belief, self._settle)
+        pose = fit(self._choose(voters, belief), voters, belief, self._settle)
         self._remember(pose)
         return self._lines()
 

@@ -1,9 +1,14 @@
 /* Stands for: voting.py, ../common/array_math.py, sums.h.
- * The steps of the fit, with the bits of the Python: the same operations in the same order, sums in numpy's. */
+ * Election and steps of the fit, with the bits of the Python: the same operations in the same order and
+ * precision, sums in numpy's order, filters in OpenCV's. */
 
 #include <math.h>
 #include <stdint.h>
 #include "sums.h"
+
+enum { BINS = 80, OUTSIDE = 1, AROUND = 10, GAP = 3, LOG_TERMS = 10, MOST = 512 };
+static const double BIN = 0.1, SIDEWAYS = 4.0, LEFT_STEP = 4.0, DIP_STEP = 6.0;
+static const float SCATTER = 0.005f;
 
 enum { UNKNOWN = 4, TERMS = UNKNOWN + 1, ROUNDS = 4 };
 static const double NEAR[ROUNDS] = {0.30, 0.20, 0.15, 0.15};
@@ -111,4 +116,126 @@ void settle(const float *left, const float *drop, const float *voters_metre, con
     }
 #endif
     settle_plain(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count, room);
+}
+
+/* What is expected of one number, and the candidates for it; no `count` where there would be more than fit. */
+typedef struct {
+    double mean, sigma;
+    long count;
+    float at[MOST];
+} Expected;
+
+static void expect(const double *belief, double step, Expected *of)
+{
+    of->mean = belief[0], of->sigma = belief[1], of->count = 0;
+    if (!(fabs(of->mean) < 1e6 && of->sigma > 0.0 && of->sigma < 0.25 * step * MOST - step))
+        return;
+    long n = (long)(2.0 * of->sigma / step);
+    for (long k = -n; k <= n; k++)
+        of->at[of->count++] = (float)(of->mean + step * (double)k);
+}
+
+static float unlikely(const Expected *of, float value)
+{
+    float off = (value - (float)of->mean) / (float)of->sigma;
+    return off * off;
+}
+
+/* `log` of array_math.py: 2 artanh((m - 1) / (m + 1)) of the mantissa, and its power of two. */
+static double logarithm(float value)
+{
+    int power;
+    float mantissa = frexpf(value, &power), series = 0.0f;
+    if ((double)mantissa < sqrt(0.5)) {
+        mantissa *= 2.0f;
+        power--;
+    }
+    float ratio = (mantissa - 1.0f) / (mantissa + 1.0f), square = ratio * ratio;
+    for (int k = LOG_TERMS; k >= 0; k--)
+        series = series * square + (float)(2.0 / (2 * k + 1));
+    return (double)(series * ratio) + power * (double)(float)0.6931471805599453;
+}
+
+/* Share of `rows` with a point, by bin of y, for lines that meet at (`left`, `dip`). */
+static void take_votes(const float *lefts, const float *drops, const float *metres, const float *weights, long n,
+                       float rows, float left, float dip, float *votes)
+{
+    double sums[BINS + 2 * OUTSIDE] = {0.0};
+    for (long i = 0; i < n; i++) {
+        float y = (lefts[i] - left) / (metres[i] * (drops[i] + dip));
+        float bin = ((float)SIDEWAYS - y) * (float)(1.0 / BIN) + (float)OUTSIDE;
+        long last = BINS + OUTSIDE; /* what no integer holds becomes the least one, as processors convert it */
+        sums[bin >= (float)last ? (bin < 2147483648.0f ? last : 0) : bin > 0.0f ? (long)bin : 0] += weights[i];
+    }
+    float shares[BINS + 2] = {0.0f};
+    for (int k = 0; k < BINS; k++)
+        shares[k + 1] = (float)sums[k + OUTSIDE] / rows;
+    for (int k = 0; k < BINS; k++)
+        votes[k] = (0.5f * shares[k] + shares[k + 1]) + 0.5f * shares[k + 2];
+}
+
+/* How much the votes for each y stand out from those around. */
+static void take_support(const float *votes, float unlikely, double *support)
+{
+    float wide[BINS + 2 * AROUND];
+    for (int k = 0; k < BINS + 2 * AROUND; k++) {
+        int from = k - AROUND;
+        wide[k] = votes[from < 0 ? -1 - from : from < BINS ? from : 2 * BINS - 1 - from] * 0.0625f;
+    }
+    for (int k = 0; k < BINS; k++) {
+        float around = 0.0f;
+        for (int j = 0; j <= 2 * AROUND; j++)
+            if (j < AROUND - GAP + 1 || j > AROUND + GAP - 1)
+                around += wide[k + j];
+        float over = votes[k] - around;
+        support[k] = logarithm(1.0f + (over > 0.0f ? over : 0.0f) / (around + SCATTER)) - (double)unlikely;
+    }
+}
+
+/* Choose the pair of lines: `pose` becomes left, dip, y_left, y_right. `belief` has means and deviations of left,
+ * dip, middle and width; `room` has space for the supports of MOST candidates. Returns 0 where it cannot tell: for
+ * more candidates, or a lane that does not fit in. */
+long elect(const float *lefts, const float *drops, const float *metres, const float *weights, long n, double rows,
+           const double *belief, double *room, double *pose)
+{
+    Expected left, dip, middle, width;
+    expect(belief, LEFT_STEP, &left);
+    expect(belief + 2, DIP_STEP, &dip);
+    expect(belief + 4, BIN, &middle);
+    expect(belief + 6, BIN, &width);
+    long all = left.count * dip.count;
+    if (!all || all > MOST || !middle.count || !width.count)
+        return 0;
+    for (long k = 0; k < all; k++) {
+        float votes[BINS], x = left.at[k / dip.count], down = dip.at[k % dip.count];
+        take_votes(lefts, drops, metres, weights, n, (float)rows, x, down, votes);
+        take_support(votes, 0.25f * (unlikely(&left, x) + unlikely(&dip, down)), room + k * BINS);
+    }
+    double y[BINS], best = -INFINITY;
+    for (int k = 0; k < BINS; k++)
+        y[k] = SIDEWAYS - BIN * (k + 0.5);
+    for (long w = 0; w < width.count; w++) {
+        double lane = rint((double)width.at[w] / BIN);
+        if (!(lane >= 1.0 && lane < BINS))
+            return 0;
+        long apart = (long)lane, columns = BINS - apart;
+        float prior[BINS];
+        for (long k = 0; k < columns; k++) {
+            double off = (0.5 * (y[k] + y[k + apart]) - middle.mean) / middle.sigma;
+            prior[k] = 0.5f * ((float)(off * off) + unlikely(&width, width.at[w]));
+        }
+        for (long k = 0; k < all; k++)
+            for (long column = 0; column < columns; column++) {
+                const double *support = room + k * BINS + column;
+                double pair = (support[0] + support[apart]) - (double)prior[column];
+                if (pair > best) {
+                    best = pair;
+                    pose[0] = left.at[k / dip.count];
+                    pose[1] = dip.at[k % dip.count];
+                    pose[2] = y[column];
+                    pose[3] = y[column + apart];
+                }
+            }
+    }
+    return best > -INFINITY;
 }

@@ -81,6 +81,9 @@ class Voters:
         self.rows = max(rows, 1.0)
 
 
+Elect = Callable[[Voters, Belief], Pose]
+
+
 def elect(voters: Voters, belief: Belief) -> Pose:
     """The pair of lines with the most support from points and belief."""
     left = _candidates(*belief.left, LEFT_STEP)

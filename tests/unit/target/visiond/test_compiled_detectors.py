@@ -14,19 +14,23 @@ from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import compiled_windows
+from selfdrive.visiond.band_filter import Points
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
 from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
-from selfdrive.visiond.compiled_robust import build_robust_detector
+from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledElect, build_robust_detector
 from selfdrive.visiond.compiled_windows import MarkWindows
 from selfdrive.visiond.hog import FEATURES, Hog, windows
 from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
 from selfdrive.visiond.paper_detector import PaperDetector
+from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
+from selfdrive.visiond.voting import Belief, Voters, elect
 
 pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
 MODEL = CameraModel()
 SMALL = CameraModel.from_view(width=512, rows=400, horizon=150.0, focal=400.0, height=1.3)
+VOTING = C_SOURCES[1]
 DETECTORS = {
     "paper": (PaperDetector, build_paper_detector, CompiledPaperDetector),
     "as_coded": (CodedDetector, build_coded_detector, CompiledCodedDetector),
@@ -129,6 +133,29 @@ def _outcome(detector, picture) -> str:
     try:
         return repr(detector.detect(view(picture)))
     except (ValueError, cv2.error, IndexError, TypeError) as error:
+        return repr(type(error))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_same_lines_are_elected(seed):
+    """Among points anywhere, before anything is known and after, also where no lane of that width fits in."""
+    chance = np.random.default_rng(seed)
+    view = RoadView(MODEL)
+    at = np.sort(chance.choice(len(view.drop) * len(view.y), chance.integers(0, 900), replace=False))
+    weight = chance.uniform(0.0, 1.0, len(at)).astype(np.float32)
+    voters = Voters(view, Points(*np.divmod(at, len(view.y)), weight), chance.uniform(1.0, 280.0))
+    fast = CompiledElect(compiled.library(VOTING))
+    first, then = Belief(), Belief((0.3, 0.19), (3.5, 0.02), (-9.1, 11.14), (1.7, 1.5))
+    wider = then._replace(width=(7.9, 0.2))
+    for belief in (first, then, then._replace(left=(2.0, 41.0), width=(3.3, 0.2)), wider):
+        found = [_elected(each, voters, belief) for each in (fast, elect)]
+        assert found[0] == found[1]
+
+
+def _elected(choose, voters, belief) -> str:
+    try:
+        return repr(choose(voters, belief))
+    except ValueError as error:
         return repr(type(error))
 
 
