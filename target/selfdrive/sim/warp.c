@@ -72,7 +72,22 @@ FAST static inline __m256 eight(__m128i levels)
     return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(levels));
 }
 
-/* The same, eight columns at a time, where these lie within the picture. */
+FAST static inline __m256i eight_within(__m256i places, int32_t size)
+{
+    return _mm256_max_epi32(_mm256_min_epi32(places, _mm256_set1_epi32(size - 1)), _mm256_setzero_si256());
+}
+
+/* Levels of eight pixels, wherever they are. Each is read with the three after it, or before it at the end. */
+FAST static inline __m256 eight_of(const Picture *picture, __m256i row, __m256i column)
+{
+    __m256i place = _mm256_add_epi32(_mm256_mullo_epi32(row, _mm256_set1_epi32(picture->width)), column);
+    __m256i from = _mm256_min_epi32(place, _mm256_set1_epi32(picture->rows * picture->width - 4));
+    __m256i bytes = _mm256_i32gather_epi32((const int *)picture->pixels, from, 1);
+    bytes = _mm256_srlv_epi32(bytes, _mm256_slli_epi32(_mm256_sub_epi32(place, from), 3));
+    return _mm256_cvtepi32_ps(_mm256_and_si256(bytes, _mm256_set1_epi32(255)));
+}
+
+/* The same, eight columns at a time. */
 FAST static void fast(const Picture *picture, const float *m, const float *start, long from, long to, uint8_t *out)
 {
     const __m256i steps = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
@@ -97,15 +112,18 @@ FAST static void fast(const Picture *picture, const float *m, const float *start
             _mm256_and_si256(_mm256_cmpgt_epi32(row, none), _mm256_cmpgt_epi32(end, place)));
         /* Beyond some thousand rows the product of the place may not fit: then `inside` asks for the row, too. */
         inside = _mm256_and_si256(inside, _mm256_cmpgt_epi32(_mm256_set1_epi32(picture->rows - 1), row));
-        if (_mm256_movemask_epi8(inside) != -1) {
-            one_by_one(picture, m, start, x, x + 8, out);
-            continue;
-        }
         __m256 here, beside, under, last_one;
         int32_t first = _mm256_extract_epi32(place, 0);
         __m256i away = _mm256_sub_epi32(place, _mm256_set1_epi32(first));
         __m256i far = _mm256_or_si256(_mm256_cmpgt_epi32(away, _mm256_set1_epi32(14)), _mm256_cmpgt_epi32(_mm256_setzero_si256(), away));
-        if (_mm256_testz_si256(far, far)) { /* all in sixteen pixels of two rows */
+        if (_mm256_movemask_epi8(inside) != -1) {
+            const __m256i one = _mm256_set1_epi32(1);
+            __m256i left = eight_within(column, picture->width), upper = eight_within(row, picture->rows);
+            __m256i next = eight_within(_mm256_add_epi32(column, one), picture->width);
+            __m256i lower = eight_within(_mm256_add_epi32(row, one), picture->rows);
+            here = eight_of(picture, upper, left), beside = eight_of(picture, upper, next);
+            under = eight_of(picture, lower, left), last_one = eight_of(picture, lower, next);
+        } else if (_mm256_testz_si256(far, far)) { /* all in sixteen pixels of two rows */
             __m256i packed = _mm256_shuffle_epi8(away, bytes);
             __m128i chosen = _mm_or_si128(_mm256_castsi256_si128(packed), _mm256_extracti128_si256(packed, 1));
             chosen = _mm_unpacklo_epi64(chosen, _mm_add_epi8(chosen, _mm_set1_epi8(1)));
@@ -197,7 +215,7 @@ void warp(const uint8_t *pixels, long rows, long width, const double *matrix, lo
 {
     void (*draw)(const Picture *, const float *, const float *, long, long, uint8_t *) = plain;
 #if defined(__x86_64__)
-    if (IS_FAST && rows * width < (1 << 30))
+    if (IS_FAST && rows * width > 3 && rows * width < (1 << 30))
         draw = IS_WIDE ? wide : fast;
 #endif
     Picture picture = {pixels, (int32_t)rows, (int32_t)width};

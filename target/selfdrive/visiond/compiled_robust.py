@@ -1,4 +1,4 @@
-"""The geometric lane detector with filter, election and fit in C, where compiled: the same lines to the bit."""
+"""The geometric lane detector with its arithmetic in C, where that was compiled: equal lines to the bit."""
 
 import ctypes
 from functools import cache
