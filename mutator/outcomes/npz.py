@@ -6,7 +6,7 @@ Format: PKWARE's APPNOTE 6.3. Whatever is not just as usual is left to numpy, an
 
 import io
 from functools import lru_cache
-from struct import Struct, error
+from struct import Struct
 from zlib import crc32
 
 import numpy as np
@@ -25,7 +25,7 @@ def members(data: bytes) -> dict[str, np.ndarray] | None:
     """The arrays of a file by name, read-only; None for a file that is not as usual, or not whole."""
     try:
         return _members(data)
-    except (ValueError, error):
+    except Exception:  # a run may write anything; numpy says what is wrong with it
         return None
 
 
@@ -76,6 +76,6 @@ def _member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarray, in
 def _header(text: bytes) -> tuple[np.dtype, tuple[int, ...]]:
     """Type and shape in a .npy file's header; ValueError unless it is of numbers one after the other."""
     shape, fortran, dtype = npy.read_array_header_1_0(io.BytesIO(text))
-    if fortran or dtype.hasobject or dtype.kind not in "biuf":
+    if fortran or dtype.hasobject or dtype.kind not in "biuf" or min(shape, default=0) < 0:
         raise ValueError(text)
     return dtype, shape
