@@ -16,17 +16,15 @@ def others() -> list[str]:
     """
     threading: Any = sys.modules.get("threading")
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
-    if not _TASKS.is_dir():  # not on Linux
+    try:  # not counted by the folder's links: not every kernel keeps their number
+        numbers = [int(task.name) for task in _TASKS.iterdir() if task.name != str(os.getpid())]
+    except FileNotFoundError:  # not on Linux
         return sorted(name for name in known.values() if name != threading.main_thread().name)
-    if _TASKS.stat().st_nlink == 3:  # one folder in it: ., .., and that of the main thread
-        return []
-    own = _system_name(os.getpid())
+    own = _system_name(os.getpid()) if numbers else ""
     found = []
-    for task in _TASKS.iterdir():
-        number = int(task.name)
-        if number != os.getpid():
-            name = _system_name(number)
-            found.append(known.get(number) or ("" if name == own else name))
+    for number in numbers:
+        name = _system_name(number)
+        found.append(known.get(number) or ("" if name == own else name))
     return sorted(found)
 
 
