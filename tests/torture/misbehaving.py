@@ -171,7 +171,8 @@ class Misbehaving:
 
     def _draw(self, seed: int) -> Drawn:
         chance = random.Random(seed)
-        engine, workers, method = (chance.choice(list(some)) for some in (ENGINES, WORKERS, METHODS))
+        engine = list(ENGINES)[-1 - seed % len(ENGINES)]  # so that a few tries have every engine, fork first
+        workers, method = (chance.choice(some) for some in (WORKERS, METHODS))
         names = chance.sample(sorted(self.misdeeds), chance.randint(1, MOST))
         return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
 
