@@ -24,7 +24,6 @@ OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the 
 # in quotes, in a name or in a tag: a number of eight digits is none
 INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
 
-_TINY = 1e-9  # s, the probe's
 _MARK = "# fi:"
 _TAG = rf"{_MARK}([0-9a-z]+)(?: guard:(\d+))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
@@ -44,11 +43,11 @@ _SETTING = re.compile(
     re.MULTILINE,
 )
 
-# what differs from probe to probe: its docstring, its settings, its condition
+# what is a probe's own: its docstring, its settings, its condition
 _OWN = re.compile(
-    r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^(?=_TINY)|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
+    r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^_TINY = .*\n|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
 )
-_ARMED = re.compile(r"^ARMED_AFTER_S = (.+)$", re.MULTILINE)
+_ARMED = re.compile(r"^ARMED_AFTER_S = (.+)$(?s:.*)^_TINY = (.+)$", re.MULTILINE)
 
 
 def probe_path(package: str | None) -> str:
@@ -222,7 +221,7 @@ def decision_in(own: str) -> tuple[float, str]:
     """The same, from the source of what is a probe's own: the condition is the source of its function."""
     armed = _ARMED.search(own)
     assert armed is not None
-    return float(armed[1]) - _TINY, own[own.index("def _condition(") :]
+    return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:

@@ -93,6 +93,13 @@ def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: f
         assert (start.step if start else None) == (active.index(True) if True in active else None)
 
 
+def test_a_probe_may_be_armed_more_exactly(probe) -> None:
+    """How close to its time a probe is armed is what its template says."""
+    code = probe(Trigger(name="x", condition="True", armed_after_s=SEEN.values[3][0] + 0.001))
+    close, far = (code.replace("\n_TINY = 1e-9\n", f"\n_TINY = {tiny}\n") for tiny in (0.0, 0.002))
+    assert [start_of(one, SEEN).step for one in (close, far)] == [4, 3]
+
+
 def test_the_parts_of_a_probe_do_what_it_does(probe) -> None:
     """What is a probe's own and what is not, run one after the other, are the probe, on the same lines."""
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
