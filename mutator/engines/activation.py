@@ -14,20 +14,7 @@ from typing import Any
 import numpy as np
 
 from mutator.mutants.probe import decision_in
-
-_COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
-    ast.Lt: np.less,
-    ast.LtE: np.less_equal,
-    ast.Gt: np.greater,
-    ast.GtE: np.greater_equal,
-    ast.Eq: np.equal,
-    ast.NotEq: np.not_equal,
-}
-_ARITHMETIC: Mapping[type[ast.operator], np.ufunc] = {
-    ast.Add: np.add,
-    ast.Sub: np.subtract,
-    ast.Mult: np.multiply,
-}
+from mutator.triggers.over_time import ARITHMETIC, COMPARE
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # looked up by identity: there are thousands
@@ -129,14 +116,14 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
         case ast.IfExp():
             return np.where(of(node.test), of(node.body), of(node.orelse))
         case ast.BinOp():
-            return _ARITHMETIC[type(node.op)](of(node.left), of(node.right))
+            return ARITHMETIC[type(node.op)](of(node.left), of(node.right))
         case ast.Call():
             return _FUNCTIONS[ast.unparse(node.func)](*map(of, node.args))
     raise AssertionError(ast.unparse(node))
 
 
 def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
-    return _COMPARE[type(operator)](one, other)
+    return COMPARE[type(operator)](one, other)
 
 
 def _least(*terms: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mutator.triggers.conditions import TIME, parse
 
-_COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
+COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
     ast.Lt: np.less,
     ast.LtE: np.less_equal,
     ast.Gt: np.greater,
@@ -17,7 +17,7 @@ _COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
     ast.Eq: np.equal,
     ast.NotEq: np.not_equal,
 }
-_ARITHMETIC: Mapping[type[ast.operator], np.ufunc] = {
+ARITHMETIC: Mapping[type[ast.operator], np.ufunc] = {
     ast.Add: np.add,
     ast.Sub: np.subtract,
     ast.Mult: np.multiply,
@@ -66,7 +66,7 @@ class _Evaluation:
             return np.logical_or.accumulate(held)
         assert isinstance(node, ast.Compare)
         terms = [self.number(part) for part in (node.left, *node.comparators)]
-        found = [_COMPARE[type(op)](*terms[i : i + 2]) for i, op in enumerate(node.ops)]
+        found = [COMPARE[type(op)](*terms[i : i + 2]) for i, op in enumerate(node.ops)]
         return reduce(np.logical_and, found)
 
     def number(self, node: ast.expr) -> Any:
@@ -78,7 +78,7 @@ class _Evaluation:
             operand = self.number(node.operand)
             return -operand if isinstance(node.op, ast.USub) else operand
         if isinstance(node, ast.BinOp):
-            return _ARITHMETIC[type(node.op)](self.number(node.left), self.number(node.right))
+            return ARITHMETIC[type(node.op)](self.number(node.left), self.number(node.right))
         if isinstance(node, ast.IfExp):
             return np.where(self.boolean(node.test), self.number(node.body), self.number(node.orelse))
         assert isinstance(node, ast.Call)
