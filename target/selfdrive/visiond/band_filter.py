@@ -29,14 +29,13 @@ class Points(NamedTuple):
     weight: np.ndarray
 
 
-Crests = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+Crests = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def crests(side: np.ndarray, single: np.ndarray, double: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (row-major, without the edge columns) and weights of the points on the crests of bright bands.
-
-    The arrays are the map's means (float32) over the width of its sides and of both kinds of marks.
-    """
+def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (row-major, without the edge columns) and weights of the points on crests of bright bands."""
+    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
+    side, single, double = (_mean(road, columns) for columns in (SIDE, SINGLE[0], DOUBLE[0]))
     single = _inner(single)
     sides = _sides(side, SINGLE[1])
     # Most results take the place of one that is not needed any more: new memory costs as much as the sums.
@@ -65,8 +64,7 @@ def crests(side: np.ndarray, single: np.ndarray, double: np.ndarray) -> tuple[np
 
 def mark_points(road: np.ndarray, find: Crests = crests) -> Points:
     """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
-    road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
-    at, weight = find(_mean(road, SIDE), _mean(road, SINGLE[0]), _mean(road, DOUBLE[0]))
+    at, weight = find(road)
     if len(at) > STRONGEST:
         keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
         at, weight = at[keep], weight[keep]

@@ -4,7 +4,6 @@ import ctypes
 from functools import cache
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from selfdrive.common import compiled
@@ -17,6 +16,7 @@ from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Fitted, Pose, Voters, elect
 
 CANDIDATES = 512  # points where lines may meet, MOST of the C file
+AT_ONCE = 8  # rows, of the C file
 C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c")]
 
 
@@ -26,43 +26,55 @@ def build_robust_detector(model: CameraModel) -> RobustDetector:
     if None in libraries or not (adds_up_alike(libraries[1]) and elects_alike(libraries[1], model)):
         return RobustDetector(model)
     digests = "".join(library.digest.hex() for library in libraries)
-    find, voting = CompiledCrests(libraries[0]), libraries[1]
+    view, voting = RoadView(model), libraries[1]
+    find = CompiledCrests(libraries[0], (len(view.drop), len(view.y)))
     return RobustDetector(model, find, CompiledElect(voting), CompiledSettle(voting), digests)
 
 
+class _Bands(ctypes.Structure):
+    """`Bands` of the C file."""
+
+    _fields_ = (
+        ("road", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("rows", "width")),
+        *((name, ctypes.c_void_p) for name in ("eroded", "opened", "contrast", "rough", "sums")),
+        *((name, ctypes.c_void_p) for name in ("column", "padded", "sure", "at", "weight")),
+        ("steepness", ctypes.c_float),
+    )
+
+
 class CompiledCrests:
-    """Does what `crests` does: `library` is `band_filter.c`, compiled."""
+    """Does what `crests` does in maps of that shape: `library` is `band_filter.c`, compiled."""
 
-    def __init__(self, library: compiled.Library) -> None:
-        self._bands, self._crests, pointer = library.code.bands, library.code.crests, ctypes.c_void_p
-        self._bands.argtypes, self._bands.restype = (
-            [*[pointer] * 3, *[ctypes.c_long] * 2, *[pointer] * 2],
-            None,
-        )
-        self._crests.argtypes = [*[pointer] * 2, *[ctypes.c_long] * 2, ctypes.c_float, *[pointer] * 3]
-        self._crests.restype = ctypes.c_long
-        self._shape: tuple[int, ...] = ()
+    def __init__(self, library: compiled.Library, shape: tuple[int, int]) -> None:
+        self._crests = library.code.crests
+        self._crests.argtypes, self._crests.restype = [ctypes.c_void_p], ctypes.c_long
+        self._shape, inner = shape, shape[1] - 2 * EDGE
+        points = shape[0], inner
+        self._arrays = {
+            "eroded": np.empty(shape, np.uint8),
+            "opened": np.empty(shape, np.uint8),
+            "contrast": np.empty(points, np.float32),
+            "rough": np.empty(points, np.float32),
+            "sums": np.empty((shape[0] + AT_ONCE, inner)),
+            "column": np.empty(inner),
+            "padded": np.zeros((AT_ONCE, inner + NEIGHBOURHOOD[0])),
+            "sure": np.empty(inner, np.float32),
+            "at": np.empty(shape[0] * inner + 1, np.int64),
+            "weight": np.empty(shape[0] * inner + 1, np.float32),
+        }
+        rooms = {name: array.ctypes.data for name, array in self._arrays.items()}
+        self._bands = _Bands(rows=shape[0], width=shape[1], steepness=STEEPNESS, **rooms)
+        self._address = ctypes.addressof(self._bands)
 
-    def __call__(
-        self, side: np.ndarray, single: np.ndarray, double: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers and weights of the points."""
-        if side.ndim != 2 or not (side.dtype == single.dtype == double.dtype == np.float32):
-            return crests(side, single, double)  # a fault may do that to a picture
-        rows, width = side.shape
-        inner = width - 2 * EDGE
-        if self._shape != side.shape:
-            self._shape = side.shape
-            self._contrast, self._rough, self._texture = np.empty((3, rows, inner), np.float32)
-            self._sure, self._weight = np.empty(inner, np.float32), np.empty(rows * inner + 1, np.float32)
-            self._at = np.empty(rows * inner + 1, np.int64)
-        given = [np.ascontiguousarray(part) for part in (side, single, double)]
-        contrast = self._contrast.ctypes.data
-        self._bands(*[part.ctypes.data for part in given], rows, width, contrast, self._rough.ctypes.data)
-        texture = cv2.blur(self._rough, NEIGHBOURHOOD, dst=self._texture)
-        room = [part.ctypes.data for part in (self._sure, self._at, self._weight)]
-        count = self._crests(contrast, texture.ctypes.data, rows, inner, STEEPNESS, *room)
-        return self._at[:count].copy(), self._weight[:count].copy()
+        if road.shape != self._shape or road.dtype != np.uint8:  # a fault may do that to a picture
+            return crests(road)
+        road = np.ascontiguousarray(road)
+        self._bands.road = road.ctypes.data
+        count = self._crests(self._address)
+        return self._arrays["at"][:count].copy(), self._arrays["weight"][:count].copy()
 
 
 class CompiledElect:
