@@ -124,7 +124,7 @@ def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
         "looked_at": np.zeros(region.windows.shape, np.uint8),
         "at": np.zeros(size + 8, np.int32),
         "label": np.zeros(size, np.int32),
-        "mask": np.zeros((rows + 2 * EPS + 1, width + 2 * EPS), np.uint8),
+        "mask": np.zeros((rows + 2 * EPS) * (width + 2 * EPS) + rows, np.uint8),
         "crowd": np.zeros((rows, width), np.uint8),
         "number": np.full((rows, width), NONE, np.int32),
         "run": np.zeros((size, 4), np.int32),

@@ -8,7 +8,7 @@ import numpy as np
 from selfdrive.common import compiled
 from selfdrive.common.array_math import length
 from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
-from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, LaneNet
+from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, WEIGHT_STEPS, LaneNet
 
 C_SOURCE = Path(__file__).with_name("mark_windows.c")
 FINEST = 2**13  # steps in 1, at most, of a weight in the first of two scores
@@ -35,7 +35,7 @@ class MarkWindows:
         net, (rows, width) = LaneNet.load(), size
         coarse = np.zeros((HIDDEN, PADDED), np.int16)
         coarse_steps = _coarse_steps(net)
-        coarse[:, :FEATURES] = np.rint(net.hidden.T * coarse_steps)
+        coarse[:, :FEATURES] = np.rint(net.whole.T * (coarse_steps / WEIGHT_STEPS))
         down, across = rows // CELL, width // CELL
         self._arrays = {
             "lengths": np.sqrt(np.arange(2 * 255**2 + 1)) / CELL**2,

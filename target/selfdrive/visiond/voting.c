@@ -46,7 +46,7 @@ INLINE void step(const float *left, const float *drop, const float *voters_metre
             double y = state[2 + side];
             error[k] = ((double)left[i] - state[0]) - y * metre[i];
             double off = error[k] / (metre[i] * near), much = 1.0 - off * off;
-            count[k] = much > 0.0 ? much : 0.0;
+            count[k] = much <= 0.0 ? 0.0 : much; /* what is no number stays */
             terms[0][k] = 1.0;
             terms[1][k] = y * (double)voters_metre[i];
             terms[2][k] = side ? 0.0 : metre[i];

@@ -97,7 +97,13 @@ def test_lines_are_the_same_to_the_bit(name, pictures):
 
 
 @pytest.mark.parametrize(
-    "model", [SMALL, replace(MODEL, width=320, rows=240, fx=154.7, fy=172.1, cx=159, cy=128)]
+    "model",
+    [
+        SMALL,
+        replace(MODEL, width=320, rows=240, fx=154.7, fy=172.1, cx=159, cy=128),
+        replace(MODEL, width=160, cx=80.0, rows=960, cy=513.0, fy=700.0),
+    ],
+    ids=["wide", "small", "narrow"],
 )
 def test_lines_of_another_camera_are_the_same_to_the_bit(model):
     """Whatever the size of its part of the road."""
