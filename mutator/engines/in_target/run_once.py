@@ -18,7 +18,7 @@ import resource
 import runpy
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -237,10 +237,21 @@ def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
 
 
 def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Top-level names of what was imported beside the `known` modules, but for those of the packages, the
-    standard library and the harness."""
-    own = {*sys.stdlib_module_names, Harness.package.name}
-    return sorted({name.partition(".")[0] for name in libraries(known, packages)} - own)
+    """Top-level names of what was imported beside the `known` modules, or of what a shared library is in use,
+    but for those of the packages, the standard library and the harness."""
+    own = {*sys.stdlib_module_names, Harness.package.name, *packages, *known}
+    return sorted({name.partition(".")[0] for name in (*libraries(known, packages), *mapped())} - own)
+
+
+def mapped() -> Iterator[str]:
+    """Names, in the folders of modules, of what this process has files of in its memory: a package's library
+    can be used without importing the package."""
+    folders = sorted((f"{folder}/" for folder in sys.path if folder), key=len, reverse=True)
+    with suppress(OSError):
+        for line in Path("/proc/self/maps").read_text(errors="replace").splitlines():
+            path = line[line.find("/") :]
+            if folder := next(filter(path.startswith, folders), ""):
+                yield path.removeprefix(folder).split("/")[0]
 
 
 def tree_files(tree: str) -> dict[str, str]:

@@ -409,6 +409,15 @@ def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 
 
+def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
+    """Though it did not import the package: its version says what was calculated all the same."""
+    code = (
+        "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
+        "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"
+    )
+    assert run(entry(code)).modules == ("casadi",)
+
+
 @pytest.mark.parametrize(("limit", "name"), [("AS", "memory_mb"), ("CPU", "cpu_s"), ("FSIZE", "disk_mb")])
 def test_a_limit_of_this_process_that_is_lower(
     manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
