@@ -11,13 +11,14 @@ from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, Points, crests
 from selfdrive.visiond.compiled_sums import adds_up_alike
+from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Fitted, Pose, Voters, elect
 
 CANDIDATES = 512  # points where lines may meet, MOST of the C file
 AT_ONCE = 8  # rows, of the C file
-C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c")]
+C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c", "road_view.c")]
 
 
 def build_robust_detector(model: CameraModel) -> RobustDetector:
@@ -25,10 +26,10 @@ def build_robust_detector(model: CameraModel) -> RobustDetector:
     libraries = [compiled.library(source) for source in C_SOURCES]
     if None in libraries or not (adds_up_alike(libraries[1]) and elects_alike(libraries[1], model)):
         return RobustDetector(model)
+    view = CompiledRoadView(model, libraries[2])
     digests = "".join(library.digest.hex() for library in libraries)
-    view, voting = RoadView(model), libraries[1]
-    find = CompiledCrests(libraries[0], (len(view.drop), len(view.y)))
-    return RobustDetector(model, find, CompiledElect(voting), CompiledSettle(voting), digests)
+    find, voting = CompiledCrests(libraries[0], (len(view.drop), len(view.y))), libraries[1]
+    return RobustDetector(model, view, find, CompiledElect(voting), CompiledSettle(voting), digests)
 
 
 class _Bands(ctypes.Structure):

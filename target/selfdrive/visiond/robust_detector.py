@@ -23,12 +23,13 @@ BEYOND = 0.3  # m over a line from which on the car is in the next lane
 class RobustDetector:
     """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last.
 
-    `calculated_by` tells which compiled code `find`, `choose` and `settle` calculate with, if any.
+    `calculated_by` tells which compiled code `view`, `find`, `choose` and `settle` calculate with, if any.
     """
 
     def __init__(
         self,
         model: CameraModel,
+        view: RoadView | None = None,
         find: Crests = crests,
         choose: Elect = elect,
         settle: Settle = settled,
@@ -36,7 +37,7 @@ class RobustDetector:
     ) -> None:
         self._find, self._choose, self._settle, self.calculated_by = find, choose, settle, calculated_by
         self._model = model
-        self._view = RoadView(model)
+        self._view = view or RoadView(model)
         self._pose: Pose | None = None
         self._missed = 0  # pictures since a line was seen
         self._probs = (0.0, 0.0)

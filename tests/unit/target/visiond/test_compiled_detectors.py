@@ -13,12 +13,13 @@ from selfdrive.sim import compile_helpers
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond import compiled_windows
+from selfdrive.visiond import compiled_view, compiled_windows
 from selfdrive.visiond.band_filter import Points
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
 from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
 from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledElect, build_robust_detector
+from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.compiled_windows import MarkWindows
 from selfdrive.visiond.hog import FEATURES, Hog, windows
 from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
@@ -140,6 +141,21 @@ def _outcome(detector, picture) -> str:
         return repr(detector.detect(view(picture)))
     except (ValueError, cv2.error, IndexError, TypeError) as error:
         return repr(type(error))
+
+
+CAMERAS = [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
+
+
+@pytest.mark.parametrize("width, rows, focal", CAMERAS)
+    "width, rows, focal", [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
+)
+def test_maps_of_any_camera_are_the_same(width, rows, focal):
+    """Also of one whose pictures cannot be halved without a rest."""
+    model = CameraModel.from_view(width=width, rows=rows, horizon=0.3 * rows, focal=focal, height=1.3)
+    slow, fast = RoadView(model), CompiledRoadView(model, compiled.library(compiled_view.C_SOURCE))
+    for seed in range(5):
+        picture = np.random.default_rng(seed).integers(0, 256, (rows, width), np.uint8)
+        assert np.array_equal(fast.map(picture), slow.map(picture))
 
 
 @pytest.mark.parametrize("seed", range(40))

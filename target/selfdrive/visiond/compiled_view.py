@@ -1,0 +1,70 @@
+"""The map of the road in C, where that was compiled: the same map to the bit."""
+
+import ctypes
+from pathlib import Path
+
+import numpy as np
+
+from selfdrive.common import compiled
+from selfdrive.common.camera_model import CameraModel
+from selfdrive.visiond.road_view import LEVELS, RoadView
+
+C_SOURCE = Path(__file__).with_name("road_view.c")
+MORE = 4  # pixels at the end of a picture that C may read
+
+
+class _Level(ctypes.Structure):
+    """`Level` of the C file."""
+
+    _fields_ = (("rows", ctypes.c_int64), ("first", ctypes.c_int64), ("places", ctypes.c_void_p))
+
+
+class _View(ctypes.Structure):
+    """`View` of the C file."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("rows", "width", "columns")),
+        ("levels", _Level * LEVELS),
+        ("smaller", ctypes.c_void_p * (LEVELS - 1)),
+        ("road", ctypes.c_void_p),
+    )
+
+
+class CompiledRoadView(RoadView):
+    """Does what RoadView does: `library` is `road_view.c`, compiled."""
+
+    def __init__(self, model: CameraModel, library: compiled.Library) -> None:
+        super().__init__(model)
+        self._take_map = library.code.take_map
+        self._take_map.argtypes, self._take_map.restype = [ctypes.c_void_p] * 2, None
+        rows, width = self._shape = model.rows - self._first, model.width
+        self._even = len(self._levels) == LEVELS and not (rows | width) % 2 ** (LEVELS - 1)
+        self._road = np.empty((len(self.drop), len(self.y)), np.uint8)
+        if not self._even:
+            return
+        sizes = [(rows >> level) * (width >> level) for level in range(1, LEVELS)]
+        self._smaller = [np.empty(size + MORE, np.uint8) for size in sizes]
+        maps = enumerate(self._levels)
+        self._places = [_places(*maps_of, width >> level) for level, maps_of in maps]
+        levels = [
+            _Level(len(columns), int(columns[0, 0, 1]), places.ctypes.data)
+            for (columns, _), places in zip(self._levels, self._places, strict=True)
+        ]
+        smaller = [array.ctypes.data for array in self._smaller]
+        self._view = _View(rows, width, len(self.y), tuple(levels), tuple(smaller), self._road.ctypes.data)
+
+    def map(self, picture: np.ndarray) -> np.ndarray:
+        """The map of a grey picture, which the next one overwrites."""
+        part = np.ascontiguousarray(picture[self._first :, :])
+        if not self._even or part.dtype != np.uint8 or part.shape != self._shape:
+            return super().map(picture)
+        self._take_map(ctypes.addressof(self._view), part.ctypes.data)
+        return self._road
+
+
+def _places(columns: np.ndarray, parts: np.ndarray, width: int) -> np.ndarray:
+    """Where each point of the map lies in its row, as the C file has it; beyond the ends at these."""
+    place = (columns[:, :, 0].astype(np.int32) << 5) + parts
+    place = np.clip(place, 0, (width - 1) << 5)
+    column = np.minimum(place >> 5, width - 2)
+    return np.ascontiguousarray((column << 6) + (place - (column << 5)), np.int32)
