@@ -30,6 +30,8 @@ CHANNELS = (
 INTEGER_CHANNELS = ("lead_status", "plan_source", "long_state", "engaged", "alert")
 
 _NO_LEAD = LeadData()
+_FOLD = 64 * len(CHANNELS)  # numbers that are kept by row before they go to their channels
+_ROOM = 4096  # rows that there is room for at first
 
 
 class Recorder:
@@ -39,7 +41,9 @@ class Recorder:
         self.alerts: list[tuple[str, float]] = []  # every time one is raised
         self.engaged_from: float | None = None
         self.engaged_to: float | None = None
-        self._rows = array("d")
+        self._rows = array("d")  # the newest ones, of which there is always one
+        self._table = np.empty((len(CHANNELS), _ROOM))  # those before, by channel, as they will be written
+        self._folded = 0  # rows in the table
         self._shown: tuple[str, ...] = ()
         self._alert_bits = 0
 
@@ -54,6 +58,8 @@ class Recorder:
             self.engaged_to = t
             if self.engaged_from is None:
                 self.engaged_from = t
+        if len(self._rows) >= _FOLD:
+            self._fold()
         self._rows.fromlist(
             [
                 *(t, v_ego, truth.a_ego, d_rel, v_lead - v_ego, v_lead),
@@ -72,12 +78,29 @@ class Recorder:
         return dict(zip(CHANNELS, self._rows[-len(CHANNELS) :], strict=True))
 
     def trace(self) -> dict[str, np.ndarray]:
-        """Every channel's array."""
-        table = np.asarray(self._rows).reshape(-1, len(CHANNELS)).T.copy()  # of its own: rows may be added
+        """Every channel's array. Rows that are added later do not change it."""
+        count = self._folded + len(self._rows) // len(CHANNELS)
+        table = self._with_newest()[:, :count]
         return {
             name: column.astype(np.int32) if name in INTEGER_CHANNELS else column
             for name, column in zip(CHANNELS, table, strict=True)
         }
+
+    def _fold(self) -> None:
+        """Move the newest rows into the table."""
+        self._table = self._with_newest()
+        self._folded += len(self._rows) // len(CHANNELS)
+        del self._rows[:]
+
+    def _with_newest(self) -> np.ndarray:
+        """The table with the newest rows in it, a larger one where they need the room."""
+        newest = np.array(self._rows).reshape(-1, len(CHANNELS)).T
+        table, end = self._table, self._folded + newest.shape[1]
+        if end > table.shape[1]:
+            table = np.empty((len(CHANNELS), 2 * table.shape[1]))
+            table[:, : self._folded] = self._table[:, : self._folded]
+        table[:, self._folded : end] = newest
+        return table
 
     def _note_alerts(self, shown: tuple[str, ...], t: float) -> None:
         self.alerts += [(name, t) for name in COUNTED_ALERTS if name in shown and name not in self._shown]
