@@ -143,10 +143,7 @@ def _outcome(detector, picture) -> str:
         return repr(type(error))
 
 
-CAMERAS = [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
-
-
-@pytest.mark.parametrize("width, rows, focal", CAMERAS)
+@pytest.mark.parametrize(
     "width, rows, focal", [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
 )
 def test_maps_of_any_camera_are_the_same(width, rows, focal):
