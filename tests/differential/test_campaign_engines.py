@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.locks import living_workers
+from mutator._common.locks import living_workers, wait_for_workers
 from mutator.execution.running import run_campaign
 from mutator.store.records import read_records
 from mutator.verification.equivalence import Proof
@@ -49,24 +49,8 @@ def test_killed_again_and_again(
 ) -> None:
     """Servers or workers killed in the middle of a campaign cost but time: the tables are the same."""
     out = tmp_path / "run"
-    command = [
-        sys.executable,
-        "-m",
-        "mutator",
-        "run",
-        "toy",
-        "--out",
-        str(out),
-        "-n",
-        "2",
-        "--engine",
-        "fork",
-    ]
-    places = {"MUTATOR_LIBRARY": str(toy.library), "MUTATOR_TEMPLATES": str(toy.templates)}
     for _ in range(3):
-        process = subprocess.Popen(
-            command, env=os.environ | places, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
+        process = _begun(toy, out)
         done = len(read_records(out)) if out.exists() else 0
         while process.poll() is None:
             time.sleep(0.02)
@@ -80,6 +64,43 @@ def test_killed_again_and_again(
     assert (summary.exit_code, summary.done) == (0, 24)
     assert {name: (out / name).read_bytes() for name in TABLES} == expected
     assert _victims(out, "fork_server") == []
+
+
+@pytest.mark.slow
+def test_a_proof_goes_on_after_kills(toy: Workspace, tmp_path: Path, expected: dict[str, bytes]) -> None:
+    """A campaign killed in the middle of its proof goes on with what is left: nothing is proved twice."""
+    out, proved = tmp_path / "run", 0
+    for _ in range(3):
+        process = _begun(toy, out)
+        while process.poll() is None and len(_proved(out)) < proved + 4:
+            time.sleep(0.02)
+        assert process.poll() is None, "it ended before it could be killed"
+        process.kill()
+        process.wait()
+        wait_for_workers(out, 15.0)
+        proved = len(_proved(out))
+    summary = run_campaign(toy, "toy", out, engine="fork")
+    assert summary.proof == Proof(sampled=20, same=20)
+    assert len(_proved(out)) == 20
+    assert {name: (out / name).read_bytes() for name in TABLES} == expected
+
+
+def _begun(toy: Workspace, out: Path) -> "subprocess.Popen[bytes]":
+    """The campaign on the fork engine, with two workers."""
+    words = ("run", "toy", "--out", str(out), "-n", "2", "--engine", "fork")
+    places = {"MUTATOR_LIBRARY": str(toy.library), "MUTATOR_TEMPLATES": str(toy.templates)}
+    return subprocess.Popen(
+        [sys.executable, "-m", "mutator", *words],
+        env=os.environ | places,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def _proved(out: Path) -> list[str]:
+    """The lines of the proof, but for the heads of their files."""
+    files = (out / "proof").glob("*.jsonl")
+    return [line for path in files for line in path.read_text().splitlines()[1:]]
 
 
 def _victims(out: Path, kind: str) -> list[int]:
