@@ -91,7 +91,7 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
         ("drive a scenario with another text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
         ("have another seed", lambda p: p.a.seed != p.b.seed),
         (
-            "end at their first terminal hazard in one run alone, which did not see what came after it",
+            "end at their first terminal hazard in only one run, which did not see what came after it",
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
     )

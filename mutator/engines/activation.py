@@ -55,7 +55,7 @@ class Start:
 def first_active(own: str, seen: Observed) -> Start | None:
     """Where a mutant must leave the golden run; None when its trigger never holds.
 
-    `own` is the source of what is its probe's own (`probe.parts_of`).
+    `own` is the source of its probe's own part (`probe.parts_of`).
     """
     return _first_active(*decision_in(own), seen)
 
@@ -80,7 +80,7 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
-    """What a probe's condition says of each observation: of doubles, numpy's arithmetic is Python's."""
+    """Whether a probe's condition holds in each observation; numpy computes with doubles as Python does."""
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):
@@ -127,7 +127,7 @@ def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
 
 
 def _least(*terms: Any) -> Any:
-    """As `min` has it, NaN or not."""
+    """As Python's `min`, NaN included."""
     return reduce(lambda least, term: np.where(term < least, term, least), terms)
 
 
@@ -139,6 +139,6 @@ _FUNCTIONS: Mapping[str, Any] = {
     "abs": np.abs,
     "min": _least,
     "max": _greatest,
-    "math.hypot": np.vectorize(math.hypot, otypes=[float]),  # numpy's is another one in the last bit
+    "math.hypot": np.vectorize(math.hypot, otypes=[float]),  # numpy's differs in the last bit
     "_div": np.divide,
 }

@@ -42,8 +42,8 @@ class FunctionSwap:
 class CodeSwap:
     """All that turns a loaded pristine program into the mutant.
 
-    `probe` is run one after the other, `own` is the source of its first part (`probe.parts_of`). `imports`
-    are modules that injected lines import; they may be loaded beforehand.
+    The parts of `probe` run one after the other; `own` is the source of the first (`probe.parts_of`).
+    `imports` are modules that injected lines import; they may be loaded beforehand.
     """
 
     functions: tuple[FunctionSwap, ...]
@@ -74,7 +74,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
         raise NotSwappable("there is no probe")
     own, common = parts_of(files[probe_file].decode())
     name = f"{tree}/{probe_file}"
-    # what all have in common takes ten times as long to compile
+    # the shared part takes ten times as long to compile, and is compiled once
     probe = (compile(own, name, "exec", dont_inherit=True), _compiled(common.encode(), name))
     return CodeSwap(functions=tuple(functions), probe=probe, own=own, imports=tuple(imports))
 

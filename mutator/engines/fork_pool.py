@@ -47,8 +47,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
-    """A golden run: the same key for the same run, and what gives the entry module's arguments that begin
-    it."""
+    """A golden run: its key, and a function that gives the arguments of the entry module that begin it."""
 
     key: Hashable
     arguments: Callable[[], list[str]]

@@ -43,7 +43,7 @@ _SETTING = re.compile(
     re.MULTILINE,
 )
 
-# what is a probe's own: its docstring, its settings, its condition
+# a probe's own part: its docstring, its settings, its condition
 _OWN = re.compile(
     r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^_TINY = .*\n|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
 )
@@ -194,8 +194,9 @@ def _end_of_settings(patch: str, begin: int, end: int) -> int:
 
 
 def parts_of(probe: str) -> tuple[str, str]:
-    """A probe's source in two: what is its own, and what the probes of a target have in common. Each has
-    empty lines in place of the other, and one after the other they do what the whole does.
+    """A probe's source in two parts: its own, and what all probes of a target share.
+
+    Run one after the other, they do what the whole does. Blank lines keep their line numbers.
     """
     own, common, at = [], [], 0
     for found in _OWN.finditer(probe):
@@ -218,7 +219,7 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
 
 
 def decision_in(own: str) -> tuple[float, str]:
-    """The same, from the source of what is a probe's own: the condition is the source of its function."""
+    """The same from the source of a probe's own part, with the condition as the source of its function."""
     armed = _ARMED.search(own)
     assert armed is not None
     return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]

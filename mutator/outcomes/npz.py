@@ -1,7 +1,7 @@
-"""Arrays of an .npz file whose members are stored, as `numpy.savez` leaves them, without the detours of
-`zipfile` and `numpy.load`, which take longer than all else that is done with a run's trace.
+"""Reads .npz files whose members are stored uncompressed, as `numpy.savez` writes them.
 
-Format: PKWARE's APPNOTE 6.3. Whatever is not just as usual is left to numpy, and to its words about it.
+`numpy.load` and `zipfile` take longer than everything else that is done with a run's trace. Anything unusual
+is left to them, errors included. Format: PKWARE's APPNOTE 6.3.
 """
 
 import io
@@ -17,12 +17,12 @@ _ENTRY = Struct("<4sBBHHHHHIIIHHHHHII")
 _LOCAL = Struct("<4sHHHHHIIIHH")
 _MAGIC = b"\x93NUMPY\x01\x00"
 _BEFORE = len(_MAGIC) + 2  # bytes of a .npy file until its header
-_IN_EXTRA = 0xFFFFFFFF  # a size that a ZIP64 field tells
+_IN_EXTRA = 0xFFFFFFFF  # the size is in a ZIP64 field
 _NAME = ".npy"
 
 
 def members(data: bytes) -> dict[str, np.ndarray] | None:
-    """The arrays of a file by name, read-only; None for a file that is not as usual, or not whole."""
+    """The arrays of a file by name, read-only; None for a file that is unusual or damaged."""
     try:
         return _members(data)
     except Exception:  # a run may write anything; numpy says what is wrong with it
@@ -74,7 +74,7 @@ def _member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarray, in
 
 @lru_cache(maxsize=256)
 def _header(text: bytes) -> tuple[np.dtype, tuple[int, ...]]:
-    """Type and shape in a .npy file's header; ValueError unless it is of numbers one after the other."""
+    """Type and shape in a .npy header; ValueError unless the array is numeric and in C order."""
     shape, fortran, dtype = npy.read_array_header_1_0(io.BytesIO(text))
     if fortran or dtype.hasobject or dtype.kind not in "biuf" or min(shape, default=0) < 0:
         raise ValueError(text)

@@ -56,7 +56,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
     with ScratchFolder("mutator-stills-") as scratch:
         try:
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
-            # begun first, so that what waits for a golden run waits for one that is under way
+            # submitted first: a film then never waits for a golden run that no thread is driving
             goldens = {key: pool.submit(filming.golden, one, scratch / key) for key, one in driven.items()}
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = Pace("pictures", len(found))

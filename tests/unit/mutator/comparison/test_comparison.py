@@ -68,7 +68,7 @@ def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
-    assert remark.startswith(f"1 of {len(found.pairs)} pairs end at their first terminal hazard in one run")
+    assert remark.startswith(f"1 of {len(found.pairs)} pairs end at their first terminal hazard in only one")
 
 
 def test_a_run_planned_before_files_were_written_down(
