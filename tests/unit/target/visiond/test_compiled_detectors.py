@@ -13,7 +13,7 @@ from selfdrive.sim import compile_helpers
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond import compiled_view, compiled_windows
+from selfdrive.visiond import compiled_robust, compiled_view, compiled_windows
 from selfdrive.visiond.band_filter import Points
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
@@ -176,6 +176,26 @@ def _elected(choose, voters, belief) -> str:
         return repr(choose(voters, belief))
     except ValueError as error:
         return repr(type(error))
+
+
+@pytest.mark.parametrize("name", ["RoadView", "crests", "elect"])
+def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
+    """Another version of OpenCV may filter otherwise: then the Python does all of it."""
+    here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
+
+    def otherwise(*given):
+        first, *others = here(*given)
+        return [first + 1, *others]
+
+    checks = compiled_robust.maps_alike, compiled_robust.finds_alike, compiled_robust.elects_alike
+    monkeypatch.setattr(*((RoadView, "map") if name == "RoadView" else (compiled_robust, name)), otherwise)
+    for check in checks:
+        check.cache_clear()
+    found = build_robust_detector(MODEL)
+    monkeypatch.undo()
+    for check in checks:
+        check.cache_clear()
+    assert not found.calculated_by and build_robust_detector(MODEL).calculated_by
 
 
 def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
