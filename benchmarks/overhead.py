@@ -33,7 +33,7 @@ from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
 from mutator.store.lines import LineWriter  # noqa: E402
-from mutator.store.records import SCHEMA  # noqa: E402
+from mutator.store.records import SCHEMA, line_of  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
@@ -100,7 +100,7 @@ class Bench:
             for finished in runner.run(some):
                 assert finished.mode == "fork" and finished.mutant, finished.record
                 (self.folder / "patch").write_bytes(finished.mutant.patch_bytes)
-                records.append(asdict(finished.record))
+                records.append(line_of(finished.record))
                 children += finished.cpu_s
             return children
 

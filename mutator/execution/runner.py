@@ -215,6 +215,7 @@ class Runner:
                 why = "was stopped, but no terminal hazard is in its trace"
                 return _bare(experiment, Status.HARNESS_ERROR, why, built)
             reference = golden.until(reference, faulty[time][-1], time)
+        faulty = golden.sharing_times(reference, faulty, time)
         difference = golden.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)

@@ -3,7 +3,7 @@
 import signal
 import socket
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full
@@ -18,7 +18,7 @@ from mutator.model import Experiment, Status
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import SeriesWriter
 from mutator.verification import equivalence
@@ -95,7 +95,7 @@ class Worker:
             self._planned = {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
         errors = []
         for finished in self._prover.run([self._planned[sample.id]]):
-            self._proofs.append(asdict(finished.record))
+            self._proofs.append(line_of(finished.record))
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
@@ -149,7 +149,7 @@ class Worker:
                 "why": finished.why,
             }
         )
-        self._records.append(asdict(finished.record))
+        self._records.append(line_of(finished.record))
 
     def _sync_blocks(self) -> None:
         """Before records: a record that survives a power cut names a patch that does."""

@@ -1,6 +1,7 @@
 """Records on disk: appended by workers, one file each, read back whatever a kill left behind."""
 
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,14 @@ from mutator.store.lines import read_segment
 
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
+_NAMES = tuple(field.name for field in fields(Record))
+_RECORDS = ("activation", "error")  # of the fields, those that are records themselves
+
+
+def line_of(record: Record) -> dict[str, Any]:
+    """A record as its line has it: `asdict` without a copy of every tuple."""
+    line = {name: getattr(record, name) for name in _NAMES}
+    return line | {name: asdict(line[name]) for name in _RECORDS if line[name] is not None}
 
 
 def record_from(data: Mapping[str, Any]) -> Record:

@@ -18,6 +18,7 @@ from mutator.outcomes.golden import (
     compare,
     load_record,
     load_trace,
+    sharing_times,
     trace_digest,
 )
 from mutator.store.run_folder import golden_key
@@ -66,6 +67,16 @@ def test_steps_at_other_times_alone_are_no_difference() -> None:
     assert compare(golden, {**faulty, "t": times[:3]}, [GAS], "t").t_first == T[3]
     later = {**golden, "gas@": own + 0.05}
     assert compare(golden, later, [GAS], "t").t_first == 0.0
+
+
+@pytest.mark.parametrize("times", [T, T + 0.01, T[:3]], ids=["equal", "others", "shorter"])
+def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
+    """A comparison finds the same whether or not the times that are equal are the same array."""
+    golden = trace(gas=[1, 2, 3, 4, 5])
+    faulty = {"t": times.copy(), "gas": np.array([1, 2, 3.5, 4, np.nan])[: len(times)]}
+    shared = sharing_times(golden, faulty, "t")
+    assert (shared["t"] is golden["t"]) == (times is T)
+    assert compare(golden, shared, [GAS], "t") == compare(golden, faulty, [GAS], "t")
 
 
 def test_first_and_largest_difference() -> None:

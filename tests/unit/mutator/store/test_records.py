@@ -2,16 +2,17 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
+from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Outcome, Record, RunError, Status
+from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.lines import LineWriter
 from mutator.store.progress import Tail
-from mutator.store.records import SCHEMA, read_records
+from mutator.store.records import SCHEMA, line_of, read_records
 
 HEAD = {"schema": SCHEMA, "plan": "p"}
 MakeRecord = Callable[..., Record]
@@ -35,6 +36,14 @@ def test_records_come_back_as_they_were(tmp_path: Path, record: MakeRecord) -> N
     write(tmp_path, "0001-gw0.jsonl", first)
     write(tmp_path, "0001-gw1.jsonl", second)
     assert read_records(tmp_path) == {"a" * 16: first, "b" * 16: second}
+
+
+def test_a_line_has_what_asdict_gives(record: MakeRecord) -> None:
+    """A record's line is `asdict`'s, with and without records inside it."""
+    activation = Activation(first=1.0, last=2.0, count=3)
+    error = RunError(kind="ValueError", message="no", place="a.py:3")
+    for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
+        assert canonical(line_of(one)) == canonical(asdict(one))
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
