@@ -143,7 +143,7 @@ class CompiledSettle:
         self._settle = library.code.settle
         self._settle.argtypes = [*[ctypes.c_void_p] * 4, ctypes.c_long, *[ctypes.c_void_p] * 8]
         self._settle.restype = None
-        self._room = np.empty((20, STRONGEST))
+        self._room = np.empty((18, STRONGEST))
         self._results = np.empty((5, STRONGEST))
 
     def __call__(

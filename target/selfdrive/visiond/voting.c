@@ -28,12 +28,46 @@ static void solve(double rows[UNKNOWN][TERMS], double *x)
         x[i] = rows[i][UNKNOWN] / rows[i][i];
 }
 
+/* `dot` of sums.h without a place for the products. */
+INLINE double dot_of_few(const double *a, const double *b, long count)
+{
+    double s[8], sum = 0.0;
+    long k = 0;
+    if (count >= 8) {
+        for (; k < 8; k++)
+            s[k] = a[k] * b[k];
+        for (; k < count - count % 8; k += 8)
+            for (long lane = 0; lane < 8; lane++)
+                s[lane] += a[k + lane] * b[k + lane];
+        sum = ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+    }
+    for (; k < count; k++)
+        sum += a[k] * b[k];
+    return sum;
+}
+
+typedef double Dot(const double *a, const double *b, long count);
+
+static double dot_plain(const double *a, const double *b, long count)
+{
+    long half = count / 2 - count / 2 % 8;
+    return count <= 128 ? dot_of_few(a, b, count) : dot_plain(a, b, half) + dot_plain(a + half, b + half, count - half);
+}
+
+#if defined(__x86_64__) && !defined(PLAIN)
+__attribute__((target("avx2"))) static double dot_fast(const double *a, const double *b, long count)
+{
+    long half = count / 2 - count / 2 % 8;
+    return count <= 128 ? dot_of_few(a, b, count) : dot_fast(a, b, half) + dot_fast(a + half, b + half, count - half);
+}
+#endif
+
 INLINE void step(const float *left, const float *drop, const float *voters_metre, const float *precision, long n,
                  double near, const double *expected, const double *believed, const double *prior, double *state,
-                 double *metre, double *error, double *count, double *room)
+                 double *metre, double *error, double *count, double *room, Dot *scalar_product)
 {
     double *terms[TERMS], *weighted[UNKNOWN], rows[UNKNOWN][TERMS], sums[TERMS][UNKNOWN], surprise[UNKNOWN];
-    double by[UNKNOWN], *products = room + 2 * n * (TERMS + UNKNOWN);
+    double by[UNKNOWN];
     for (int k = 0; k < TERMS; k++)
         terms[k] = room + 2 * n * k;
     for (int k = 0; k < UNKNOWN; k++)
@@ -58,7 +92,7 @@ INLINE void step(const float *left, const float *drop, const float *voters_metre
         }
     for (int i = 0; i < TERMS; i++)
         for (int j = 0; j < UNKNOWN; j++)
-            sums[i][j] = dot(terms[i], weighted[j], 2 * n, products);
+            sums[i][j] = scalar_product(terms[i], weighted[j], 2 * n);
     for (int i = 0; i < UNKNOWN; i++) {
         const double *row = expected + UNKNOWN * i;
         surprise[i] = believed[i] - (((row[0] * state[0] + row[1] * state[1]) + row[2] * state[2]) + row[3] * state[3]);
@@ -78,18 +112,19 @@ INLINE void step(const float *left, const float *drop, const float *voters_metre
 
 INLINE void all_steps(const float *left, const float *drop, const float *voters_metre, const float *precision, long n,
                       const double *expected, const double *believed, const double *prior, double *state,
-                      double *metre, double *error, double *count, double *room)
+                      double *metre, double *error, double *count, double *room, Dot *scalar_product)
 {
     for (int k = 0; k < ROUNDS; k++)
         step(left, drop, voters_metre, precision, n, NEAR[k], expected, believed, prior, state, metre, error, count,
-             room);
+             room, scalar_product);
 }
 
 static void settle_plain(const float *left, const float *drop, const float *voters_metre, const float *precision,
                          long n, const double *expected, const double *believed, const double *prior, double *state,
                          double *metre, double *error, double *count, double *room)
 {
-    all_steps(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count, room);
+    all_steps(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count, room,
+              dot_plain);
 }
 
 #if defined(__x86_64__) && !defined(PLAIN)
@@ -98,12 +133,13 @@ settle_fast(const float *left, const float *drop, const float *voters_metre, con
             const double *expected, const double *believed, const double *prior, double *state, double *metre,
             double *error, double *count, double *room)
 {
-    all_steps(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count, room);
+    all_steps(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count, room,
+              dot_fast);
 }
 #endif
 
 /* Move `state` by all steps. `metre` (n), `error` and `count` (2, n) become those of the last one, before it moved.
- * `expected` (4, 4) times its own transpose is `prior`; `room` has space for 20 numbers for each point. */
+ * `expected` (4, 4) times its own transpose is `prior`; `room` has space for 18 numbers for each point. */
 void settle(const float *left, const float *drop, const float *voters_metre, const float *precision, long n,
             const double *expected, const double *believed, const double *prior, double *state, double *metre,
             double *error, double *count, double *room)
