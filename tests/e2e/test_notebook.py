@@ -29,6 +29,6 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
     assert len(pictures) == 2
     shown = "\n".join(output.get("data", {}).get("text/plain", "") for output in outputs)
-    assert "8 of 8 experiments of quickstart, as_described" in shown
-    assert "8 of 8 experiments of quickstart, as_coded" in shown
+    assert "8 of 8 experiments of paper, as_described" in shown
+    assert "8 of 8 experiments of paper, as_coded" in shown
     assert not [output for output in outputs if output.get("name") == "stderr"]
