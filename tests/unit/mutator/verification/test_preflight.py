@@ -15,7 +15,9 @@ from mutator.store.lines import LineWriter
 from mutator.store.progress import Progress
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.verification.canary import judge
 from mutator.verification.preflight import run_checks
+from mutator.verification.preflight_rules import CheckRun
 from mutator.workspace import Workspace
 
 
@@ -171,3 +173,14 @@ def test_other_golden_runs_than_before_are_refused(
         run_checks(toycar, folder)
     shutil.rmtree(folder.work)
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
+
+
+def test_a_canary_whose_run_was_ended_from_outside_is_run_again(toycar: Workspace, tmp_path: Path) -> None:
+    """What the check says does not depend on a signal that struck one of its runs; a run that never ends well
+    is tried once more and no further."""
+    canary = frozen(toycar, tmp_path).canary
+    fine = CheckRun(problem="", hazards=(("H3", 1.0),))
+    runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])
+    assert judge([canary], lambda _: next(runs), "H3") == ("", "reached H3")
+    ended = iter([CheckRun(problem="crashed")] * 2)  # a third run would be one too many
+    assert "(crashed)" in judge([canary], lambda _: next(ended), "H3")[0]
