@@ -54,7 +54,8 @@ def constrained(clone: Path) -> tuple[str, ...]:
 def stated_licence(name: str) -> str | None:
     """The licence that an installed package states; None when it is not installed here.
 
-    The licence expression where there is one (PEP 639); else the classifier; else the free text.
+    The licence expression where there is one (PEP 639); else the classifier; else the first line of the free
+    text, which may be the whole licence.
     """
     try:
         stated = metadata.metadata(name)
@@ -65,7 +66,8 @@ def stated_licence(name: str) -> str | None:
         c.split(" :: ")[1:] for c in stated.get_all("Classifier", []) if c.startswith("License :: ")
     ]
     named = [words[-1] for words in classifiers if words != ["OSI Approved"]]
-    return ", ".join(expressions or named or stated.get_all("License", ["none stated"]))
+    texts = [text.strip().partition("\n")[0] for text in stated.get_all("License", [])]
+    return ", ".join(expressions or named or texts or ["none stated"])
 
 
 def _licence(name: str, known: Mapping[str, str]) -> str:

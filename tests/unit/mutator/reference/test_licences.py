@@ -1,6 +1,7 @@
 """The page of licences has every dependency, with the licence that the package states."""
 
 import sys
+from email.message import Message
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,14 @@ def test_the_licences_are_those_that_the_packages_state() -> None:
     installed = {name: licence for name, licence in stated.items() if licence is not None}
     assert "numpy" in installed
     assert {name: TABLE[name] for name in installed} == installed
+
+
+def test_a_licence_given_whole_is_told_by_its_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some packages put their licence's whole text into the field that should name it."""
+    stated = Message()
+    stated["License"] = "BSD 3-Clause License\n \n Redistribution and use ..."
+    monkeypatch.setattr("mutator.reference.licences.metadata.metadata", lambda name: stated)
+    assert stated_licence("any") == "BSD 3-Clause License"
 
 
 def clone(folder: Path, *packages: str) -> Path:
