@@ -1,0 +1,290 @@
+"""A finished run folder of so many experiments, made up: what other benchmarks read.
+
+`python benchmarks/made_up_run.py SIZE OUT`. The experiments are those of the paper's campaign with as many
+seeds as are needed, driven without pictures. Golden runs are driven. Records, patches, timings and series are
+a few hundred real or made-up ones, again and again under other ids, with the checksums and digests that a run
+of this size has: the folder opens, and has a seal.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import BinaryIO
+
+import numpy as np
+from growth import record
+
+from mutator._common.hashing import canonical, digest
+from mutator.campaigns import machine
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.campaigns.provenance import add_stretch
+from mutator.execution.single_run import run_golden
+from mutator.model import Experiment, Record
+from mutator.mutants.building import build
+from mutator.outcomes.golden import load_trace
+from mutator.outcomes.sampling import Sampler
+from mutator.store import digests, plan_file
+from mutator.store.blocks import as_block
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.digests import Digest
+from mutator.store.patches import _Packer
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.series import INDEX, Index, write_index
+from mutator.store.series_format import encode
+from mutator.store.series_script import name_of, write_script
+from mutator.store.stretches import Stretch
+from mutator.verification import equivalence
+from mutator.verification.preflight_rules import digest_of
+from mutator.verification.seal import seal_of
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[1]
+SEED = 11_280  # experiments of a seed
+KINDS = 480  # different records, which experiments take in turn
+PATCHES = 240  # different patches
+SERIES, SERIES_MOST = 48, 150_000  # different series, and experiments that have one: what fits into 500 MB
+WORKERS, PIECE = 2, 20  # files, and experiments in a row in one of them
+_WHOLE_EVERY = 256  # patches, as the writer of patches has it
+_NO_ID = "0" * 16
+
+
+def make(size: int, out: Path) -> str:
+    """Write the run folder `out` of so many experiments; its seal."""
+    workspace = Workspace.find(root=ROOT)
+    folder = planned(workspace, size, out)
+    first = tuple(islice(_experiments(folder), min(size, SEED)))
+    goldens(workspace, folder, first)
+    ids = list(plan_file.ids(out))
+    patches = patches_of(workspace, first)
+    records = made_up_records(workspace, first)
+    write_segments(folder, ids, records, patches)
+    equivalence.begin(out)
+    write_proof(folder, ids, records, patches)
+    write_series(workspace, folder, ids, first)
+    add_stretch(
+        folder,
+        Stretch(
+            python=machine.python(),
+            packages={
+                name: version for name, version in machine.versions(machine.required()).items() if version
+            },
+            platform="made up",
+            records="0001-*",
+        ),
+    )
+    digests.close_segments(out, finished=True)
+    return seal_of(RunFolder(out)) or ""
+
+
+def campaign(folder: Path) -> Path:
+    """The paper's campaign, driven without pictures, written into a folder."""
+    text = (ROOT / "fault_library" / "campaigns" / "paper.yaml").read_text()
+    for name in ("pictures, paper_detector", "pictures, coded_detector"):
+        text = text.replace(f"[{name}]", "[]")
+    path = folder / "million.yaml"
+    path.write_text(text.replace("name: paper\n", "name: million\n"))
+    return path
+
+
+def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
+    """The campaign's plan with as many seeds as are needed, cut to size, frozen in `out`."""
+    with TemporaryDirectory() as place:
+        plan = make_plan(workspace, campaign(Path(place)))
+        seeds = range(1, -(-size // len(plan.experiments)) + 1)
+        more = (replace(e, seed=seed) for seed in seeds for e in plan.experiments)
+        experiments = tuple(islice(more, size))
+        chunks = tuple(min(PIECE, size - first) for first in range(0, size, PIECE))
+        return freeze(replace(plan, experiments=experiments, chunks=chunks, runs=size), out, workspace)
+
+
+def _experiments(folder: RunFolder) -> Iterator[Experiment]:
+    faults = plan_file.read_faults(folder.path)
+    for chunk in folder.head["chunks"]:
+        yield from plan_file.read_chunk(folder.path, chunk, faults)
+
+
+def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Experiment]) -> None:
+    """Drive the golden runs, and leave checks that have passed."""
+    manifest, run = workspace.manifest(folder.head["target"]), folder.path
+    known = {}
+    for scenario, changes in folder.head["goldens"]:
+        place = folder.golden(scenario, tuple(changes))
+        like = next(
+            e for e in (*experiments, folder.canary) if (e.scenario, list(e.changes)) == (scenario, changes)
+        )
+        with TemporaryDirectory(dir=run) as scratch:
+            found = run_golden(workspace, manifest, like, Path(scratch) / "one", limits=folder.limits)
+            place.parent.mkdir(exist_ok=True)
+            shutil.move(found, place)
+        known[golden_key(scenario, changes)] = digest_of(manifest, place)
+    checks = {"schema": CHECKS_SCHEMA, "digest": "", "results": [], "goldens": known}
+    data = json.dumps(checks | {"packages": [], "run_cpu_s": 1.0}).encode()
+    files = [path for path in (run / "golden").rglob("*") if path.is_file()]
+    coming = {path.relative_to(run).as_posix(): Digest.of(path.read_bytes()) for path in files}
+    with digests.rewriting(run, coming | {CHECKS: Digest.of(data)}):
+        (run / CHECKS).write_bytes(data)
+
+
+def patches_of(workspace: Workspace, experiments: Sequence[Experiment]) -> list[bytes]:
+    """The patches of the mutants of some of them."""
+    manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
+    some = experiments[:: max(1, len(experiments) // PATCHES)][:PATCHES]
+    return [build(manifest, models, one.fault, one.trigger).patch_bytes for one in some]
+
+
+def made_up_records(workspace: Workspace, experiments: Sequence[Experiment]) -> list[Record]:
+    """Records that have everything in some and nothing in others."""
+    draw = np.random.default_rng(1)
+    names = [metric.name for metric in workspace.manifest("openpilot").measures]
+    step = max(1, len(experiments) // KINDS)
+    found = []
+    for number, experiment in enumerate(experiments[::step][:KINDS]):
+        metrics = tuple(zip(names, map(float, draw.normal(10.0, 5.0, len(names))), strict=True))
+        one = record(experiment, number)
+        found.append(replace(one, experiment_id=_NO_ID, metrics=metrics, left=one.left[: 12 * (number % 3)]))
+    return found
+
+
+class Lines:
+    """Writes checksummed lines from their bytes, many times as fast as LineWriter does."""
+
+    def __init__(self, path: Path, head: dict[str, str]) -> None:
+        path.parent.mkdir(exist_ok=True)
+        self._file: BinaryIO = path.open("wb", buffering=1 << 20)
+        self._last = b""
+        self.write(canonical({**head, "file": f"{path.parent.name}/{path.name}"}).encode()[1:])
+
+    def write(self, body: bytes) -> None:
+        """A line, without its first brace."""
+        self._last = sha256(self._last + body).hexdigest()[:16].encode()
+        self._file.write(b'{"sum":"%b",%b\n' % (self._last, body))
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def write_segments(
+    folder: RunFolder, ids: Sequence[str], records: Sequence[Record], patches: Sequence[bytes]
+) -> None:
+    """Records, timings and patches of all experiments, as two workers would have left them."""
+    lines = _bodies(records, patches)
+    blocks = _blocks(patches)
+    for worker in range(WORKERS):
+        name = f"0001-gw{worker}"
+        head = {"plan": folder.head["plan"]}
+        record_lines = Lines(folder.path / "records" / f"{name}.jsonl", head | {"schema": SCHEMA})
+        timing_lines = Lines(folder.path / "timings" / f"{name}.jsonl", head | {"schema": TIMINGS_SCHEMA})
+        (folder.path / "patches").mkdir(exist_ok=True)
+        with (folder.path / "patches" / f"{name}.blocks").open("wb", buffering=1 << 20) as packed:
+            for count, number in enumerate(n for n in range(len(ids)) if n // PIECE % WORKERS == worker):
+                of_patch = _patch_of(count, len(patches))
+                kind, content = blocks[of_patch]
+                packed.write(as_block(kind, ids[number], content))
+                record_lines.write(lines[number % len(lines)](ids[number], of_patch))
+                timing_lines.write(
+                    b'"cpu_s":0.%03d,"engine":"forked","experiment_id":"%b","host":"made-up",'
+                    b'"wall_s":0.%03d,"why":"","worker":"%b"}'
+                    % (number % 997, ids[number].encode(), number % 991, name.encode())
+                )
+        record_lines.close()
+        timing_lines.close()
+
+
+def _patch_of(count: int, patches: int) -> int:
+    """The number of the patch of a file's experiment: the first one where it is stored whole."""
+    return count % patches if count % _WHOLE_EVERY else 0
+
+
+def _blocks(patches: Sequence[bytes]) -> list[tuple[int, bytes]]:
+    """The first patch whole, each other one beside it."""
+    packer = _Packer()
+    return [packer.block(patch) for patch in patches]
+
+
+def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callable[[str, int], bytes]]:
+    """Of each kind of record the line of an experiment with a patch."""
+    named = [digest(patch).encode() for patch in patches]
+
+    def body(one: Record) -> Callable[[str, int], bytes]:
+        text = canonical(line_of(replace(one, patch="PATCH"))).encode()[1:]
+        before, after = text.split(_NO_ID.encode())
+        between, end = after.split(b"PATCH")
+        return lambda name, patch: b"".join((before, name.encode(), between, named[patch], end))
+
+    return [body(one) for one in records]
+
+
+def write_proof(
+    folder: RunFolder, ids: Sequence[str], records: Sequence[Record], patches: Sequence[bytes]
+) -> None:
+    """The proof's sample with the records that the experiments have."""
+    lines = _bodies(records, patches)
+    proof = Lines(
+        folder.path / equivalence.FOLDER / "0001-gw0.jsonl", {"plan": folder.head["plan"], "schema": SCHEMA}
+    )
+    wanted = set(equivalence.sampled(folder))
+    counts = [0] * WORKERS
+    for number, name in enumerate(ids):
+        worker = number // PIECE % WORKERS
+        if name in wanted:
+            proof.write(lines[number % len(lines)](name, _patch_of(counts[worker], len(patches))))
+        counts[worker] += 1
+    proof.close()
+
+
+def write_series(
+    workspace: Workspace, folder: RunFolder, ids: Sequence[str], experiments: Sequence[Experiment]
+) -> None:
+    """A packed index in which the experiments that have room share a few series."""
+    manifest, place = workspace.manifest("openpilot"), folder.path / "series"
+    place.mkdir()
+    scenario, changes = folder.head["goldens"][0]
+    golden = load_trace(manifest, folder.golden(scenario, tuple(changes)))
+    sampler, draw = Sampler(manifest, golden), np.random.default_rng(1)
+    names = [channel.name for channel in manifest.compared]
+    made = [sampler.encoded]
+    for number in range(SERIES):
+        change = {name: golden[name] + draw.normal(size=len(golden[name])).cumsum() / 100 for name in names}
+        made.append(
+            encode(
+                sampler.series(golden | change, record(experiments[number % len(experiments)], number)),
+                sampler.golden,
+            )
+        )
+    data = b"".join(made)
+    write_script(place / f"{name_of(data)}.js", data)
+    key, kept = golden_key(scenario, changes), ids[:SERIES_MOST]
+    index = Index(
+        plan=folder.head["plan"],
+        chunks=((name_of(data), len(made)),),
+        sizes=tuple(map(len, made)),
+        goldens={key: 0},
+        entries={name: 1 + number % SERIES for number, name in enumerate(kept)},
+        golden_of=dict.fromkeys(kept, key),
+        left_out=len(ids) - len(kept),
+        budget_mb=500,
+    )
+    write_index(place / f"{INDEX}.js", index)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("size", type=int)
+    parser.add_argument("out", type=Path)
+    options = parser.parse_args()
+    print(make(options.size, options.out))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,125 @@
+"""What a campaign of a million experiments costs around its runs: plan, open and resume, at three sizes.
+
+`python benchmarks/million.py [--sizes N ...] [--keep DIR]`. The runs are made up (`made_up_run.py`), and kept
+in DIR for the next time. Each row is a process of its own: seconds of CPU and of wall time, and the most
+memory that it ever had. Growth: CPU time for one experiment, beside that of the smallest size.
+"""
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+
+import made_up_run
+
+from mutator.execution.running import run_campaign
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+SIZES = (10_000, 100_000, 1_000_000)
+GOAL_SIZE = 1_000_000
+GOALS = {"plan": (60.0, 1000.0), "resume": (10.0, None)}  # wall s and MB at most, of GOAL_SIZE
+
+
+def plan(size: int, run: Path) -> None:
+    """Plan into a new folder."""
+    with tempfile.TemporaryDirectory(dir=run.parent) as place:
+        made_up_run.planned(Workspace.find(root=made_up_run.ROOT), size, Path(place) / "run")
+
+
+def opened(size: int, run: Path) -> None:
+    """Open a finished run: all that it holds is verified."""
+    RunFolder.open(run)
+
+
+def resume(size: int, run: Path) -> None:
+    """Give the command again: there is nothing to do."""
+    summary = run_campaign(Workspace.find(root=made_up_run.ROOT), run / "campaign.yaml", run)
+    if (summary.done, summary.ran) != (size, 0):
+        raise SystemExit(f"{summary.done} done, {summary.ran} now")
+
+
+ROWS: dict[str, Callable[[int, Path], None]] = {"plan": plan, "open": opened, "resume": resume}
+
+
+def apart(row: str, size: int, run: Path) -> dict[str, float]:
+    """A row in a process of its own."""
+    command = [sys.executable, __file__, "--row", row, str(size), str(run)]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+def measured(row: str, size: int, run: Path) -> dict[str, float]:
+    """Do what a row stands for: seconds, and the most memory in MB."""
+    began = perf_counter()
+    ROWS[row](size, run)
+    wall = perf_counter() - began
+    uses = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    cpu = sum(use.ru_utime + use.ru_stime for use in uses)
+    return {"cpu_s": cpu, "wall_s": wall, "mb": max(use.ru_maxrss for use in uses) / 1024}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
+    parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS))
+    parser.add_argument("--keep", type=Path, help="keep the runs here, and use those that are here")
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--row", nargs=3, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.row:
+        row, size, run = options.row
+        print(json.dumps(measured(row, int(size), Path(run))))
+        return 0
+    place = options.keep or Path(tempfile.mkdtemp())
+    try:
+        found = figures(options.sizes, options.rows, place)
+    finally:
+        if options.keep is None:
+            shutil.rmtree(place)
+    if options.json:
+        options.json.write_text(json.dumps(found, indent=1) + "\n")
+    return told(found)
+
+
+def figures(sizes: list[int], rows: list[str], place: Path) -> dict[str, dict[int, dict[str, float]]]:
+    """Measure and print, size by size."""
+    found: dict[str, dict[int, dict[str, float]]] = {row: {} for row in rows}
+    print(f"{'experiments':>12} {'':14}{'CPU s':>9}{'wall s':>9}{'MB':>8}{'us CPU each':>13}{'growth':>8}")
+    for size in sizes:
+        run = place / str(size)
+        if not (run / "run.json").exists() or not RunFolder.unverified(run).finished:
+            shutil.rmtree(run, ignore_errors=True)
+            subprocess.run([sys.executable, made_up_run.__file__, str(size), str(run)], check=True)
+        for row in rows:
+            one = found[row][size] = apart(row, size, run)
+            first = found[row][sizes[0]]["cpu_s"] / sizes[0]
+            each = one["cpu_s"] / size
+            print(
+                f"{size:12,} {row:14}{one['cpu_s']:9.1f}{one['wall_s']:9.1f}{one['mb']:8.0f}"
+                f"{each * 1e6:13.1f}{each / first:8.2f}",
+                flush=True,
+            )
+    return found
+
+
+def told(found: dict[str, dict[int, dict[str, float]]]) -> int:
+    """Say which goals are missed; 1 where one is."""
+    code = 0
+    for row, (seconds, memory) in GOALS.items():
+        one = found.get(row, {}).get(GOAL_SIZE)
+        if one and (one["wall_s"] > seconds or (memory and one["mb"] > memory)):
+            print(f"{row}: {one['wall_s']:.1f} s and {one['mb']:.0f} MB; the goal is {seconds:.0f} s", end="")
+            print(f" and {memory:.0f} MB" if memory else "")
+            code = 1
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
