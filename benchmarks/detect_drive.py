@@ -1,8 +1,9 @@
 """How long the geometric detector, and the one as coded, take for a picture: medians over a drive.
 
-`python benchmarks/detect_drive.py [--repeat N]`, on one core and clean as in bad weather. Times are of this
-process, so other work on the machine matters little, but for the caches it shares. Exit code 1 where a median
-is above its goal.
+`python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core and clean as in bad weather. What is
+compiled is used, but with `--plain`; the last column says for each whether it was. Times are of this process,
+so other work on the machine matters little, but for the caches it shares. Exit code 1 where a median is above
+its goal.
 """
 
 import argparse
@@ -21,11 +22,15 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
+from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
 from selfdrive.messages import CameraView  # noqa: E402
 from selfdrive.sim import effects  # noqa: E402
+from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.coded_detector import CodedDetector  # noqa: E402
+from selfdrive.visiond.compiled_coded import build_coded_detector  # noqa: E402
+from selfdrive.visiond.compiled_robust import build_robust_detector  # noqa: E402
 from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
 
 # weather, amount, goal for the median (ms)
@@ -79,20 +84,25 @@ def main() -> int:
     """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeat", type=int, default=300, help="pictures for each median")
-    repeat = parser.parse_args().repeat
+    parser.add_argument("--plain", action="store_true", help="without compiled code")
+    options = parser.parse_args()
     cv2.setNumThreads(1)
+    compiled.use(None if options.plain else FOLDER)
     slow = False
-    print(
-        f"{'detector':<16}{'marks':<8}{'weather':<18}{'first':>10}{'median':>10}{'slowest':>10}{'goal':>10}{'ratio':>8}"
-    )
-    cases = [(RobustDetector, marks, *case) for marks in ("solid", "dashed") for case in ROBUST]
-    cases += [(CodedDetector, "solid", *case) for case in CODED]
-    for detector, marks, weather, amount, goal in cases:
-        found = times(detector(CameraModel()), drive(marks, weather, amount), repeat)
+    columns = "".join(f"{name:>10}" for name in ("first", "median", "slowest", "goal"))
+    print(f"{'detector':<10}{'marks':<8}{'weather':<18}{columns}{'ratio':>8}  in")
+    cases = [
+        ("robust", build_robust_detector, marks, *case) for marks in ("solid", "dashed") for case in ROBUST
+    ]
+    cases += [("as_coded", build_coded_detector, "solid", *case) for case in CODED]
+    for kind, build, marks, weather, amount, goal in cases:
+        detector = build(CameraModel())
+        found = times(detector, drive(marks, weather, amount), options.repeat)
         slow |= median(found) > goal
         name = f"{weather} {amount:g}" if weather else "clean"
         figures = "".join(f"{value:7.2f} ms" for value in (found[0], median(found), max(found[1:]), goal))
-        print(f"{detector.__name__:<16}{marks:<8}{name:<18}{figures}{median(found) / goal:8.2f}")
+        language = "C" if detector.calculated_by else "Python"
+        print(f"{kind:<10}{marks:<8}{name:<18}{figures}{median(found) / goal:8.2f}  {language}")
     return int(slow)
 
 

@@ -1,6 +1,7 @@
 """How long image effects take for a picture: medians over a drive, mild and strong, for the default camera.
 
-`python benchmarks/effects.py [EFFECT ...] [--repeat N]`, on one core. Times are of this process, so other
+`python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`, on one core. What is compiled is used, but
+with `--plain`; the last column says of each effect whether any of it was. Times are of this process, so other
 work on the machine matters little, but for the caches it shares. Exit code 1 where a median is above 3 ms.
 """
 
@@ -18,7 +19,9 @@ import cv2
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
+from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.camera_model import CameraModel  # noqa: E402
+from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
 from selfdrive.sim.effects.levels import LEVELS  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 
@@ -45,12 +48,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("effects", nargs="*", help="names of effects; all of them if none is given")
     parser.add_argument("--repeat", type=int, default=100, help="pictures for each median")
+    parser.add_argument("--plain", action="store_true", help="without compiled code")
     given = parser.parse_args()
     cv2.setNumThreads(1)
+    compiled.use(None if given.plain else FOLDER)
     camera = CameraModel()
     picture = RoadRenderer(camera, "solid", 0).grey(10.0)
     slow = []
-    print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}{'of the goal':>13}")
+    print(f"{'effect':<16}{'amount':>8}{'made in':>12}{'median':>12}{'fastest':>12}{'of the goal':>13}  in")
     for kind, amounts in LEVELS.items():
         if given.effects and kind.__name__ not in given.effects:
             continue
@@ -60,9 +65,10 @@ def main() -> int:
             made = 1000.0 * (process_time() - start)
             moments = [Moment(2.0 + 0.05 * k, 50.0 + 1.341 * k, 26.82) for k in range(given.repeat)]
             times = [milliseconds(partial(effect.apply, picture, moment)) for moment in moments]
+            language = "C" if effect._key[-1] else "Python"
             print(
                 f"{kind.__name__:<16}{amount:>8g}{made:>9.1f} ms{median(times):>9.2f} ms{min(times):>9.2f} ms"
-                f"{median(times) / GOAL:>13.2f}"
+                f"{median(times) / GOAL:>13.2f}  {language}"
             )
             if median(times) > GOAL:
                 slow.append(kind.__name__)
