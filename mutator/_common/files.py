@@ -171,14 +171,21 @@ def _emptied(folder: int) -> list[str]:
 
 def write_atomic(path: Path, data: bytes) -> None:
     """Write the whole file or leave the old one; DiskFull if there is no room, MutatorError for a folder."""
+    with half_written(path) as temporary:
+        temporary.write_bytes(data)
+
+
+@contextmanager
+def half_written(path: Path) -> Iterator[Path]:
+    """Where to write what is to become the file at `path`, in pieces: as `write_atomic`, it does at the end,
+    unless something was raised."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{threading.get_native_id()}")
     with raising_disk_full(path):
         try:
-            with temporary.open("wb") as file:
-                file.write(data)
-                file.flush()
+            yield temporary
+            with temporary.open("rb+") as file:
                 os.fsync(file.fileno())
             temporary.replace(path)
         except BaseException:
@@ -187,7 +194,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a file of that name was left by a killed `write_atomic`."""
+    """Whether a file of that name was left by a killed `write_atomic` or `half_written`."""
     return complete(name) != name
 
 

@@ -57,8 +57,11 @@ def plain(value: Any) -> Any:
 
 def canonical(value: Any) -> str:
     """One text for one value: sorted keys, no spaces, shortest exact floats."""
-    # only what JSON does not know goes through `plain`: a plan has thousands of ids
-    return json.dumps(value, default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return _CANONICAL.encode(value)
+
+
+# only what JSON does not know goes through `plain`: a plan has thousands of ids
+_CANONICAL = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
 def digest(value: Any) -> str:

@@ -1,6 +1,6 @@
 """Chunks: what one pytest item runs. Cut when a plan is frozen; what is left of them is found on a start."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -37,7 +37,7 @@ class Pending:
     places: tuple[int, ...]
 
 
-def pending(folder: RunFolder, records: dict[str, Record]) -> tuple[Pending, ...]:
+def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
     """Every chunk of the folder's share that has experiments without a record, or with a harness error,
     which is tried again."""
     done = {name for name, record in records.items() if record.status is not Status.HARNESS_ERROR}

@@ -105,6 +105,8 @@ def report(
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
     show_counts(terminal, loaded)
+    for summary in written.summaries:
+        terminal.table(summary.heads, summary.rows, right=tuple(summary.right))
     terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
     loaded.check_equivalence()
 

@@ -9,7 +9,7 @@ import shutil
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -109,7 +109,7 @@ class Session:
         self.interrupted = False
         self._began = time.monotonic()
         self._done_before = 0
-        self._records: dict[str, Record] | None = None
+        self._records: Mapping[str, Record] | None = None
 
     def prepare(self) -> None:
         """Find what is left to run; if anything is, pass the checks, lay out the pristine tree, and note the

@@ -6,6 +6,7 @@ target. What is known of an experiment before it runs is in the plan, too.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 from mutator.model import Experiment
@@ -149,6 +150,7 @@ def is_text(column: str) -> bool:
     return column in _TEXTS
 
 
+@lru_cache(maxsize=64)
 def hazard_columns(hazard: str) -> tuple[Column, Column]:
     """The flag and the time of a hazard: `near` and `t_near` of NEAR."""
     name = hazard.lower()
@@ -164,9 +166,14 @@ def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
     return tuple(name.upper() for name in known if f"t_{name}" in known)
 
 
-def deviation_columns(channels: Sequence[str]) -> dict[str, str]:
+def deviation_columns(channels: Sequence[str]) -> Mapping[str, str]:
     """Column of each compared channel: `max_dev_` and its first word (`wheel` of `wheel_turn`), or its
     whole name where another channel begins with the same word."""
+    return _deviation_columns(tuple(channels))
+
+
+@lru_cache(maxsize=64)
+def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
     words = [name.split("_")[0] for name in channels]
     return {
         name: f"max_dev_{word if words.count(word) == 1 else name}"

@@ -13,7 +13,7 @@ from functools import lru_cache
 from math import inf
 
 from mutator.errors import MutatorError
-from mutator.model import Experiment, Outcome, Record
+from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.propagation import Departure
 from mutator.outcomes.way import Way, chained, links_of, steps_from, structured
 from mutator.store.run_head import REMEDY, Head
@@ -84,6 +84,22 @@ class Path:
     stopped_at: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """What paths have in common whose faults came in at the same components, which left golden in the same
+    order: all but the times.
+
+    `late` has for each component that had changed before its channels show it the place of the time by which
+    it had, in the order of times.
+    """
+
+    states: Mapping[str, State]  # in causal order
+    late: Mapping[str, int]
+    crossings: tuple[Crossing, ...]
+    reached: str
+    stopped_at: tuple[str, ...]
+
+
 class Ways:
     """Paths of faults through a target.
 
@@ -99,7 +115,8 @@ class Ways:
         self._links = links_of(structure) if structure else {}
         # from what is not recorded back to what leads to it
         self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
-        self._way = lru_cache(maxsize=None)(self._way_of)
+        self._course = lru_cache(maxsize=None)(self._course_of)
+        self._where: dict[str, frozenset[str]] = {}  # the components of each fault by its id
 
     @property
     def processes(self) -> frozenset[str]:
@@ -108,44 +125,76 @@ class Ways:
             return frozenset(name for name, role in self._roles.items() if role == Role.TRUTH.value)
         return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
 
-    def injected(self, experiment: Experiment) -> frozenset[str]:
+    def _injected(self, fault: Fault) -> frozenset[str]:
         """The components of the structure whose files the fault is injected into."""
-        files = {injection.location.path for injection in experiment.fault.injections}
-        components = self.structure.components if self.structure else {}
-        return frozenset(name for name, one in components.items() if files.intersection(one.modules))
+        if fault.id not in self._where:
+            files = {injection.location.path for injection in fault.injections}
+            components = self.structure.components if self.structure else {}
+            found = frozenset(name for name, one in components.items() if files.intersection(one.modules))
+            self._where[fault.id] = found
+        return self._where[fault.id]
 
     def path(self, experiment: Experiment, record: Record) -> Path | None:
         """The path of an experiment; None where its fault was not active, ended without an outcome, or is in
         no component that is known."""
-        if record.outcome in (None, Outcome.NOT_ACTIVATED):
-            return None
-        way = self._way(self.injected(experiment))
-        if not way.components:
+        course = self.course(experiment, record)
+        if course is None:
             return None
         left: dict[str, list[Departure]] = {}
         for departure in record.left:
             left.setdefault(self.component_of.get(departure[0], ""), []).append(departure)
-        times = {name: min(t for _, t, _ in found) for name, found in left.items()}
-        latest = self._latest(way, times)
-        states, arrived = self._states(way, times.keys(), latest)
+        times = sorted({min(t for _, t, _ in found) for found in left.values()})
         stages = [
             Stage(
                 component=name,
-                state=states[name],
+                state=state,
                 channels=tuple(left.get(name, ())),
-                t_by=_sooner(latest, times, name) if states[name] in _CHANGED else None,
+                t_by=times[course.late[name]] if name in course.late else None,
             )
-            for name in way.components
+            for name, state in course.states.items()
         ]
-        changed = [s.component for s in stages if s.channels and s.state in (State.INJECTED, State.REACHED)]
         return Path(
             stages=tuple(stages),
+            crossings=course.crossings,
+            reached=course.reached,
+            stopped_at=course.stopped_at,
+        )
+
+    def course(self, experiment: Experiment, record: Record) -> Course | None:
+        """The course of an experiment, the same object for all that have it; None as of `path`."""
+        if record.outcome in (None, Outcome.NOT_ACTIVATED):
+            return None
+        firsts: dict[str, float] = {}
+        for channel, first, _ in record.left:
+            component = self.component_of.get(channel, "")
+            firsts[component] = min(first, firsts.get(component, inf))
+        place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
+        order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
+        return self._course(self._injected(experiment.fault), order, record.outcome is Outcome.MASKED)
+
+    def _course_of(
+        self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
+    ) -> Course | None:
+        """`order` has the place of the time at which each component left golden, of those that did."""
+        way = self._way_of(injected)
+        if not way.components:
+            return None
+        times = dict(order)
+        latest = self._latest(way, times)
+        states, arrived = self._states(way, times.keys(), latest)
+        late = {name: _sooner(latest, times, name) for name, state in states.items() if state in _CHANGED}
+        changed = [
+            n for n, state in states.items() if n in times and state in (State.INJECTED, State.REACHED)
+        ]
+        return Course(
+            states=states,
+            late={name: int(place) for name, place in late.items() if place is not None},
             crossings=tuple(
                 Crossing(link=name, tail=tail, tip=tip, passage=_passage(tail, tip, states, arrived))
                 for name, (tail, tip) in way.links.items()
             ),
             reached=min(reversed(changed), key=way.steps.__getitem__, default=""),
-            stopped_at=_holding(way, states, arrived) if record.outcome is Outcome.MASKED else (),
+            stopped_at=_holding(way, states, arrived) if masked else (),
         )
 
     def _states(

@@ -51,12 +51,16 @@ def channel_facts(manifest: TargetManifest) -> list[list[str]]:
 
 def columns_of(records: Iterable[Record], channels: Sequence[Sequence[str]]) -> Mapping[str, list[Any]]:
     """The columns of propagation.parquet, a row for each channel that left golden, in the records' order."""
-    facts = {name: (role, component) for name, _, role, component, _ in channels}
+    facts = {name: (component, role) for name, _, role, component, _ in channels}
     made: dict[str, list[Any]] = {column.name: [] for column in COLUMNS}
     for record in records:
         for name, first, largest in record.left:
-            role, component = facts.get(name, ("", ""))
-            cells = (record.experiment_id, name, component, role, round(first, 6), largest)
-            for column, cell in zip(made.values(), cells, strict=True):
-                column.append(cell)
+            made["channel"].append(name)
+            made["t_first"].append(round(first, 6))
+            made["max_dev"].append(largest)
+        made["experiment_id"] += [record.experiment_id] * len(record.left)
+    for name in made["channel"]:
+        component, role = facts.get(name, ("", ""))
+        made["component"].append(component)
+        made["role"].append(role)
     return made

@@ -1,13 +1,13 @@
 """The results table: a row per experiment, made from plan and records at any time, always the same bytes."""
 
-import csv
-import io
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import read_json, write_atomic, write_json
+from mutator._common.files import half_written, read_json, write_json
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
@@ -16,18 +16,19 @@ from mutator.outcomes import propagation
 from mutator.outcomes.columns import (
     T_END,
     TIMINGS,
-    Column,
     deviation_columns,
     hazard_columns,
     plan_row,
     result_columns,
     severity_columns,
 )
-from mutator.outcomes.paths import Ways, ways_of
+from mutator.outcomes.paths import ways_of
 from mutator.outcomes.propagation import columns_of
+from mutator.outcomes.table_files import CsvTable, ParquetTable
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.store import plan_file
 from mutator.store.digests import Digest
+from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
 
@@ -35,6 +36,7 @@ CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parqu
 PROPAGATION = "propagation.parquet"
 TABLES = (CSV, PARQUET, PROPAGATION, TIMINGS_PARQUET)
 SCHEMA, STAMP = "results/1", "results.json"
+_BATCH = 5_000  # experiments that are read before their rows are written
 _TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
 
 
@@ -108,47 +110,74 @@ def build(run: Path) -> Path:
     MutatorWarning tells of a table that somebody has edited: it is no more."""
     folder = RunFolder.open(run)
     made_from = _made_from(folder)
-    made = tables(folder)
-    now = {name: digest(data) for name, data in made.items()}
-    # first what is there and what will be, so that a table which a kill left is not taken for an edited one
-    before = _unedited(folder, now)
-    stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
-    write_json(folder.path / STAMP, stamp)
-    for name, data in made.items():
-        write_atomic(folder.path / name, data)
+    with ExitStack() as stack:
+        paths = {name: folder.path / name for name in reversed(names(folder))}  # the first one is kept first
+        made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
+        write(folder, made)
+        now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}
+        # first what is there and what will be, so that a table which a kill left is not taken for an edited
+        # one; then, as the block ends, the tables
+        before = _unedited(folder, now)
+        stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
+        write_json(folder.path / STAMP, stamp)
     return folder.path / CSV
 
 
-def tables(folder: RunFolder) -> dict[str, bytes]:
-    """The tables of a run folder by file name, made from its plan, records and timings."""
-    records = folder.records()
-    experiments = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
-    head = folder.head
-    metrics = head.get("metrics", ())
-    ways = ways_of(head)
-    columns = result_columns(
-        head["hazards"], head["compared"], metrics, severity_columns(head), paths=ways is not None
-    )
-    ends, scale = T_END in (name for name, *_ in metrics), folder.scale
-    done = [(e, records[e.id]) for e in experiments if e.id in records]
-    rows = [row(e, r, head["hazards"], ends=ends, scale=scale) | _path_cells(ways, e, r) for e, r in done]
-    made = {
-        CSV: _csv(rows, [column.name for column in columns]),
-        PARQUET: _parquet(_columns(rows, columns), columns),
-        TIMINGS_PARQUET: _timings(folder),
-    }
-    if "channels" in head:
-        found = columns_of((record for _, record in done), head["channels"])
-        made[PROPAGATION] = _parquet(found, propagation.COLUMNS)
-    return made
+def names(folder: RunFolder) -> tuple[str, ...]:
+    """The tables that a folder has; runs of earlier versions recorded no propagation."""
+    return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
-def _path_cells(ways: Ways | None, experiment: Experiment, record: Record) -> dict[str, object]:
-    """What the path of a fault adds to a row."""
-    path = ways.path(experiment, record) if ways else None
-    if path is None:
-        return {}
-    return {"reached": path.reached or None, "stopped_at": ";".join(path.stopped_at) or None}
+def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
+    """Write the tables of a run folder, made from its plan, records and timings, each to its path in `paths`.
+
+    Experiments are read by their ids, a batch at a time: a million takes some hundred MB.
+    """
+    records, planned, table = folder.records(), Planned(folder.path), _Table(folder)
+    with ExitStack() as stack:
+        csv = stack.enter_context(CsvTable(paths[CSV], table.columns))
+        parquet = stack.enter_context(ParquetTable(paths[PARQUET], table.columns))
+        propagated = None
+        if PROPAGATION in paths:
+            propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))
+        for batch in _batches(name for name in sorted(planned) if name in records):
+            done = [(planned[name], records[name]) for name in batch]
+            rows = [table.cells(*one) for one in done]
+            csv.append(rows)
+            parquet.append(list(zip(*rows, strict=True)))
+            if propagated:
+                found = columns_of((record for _, record in done), folder.head["channels"])
+                propagated.append(list(found.values()))
+    _write_timings(folder, paths[TIMINGS_PARQUET])
+
+
+class _Table:
+    """The columns of a run's results.csv, and the cells of its rows."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        head = folder.head
+        metrics = head.get("metrics", ())
+        self._hazards, self._scale, self._ways = head["hazards"], folder.scale, ways_of(head)
+        self._ends = T_END in (name for name, *_ in metrics)
+        self.columns = result_columns(
+            *(head["hazards"], head["compared"], metrics, severity_columns(head)),
+            paths=self._ways is not None,
+        )
+        self._names = [column.name for column in self.columns]
+
+    def cells(self, experiment: Experiment, record: Record) -> list[object]:
+        """A row, in the order of the columns."""
+        made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
+        course = self._ways.course(experiment, record) if self._ways else None
+        if course:
+            made |= {"reached": course.reached or None, "stopped_at": ";".join(course.stopped_at) or None}
+        return list(map(made.get, self._names))
+
+
+def _batches(items: Iterable[str]) -> Iterator[tuple[str, ...]]:
+    left = iter(items)
+    while batch := tuple(islice(left, _BATCH)):
+        yield batch
 
 
 def _made_from(folder: RunFolder) -> str:
@@ -165,13 +194,8 @@ def _made_from(folder: RunFolder) -> str:
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
     """Digests of the tables as they are now; None of a missing one."""
-    found = {name: Digest.of_file(folder.path / name) for name in _names(folder)}
+    found = {name: Digest.of_file(folder.path / name) for name in names(folder)}
     return {name: one.sha256 if one else None for name, one in found.items()}
-
-
-def _names(folder: RunFolder) -> tuple[str, ...]:
-    """The tables that a folder has; runs of earlier versions recorded no propagation."""
-    return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
 def _stamp(folder: RunFolder) -> dict[str, Any]:
@@ -199,32 +223,10 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
     return {name: one for name, one in found.items() if one in made[name]}
 
 
-def _csv(rows: list[dict[str, object]], columns: list[str]) -> bytes:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n", restval="", extrasaction="ignore")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue().encode()
-
-
-def _columns(rows: list[dict[str, object]], columns: Sequence[Column]) -> dict[str, list[Any]]:
-    return {column.name: [row.get(column.name) for row in rows] for column in columns}
-
-
-def _parquet(values: Mapping[str, list[Any]], columns: Sequence[Column]) -> bytes:
-    """Columns as a Parquet file; nothing in it depends on when or where it was made."""
-    import pyarrow as pa  # type: ignore[import-untyped]
-    from pyarrow import parquet
-
-    types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
-    schema = pa.schema([(column.name, types[column.type]) for column in columns])
-    table = pa.table({field.name: pa.array(values[field.name], field.type) for field in schema}, schema)
-    sink = io.BytesIO()
-    parquet.write_table(table, sink, compression="zstd")
-    return sink.getvalue()
-
-
-def _timings(folder: RunFolder) -> bytes:
+def _write_timings(folder: RunFolder, path: Path) -> None:
     """What each experiment cost, where."""
     newest = folder.timings()
-    return _parquet(_columns([newest[name] for name in sorted(newest)], TIMINGS), TIMINGS)
+    with ParquetTable(path, TIMINGS) as file:
+        for batch in _batches(sorted(newest)):
+            lines = [newest[name] for name in batch]
+            file.append([[line.get(column.name) for line in lines] for column in TIMINGS])

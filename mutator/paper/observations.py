@@ -178,8 +178,11 @@ class JudgedObservation:
     verdict: Verdict
 
 
-def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[JudgedObservation, ...]:
-    """The observations of a file, put to a frame of results.
+def judge(
+    path: Path, runs: pd.DataFrame, lacks: Sequence[str], *, only_needed: bool = False
+) -> tuple[JudgedObservation, ...]:
+    """The observations of a file, put to a frame of results; with `only_needed` only the claims that they
+    rest on.
 
     `lacks`: why these are not the paper's mixture of faults, if they are not. MutatorError with file and line
     for a file or a query that is wrong.
@@ -190,6 +193,7 @@ def judge(path: Path, runs: pd.DataFrame, lacks: Sequence[str]) -> tuple[JudgedO
         claims = tuple(
             _judged(f"{i + 1}.{k + 1}", claim, runs, lacks, source, ("observations", i, "claims", k))
             for k, claim in enumerate(observation.claims)
+            if claim.needed or not only_needed
         )
         needed = [one.verdict for one in claims if one.claim.needed]
         made.append(

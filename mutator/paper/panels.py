@@ -1,15 +1,19 @@
 """The published observations in the report of a run: judged on its results, written, shown."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from mutator._common.files import write_atomic
 from mutator.outcomes.fault_free import own_alerts
-from mutator.paper import observations, observations_page
+from mutator.paper import observations, observations_page, seeds
 from mutator.paper.observations import Verdict
 from mutator.paper.published import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import write_csv
 from mutator.report.studies import ReportedRun
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FILE = "observations.md"
 _HTML = """\
@@ -35,11 +39,17 @@ _HTML = """\
 </details>
 {% endfor %}
 <p>{{ rules | marked }}</p>
+{% if of_seeds %}
+<h3>Seed by seed</h3>
+<p>{{ about_seeds }}</p>
+{{ of_seeds.as_html() }}
+{% endif %}
 """
 
 
 def observations_panel(run: ReportedRun) -> Panel | None:
-    """The observations that the library cites, with observations.md and tables/observations.csv.
+    """The observations that the library cites, with observations.md and tables/observations.csv; of several
+    seeds also how many of them show each, with tables/observations_by_seed.csv.
 
     None when the library cites none, when the run has none of the published fault types, or when its
     experiments decide none of the observations. Those that they decide come first.
@@ -51,7 +61,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     if not (file.is_file() and has_paper(references)):
         return None
     kinds = list(dict.fromkeys(kind for _, kind in load_paper(references).coverage))
-    missing = sorted(set(kinds) - set(run.frame["kind"]))
+    missing = _missing(kinds, run.frame)
     if len(missing) == len(kinds):
         return None
     ends = run.ends() or {}
@@ -61,12 +71,17 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     if all(one.verdict is Verdict.UNDECIDED for one in judged):
         return None
     shown_ends = tuple(sorted(ends.items()))
+    by_seed = seeds.judge_by_seed(file, frame, lambda runs: list(_lacks(run, _missing(kinds, runs))))
+    of_seeds = seeds.table(judged, by_seed) if by_seed else None
     write_atomic(run.out / FILE, observations_page.markdown(judged, shown_ends, coverage).encode())
     write_csv(observations_page.sheet(judged), run.out)
+    if by_seed:
+        write_csv(seeds.sheet(by_seed), run.out)
     parts = [
         "## The paper's observations",
         coverage,
         observations_page.verdicts(judged),
+        *(("### Seed by seed", seeds.ABOUT, of_seeds.as_markdown()) if of_seeds else ()),
         f"Their claims, rules, numbers and queries are in [{FILE}]({FILE}).",
     ]
     html = rendered(
@@ -77,8 +92,17 @@ def observations_panel(run: ReportedRun) -> Panel | None:
         table=observations_page.table,
         session=observations_page.session(shown_ends),
         rules=observations_page.rules(),
+        of_seeds=of_seeds,
+        about_seeds=seeds.ABOUT,
     )
-    return Panel(anchor="observations", link="Observations", markdown="\n\n".join(parts), html=html)
+    return Panel(
+        anchor="observations", link="Observations", markdown="\n\n".join(parts), html=html, summary=of_seeds
+    )
+
+
+def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
+    """The fault types of the paper that are not in these runs."""
+    return sorted(set(kinds) - set(runs["kind"].unique()))
 
 
 def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:

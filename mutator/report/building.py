@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mutator._common.files import write_atomic
+from mutator._common.tables import Table
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import outcome_counts
 from mutator.report.browse import browse_data
@@ -24,11 +25,13 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """Where a report was written, and how many experiments it has."""
+    """Where a report was written, and how many experiments it has; `summaries` are tables of it that fit a
+    terminal, if it was written now."""
 
     markdown: Path
     page: Path
     rows: int
+    summaries: tuple[Table, ...] = ()
 
 
 STUDY_FILES = ("STUDY.md", "study.html")  # of the report, where a study has something to say
@@ -62,7 +65,8 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     write_atomic(text, markdown(content).encode())
     write_atomic(hypertext, page_html(content).encode())
     write_stamp(out, sources)
-    return Report(markdown=text, page=hypertext, rows=len(reported.rows))
+    summaries = tuple(panel.summary for panel in (*content.panels, *study) if panel.summary)
+    return Report(markdown=text, page=hypertext, rows=len(reported.rows), summaries=summaries)
 
 
 def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:

@@ -4,6 +4,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.tables import Table
+
 if TYPE_CHECKING:
     from markupsafe import Markup
 
@@ -14,13 +16,15 @@ FOLDER = "report"  # of a run folder
 class Panel:
     """One part of a report with its headings: `##` in Markdown, `<h2>` in HTML.
 
-    `anchor` is its id in the page, `link` its name in the page's bar.
+    `anchor` is its id in the page, `link` its name in the page's bar; `summary` is what the command line
+    shows of it, if anything.
     """
 
     anchor: str
     link: str
     markdown: str
     html: "Markup"
+    summary: Table | None = None
 
 
 def rendered(template: str, **values: Any) -> "Markup":

@@ -23,6 +23,13 @@ class P(float):
         return "< 0.0001" if self < 0.0001 else f"{float(self):.4f}"
 
 
+class Rate(float):
+    """A share alone, of 1: read in %."""
+
+    def __str__(self) -> str:
+        return "-" if math.isnan(self) else f"{100 * float(self):.1f} %"
+
+
 Cell = Share | float | int | str | None
 
 
@@ -38,7 +45,7 @@ class Sheet:
 
     def table(self) -> Table:
         """The cells as texts to be read."""
-        return Table(heads=self.heads, rows=[[_text(cell) for cell in line] for line in self.lines])
+        return Table(heads=self.heads, rows=[[text_of(cell) for cell in line] for line in self.lines])
 
     def markdown(self) -> str:
         """Title, note and table."""
@@ -86,7 +93,8 @@ def _number(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.6g}"
 
 
-def _text(cell: Cell) -> str:
+def text_of(cell: Cell) -> str:
+    """A cell as it is read."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "-"
-    return str(cell) if isinstance(cell, P) or not isinstance(cell, float) else f"{cell:.3g}"
+    return str(cell) if isinstance(cell, P | Rate) or not isinstance(cell, float) else f"{cell:.3g}"

@@ -152,7 +152,7 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     damaged: list[int] = []
     last = b""
     for number, line in enumerate(data[:end].split(b"\n")[:-1], start=1):
-        if not checksums or line == _line(last, line[_BODY:])[:-1]:
+        if not checksums or _is_intact(last, line):
             lines[number] = line
         else:
             damaged.append(number)
@@ -160,9 +160,45 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     return Segment(path=path, checksums=checksums, lines=lines, damaged=tuple(damaged), end=end)
 
 
+def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tuple[int, int, bytes]]:
+    """Number, offset and bytes (without the line's end) of each whole line after the head, one at a time.
+
+    MutatorError for a damaged line, and for a file that is missing, or of another schema or name.
+    """
+    last, offset = b"", 0
+    with _no_pipe(path).open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            if not line.endswith(b"\n"):  # torn: a kill left it
+                return
+            data = line[:-1]
+            if checksums and not _is_intact(last, data):
+                raise bare_segment(path, checksums=checksums).problem(number)
+            if number == 1:
+                bare_segment(path, {1: data}, checksums=checksums).check_head(schema)
+            else:
+                yield number, offset, data
+            last = line[_SUM]
+            offset += len(line)
+
+
+def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None, *, checksums: bool) -> Segment:
+    """A file of which no more than these lines is known."""
+    return Segment(path=path, checksums=checksums, lines=lines or {}, damaged=(), end=0)
+
+
+def _is_intact(last: bytes, line: bytes) -> bool:
+    """Whether a line, which follows on the checksum `last`, has the bytes that its own was taken of."""
+    found = sha256(last + line[_BODY:]).hexdigest()[:_WIDTH].encode()
+    return line[:_BODY] == b"".join((_KEY, found, _AFTER))
+
+
 def _read(path: Path) -> bytes:
+    return _no_pipe(path).read_bytes()
+
+
+def _no_pipe(path: Path) -> Path:
     if path.is_file():  # nobody waits for what a pipe may say
-        return path.read_bytes()
+        return path
     raise MutatorError(
         "no file",
         where=path,

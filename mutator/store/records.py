@@ -7,7 +7,7 @@ from typing import Any
 
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
-from mutator.store.lines import read_segment
+from mutator.store.indexed_lines import IndexedLines, Line
 
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
@@ -41,35 +41,38 @@ def record_from(data: Mapping[str, Any]) -> Record:
         t_end=data.get("t_end"),
         dev=_pairs(data.get("dev", [])),
         metrics=_pairs(data.get("metrics", [])),
-        left=tuple((name, first, largest) for name, first, largest in data.get("left", [])),
+        left=tuple([(name, first, largest) for name, first, largest in data.get("left", ())]),
     )
 
 
 def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
-    return tuple((name, value) for name, value in items)
+    return tuple([(name, value) for name, value in items])  # a list: faster than a generator
 
 
-def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> dict[str, Record]:
+def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:
     """The final record of each experiment id that has one (torn last lines are skipped).
 
     Any other record goes before a harness error. MutatorError for a damaged line and for a second record of
     one experiment; CheckFailed when the two differ.
     """
-    records: dict[str, Record] = {}
-    for path in sorted((run / folder).glob("*.jsonl")):
-        segment = read_segment(path, checksums=checksums)
-        for number, data in segment.objects(SCHEMA):
-            try:
-                record = record_from(data)
-            except (KeyError, TypeError, ValueError):
-                raise segment.problem(number) from None
-            known = records.setdefault(record.experiment_id, record)
-            if known is record or record.status is Status.HARNESS_ERROR:
-                continue
-            if known.status is not Status.HARNESS_ERROR:
-                raise second_record(path, number, record.experiment_id, same=known == record)
-            records[record.experiment_id] = record
-    return records
+    paths = sorted((run / folder).glob("*.jsonl"))
+    return IndexedLines(paths, SCHEMA, record_from, _replaces, checksums=checksums)
+
+
+def _replaces(line: Line, known: Line) -> bool:
+    """Whether a second record of an experiment is the one that counts."""
+    record, before = (record_from(one.content()) for one in (line, known))
+    if record.status is Status.HARNESS_ERROR:
+        return False
+    if before.status is not Status.HARNESS_ERROR:
+        raise second_record(line.path, line.number, record.experiment_id, same=before == record)
+    return True
+
+
+def read_timings(run: Path, *, checksums: bool = True) -> IndexedLines[dict[str, Any]]:
+    """The newest line of timings of each experiment that has one."""
+    paths = sorted((run / "timings").glob("*.jsonl"))
+    return IndexedLines(paths, TIMINGS_SCHEMA, dict, lambda line, known: True, checksums=checksums)
 
 
 def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:

@@ -25,7 +25,7 @@ DIR/
   work/                                          scratch of running experiments
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -36,9 +36,8 @@ from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
-from mutator.store.lines import read_segment
 from mutator.store.patches import Patches
-from mutator.store.records import TIMINGS_SCHEMA, read_records
+from mutator.store.records import read_records, read_timings
 from mutator.store.run_head import FIRST_SCHEMA, HEAD, Head, read_head
 from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
@@ -233,25 +232,18 @@ class RunFolder:
                 raise problem
         return self.patches.read(experiment_id)
 
-    def records(self, kind: str = "records") -> dict[str, Record]:
-        """The records of the experiments, or those of the `proof`, by experiment id."""
+    def records(self, kind: str = "records") -> Mapping[str, Record]:
+        """The records of the experiments, or those of the `proof`, by experiment id; each is parsed when it
+        is asked for."""
         return read_records(self.path, kind, checksums=self.verifiable)
 
     def comparable(self, record: Record) -> Record:
         """A record of today as one of this folder has it: earlier schemas knew nothing of patches."""
         return record if self.verifiable else replace(record, patch="")
 
-    def timings(self) -> dict[str, dict[str, Any]]:
-        """What each experiment cost, where: its newest line, by experiment id."""
-        newest: dict[str, dict[str, Any]] = {}
-        for path in sorted((self.path / "timings").glob("*.jsonl")):
-            segment = read_segment(path, checksums=self.verifiable)
-            for number, line in segment.objects(TIMINGS_SCHEMA):
-                try:
-                    newest[line["experiment_id"]] = line
-                except (KeyError, TypeError):
-                    raise segment.problem(number) from None
-        return newest
+    def timings(self) -> Mapping[str, dict[str, Any]]:
+        """What each experiment cost, where: its newest line, by experiment id; as `records`."""
+        return read_timings(self.path, checksums=self.verifiable)
 
     @property
     def canary(self) -> Experiment:

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TextIO
 
 from mutator.errors import MutatorError
 from mutator.outcomes import results
@@ -21,24 +23,30 @@ def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
 def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
     if not there:
         return
-    made = results.tables(folder)
-    for name in there:
-        path = folder.path / name
-        if name == results.CSV:
-            yield from _cells(path, made[name])
-        elif name not in made or not same_parquet(path, made[name]):
-            yield MutatorError("not what the records give", where=path, remedy=_REMEDY)
+    with TemporaryDirectory() as scratch:
+        made = {name: Path(scratch) / name for name in results.names(folder)}
+        results.write(folder, made)
+        for name in there:
+            path = folder.path / name
+            if name == results.CSV:
+                yield from _cells(path, made[name])
+            elif name not in made or not same_parquet(path, made[name]):
+                yield MutatorError("not what the records give", where=path, remedy=_REMEDY)
 
 
-def _cells(path: Path, made: bytes) -> Iterator[MutatorError]:
+def _cells(path: Path, made: Path) -> Iterator[MutatorError]:
     """The lines that differ, each by its first cell that does."""
-    found, wanted = (data.decode("utf-8", "replace").split("\n") for data in (path.read_bytes(), made))
-    for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
-        if got is None or expected is None:
-            told = [f"'{line}'" if line is not None else "no line" for line in (got, expected)]
-        elif got != expected:
-            cells = zip_longest(got.split(","), expected.split(","), fillvalue="")
-            told = [f"'{cell}'" for cell in next(pair for pair in cells if pair[0] != pair[1])]
-        else:
-            continue
-        yield MutatorError(told[0], where=path, line=number, expected=told[1], remedy=_REMEDY)
+    with _opened(path) as found, _opened(made) as wanted:
+        for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
+            if got is None or expected is None:
+                told = [f"'{line.rstrip()}'" if line is not None else "no line" for line in (got, expected)]
+            elif got != expected:
+                cells = zip_longest(got.split(","), expected.split(","), fillvalue="")
+                told = [f"'{cell.rstrip()}'" for cell in next(pair for pair in cells if pair[0] != pair[1])]
+            else:
+                continue
+            yield MutatorError(told[0], where=path, line=number, expected=told[1], remedy=_REMEDY)
+
+
+def _opened(path: Path) -> TextIO:
+    return path.open(encoding="utf-8", errors="replace", newline="\n")

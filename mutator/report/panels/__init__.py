@@ -6,12 +6,13 @@ A panel is made by a function from `ReportedRun` to `Panel`, or to None where th
 from collections.abc import Callable
 
 from mutator.report.panel import Panel
-from mutator.report.panels import failed, figures, origin, paths, tables
+from mutator.report.panels import failed, figures, origin, paths, seeds, tables
 from mutator.report.studies import ReportedRun
 
 PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
     paths.paths_panel,
     tables.tables_panel,
+    seeds.seeds_panel,
     figures.figures_panel,
     failed.failed_panel,
     origin.origin_panel,

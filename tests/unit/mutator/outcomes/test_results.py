@@ -1,22 +1,26 @@
 """The results table: its columns, its cells, its bytes."""
 
 import csv
+import io
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from mutator._common.files import write_atomic
+from mutator._common.files import half_written
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
-from mutator.outcomes import results
-from mutator.outcomes.columns import result_columns, severity_columns
+from mutator.outcomes import propagation, results, table_files
+from mutator.outcomes.columns import TIMINGS, Column, result_columns, severity_columns
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
@@ -219,6 +223,79 @@ def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable
     assert [table.read_bytes() for table in tables] == before
 
 
+def made_at_once(folder: RunFolder) -> dict[str, bytes]:
+    """The tables as they were made when all rows were in memory, up to version 0.2."""
+    records = folder.records()
+    planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
+    done = [(e, records[e.id]) for e in planned if e.id in records]
+    columns = results._Table(folder).columns
+    names = [column.name for column in columns]
+    rows = [dict(zip(names, results._Table(folder).cells(*one), strict=True)) for one in done]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
+    writer.writeheader()
+    writer.writerows(rows)
+    lines = [line for _, line in sorted(folder.timings().items())]
+    left = [(r.experiment_id, *one) for _, r in done for one in r.left]
+    facts = {name: (component, role) for name, _, role, component, _ in folder.head["channels"]}
+    cells = [(name, ch, *facts.get(ch, ("", "")), round(first, 6), most) for name, ch, first, most in left]
+    left_names = [column.name for column in propagation.COLUMNS]
+    return {
+        results.CSV: text.getvalue().encode(),
+        results.PARQUET: parquet_at_once(rows, columns),
+        results.TIMINGS_PARQUET: parquet_at_once(lines, TIMINGS),
+        results.PROPAGATION: parquet_at_once(
+            [dict(zip(left_names, one, strict=True)) for one in cells], propagation.COLUMNS
+        ),
+    }
+
+
+def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> bytes:
+    types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
+    schema = pa.schema([(column.name, types[column.type]) for column in columns])
+    arrays = {c.name: pa.array([row.get(c.name) for row in rows], types[c.type]) for c in columns}
+    sink = io.BytesIO()
+    pq.write_table(pa.table(arrays, schema), sink, compression="zstd")
+    return sink.getvalue()
+
+
+@pytest.mark.parametrize("batch", [1, 7, 5_000])
+def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int
+) -> None:
+    """However many experiments are read at a time, the files are those of the version that had all rows in
+    memory; those of a run without a record, too."""
+    left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
+    last = plan_file.read_all(folder.path)[22]
+    lines = LineWriter(
+        folder.path / "records" / "0002-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+    )
+    lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
+    lines.close()
+    monkeypatch.setattr(results, "_BATCH", batch)
+    for _ in range(2):
+        results.build(folder.path)
+        made = {name: (folder.path / name).read_bytes() for name in results.TABLES}
+        assert made == made_at_once(folder)
+        for kind in ("records", "timings"):
+            for path in (folder.path / kind).iterdir():
+                path.unlink()
+
+
+def test_a_long_table_has_several_row_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Parquet file has row groups of one size but for the last, whatever the batches; no empty one."""
+    monkeypatch.setattr(table_files, "_ROWS", 4)
+    columns = (Column("n", "count", "", ""),)
+    for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
+        for batch in (1, 3, 20):
+            with table_files.ParquetTable(tmp_path / "t.parquet", columns) as file:
+                for first in range(0, size, batch):
+                    file.append([range(first, min(size, first + batch))])
+            found = pq.ParquetFile(tmp_path / "t.parquet")
+            assert [found.metadata.row_group(i).num_rows for i in range(found.num_row_groups)] == groups
+            assert found.read()["n"].to_pylist() == list(range(size))
+
+
 def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
     built: list[Path] = []
     monkeypatch.setattr(results, "build", lambda run: built.append(run) or run / results.CSV)
@@ -285,13 +362,15 @@ def test_a_table_that_a_kill_left_is_no_edited_one(
         lines.append(asdict(record(planned[20 + number].id, max_dev=(("gas", 0.5),))))
         lines.close()
 
-        def write(path: Path, data: bytes, stop: str = killed_before) -> None:
-            if path.name == stop:
-                raise KeyboardInterrupt
-            write_atomic(path, data)
+        @contextmanager
+        def written(path: Path, stop: str = killed_before) -> Iterator[Path]:
+            with half_written(path) as temporary:
+                yield temporary
+                if path.name == stop:
+                    raise KeyboardInterrupt
 
         with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-            patch.setattr(results, "write_atomic", write)
+            patch.setattr(results, "half_written", written)
             results.ensure(folder.path)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -79,7 +79,7 @@ def test_a_line_that_is_no_record_is_told(tmp_path: Path) -> None:
     writer.append({"experiment_id": 3})
     writer.close()
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
-        read_records(tmp_path)
+        read_records(tmp_path)["3"]
 
 
 def test_newer_schema_is_refused(tmp_path: Path) -> None:

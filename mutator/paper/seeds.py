@@ -1,0 +1,73 @@
+"""The published observations seed by seed: how many seeds show each of them."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from mutator._common.tables import Table
+from mutator.paper.observations import JudgedObservation, Verdict, judge
+from mutator.statistics.seeds import seeds_of
+from mutator.statistics.sheet import Cell, Sheet
+
+BySeed = Mapping[str, Sequence[JudgedObservation]]
+
+ABOUT = (
+    "Each seed is the whole campaign with other draws, and its observations are judged on its runs alone, by "
+    "the same rules. A seed has fewer runs than all together, so more of it cannot be told."
+)
+
+
+def judge_by_seed(path: Path, runs: pd.DataFrame, lacks: Callable[[pd.DataFrame], Sequence[str]]) -> BySeed:
+    """The observations of a file, put to the runs of each seed by itself; nothing of a single seed.
+
+    `lacks` says of a seed's runs why they are not the paper's mixture of faults.
+    """
+    seeds = seeds_of(runs)
+    if len(seeds) < 2:
+        return {}
+    groups = {str(seed): group for seed, group in runs.groupby("seed", observed=True)}
+    return {seed: judge(path, groups[seed], lacks(groups[seed]), only_needed=True) for seed in seeds}
+
+
+def table(together: Sequence[JudgedObservation], by_seed: BySeed) -> Table:
+    """How many seeds show each observation, and what all seeds together say."""
+    heads = ("observation", "", "all seeds together", *(verdict.value for verdict in Verdict), "seeds")
+    rows = [
+        (
+            *(str(one.number), one.title, one.verdict.value),
+            *(str(len(_seeds_of(one.number, verdict, by_seed))) for verdict in Verdict),
+            str(len(by_seed)),
+        )
+        for one in together
+    ]
+    return Table(heads=heads, rows=rows, right=range(3, len(heads)))
+
+
+def _seeds_of(number: int, verdict: Verdict, by_seed: BySeed) -> list[str]:
+    """The seeds whose verdict on an observation is this one."""
+    return [seed for seed, judged in by_seed.items() if judged[number - 1].verdict is verdict]
+
+
+def sheet(by_seed: BySeed) -> Sheet:
+    """A line for each seed and each query of a claim that an observation rests on."""
+    return Sheet(
+        name="observations_by_seed",
+        title="The paper's observations by seed",
+        note=ABOUT,
+        heads=(
+            *("seed", "observation", "verdict of the observation", "claim", "says", "group"),
+            *("N", "estimate", "low", "high", "verdict"),
+        ),
+        lines=tuple(_cells(by_seed)),
+    )
+
+
+def _cells(by_seed: BySeed) -> Iterator[tuple[Cell, ...]]:
+    for seed, judged in by_seed.items():
+        for one in judged:
+            for claim in one.claims:
+                for a in claim.answers:
+                    head = (int(seed), one.number, one.verdict.value, claim.number, claim.claim.says, a.group)
+                    numbers = (a.found.n, a.found.estimate, a.found.low, a.found.high)
+                    yield (*head, *numbers, a.verdict.value)

@@ -1,0 +1,45 @@
+"""How far the seeds of a campaign lie apart; nothing of a run with one seed."""
+
+from mutator._common.tables import Table
+from mutator.report.panel import Panel, rendered
+from mutator.report.panels.tables import write_sheets
+from mutator.report.studies import ReportedRun
+from mutator.statistics.seeds import ALL, kinds_sheet, seeds_of, seeds_sheet
+from mutator.statistics.sheet import Sheet, text_of
+
+_HTML = """\
+<h2>Seeds</h2>
+<p>{{ about }}</p>
+{% for sheet in sheets %}
+<details class="table"{{ " open" if loop.first }}>
+<summary><h3>{{ sheet.title }}</h3></summary>
+<p>{{ sheet.note | marked }}</p>
+{{ sheet.table().as_html() }}
+</details>
+{% endfor %}
+"""
+
+
+def seeds_panel(run: ReportedRun) -> Panel | None:
+    """The spread of each share between the seeds, with tables/seeds.csv and seeds_by_fault_type.csv."""
+    seeds = seeds_of(run.frame)
+    if len(seeds) < 2:
+        return None
+    sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), kinds_sheet(run.frame))
+    write_sheets(sheets, run.out)
+    about = f"{len(seeds)} seeds, from {seeds[0]} to {seeds[-1]}: each is the campaign with other draws."
+    markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
+    html = rendered(_HTML, about=about, sheets=sheets)
+    return Panel(anchor="seeds", link="Seeds", markdown=markdown, html=html, summary=_summary(sheets[0]))
+
+
+def _summary(sheet: Sheet) -> Table:
+    """The shares over all faults, in fewer columns."""
+    rows = []
+    for faults, part, whole, share, *cells, _ in sheet.lines:
+        if faults == ALL:
+            low, high, least, its, largest, other = map(text_of, cells)
+            ends = [f"{least} (seed {its})", f"{largest} (seed {other})"] if its != "-" else ["-", "-"]
+            rows.append([f"{part} / {whole}", text_of(share), f"{low} to {high}", *ends])
+    heads = ("share", "all seeds, 95 % of runs", "95 % between seeds", "least", "largest")
+    return Table(heads=heads, rows=rows)

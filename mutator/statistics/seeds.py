@@ -1,0 +1,124 @@
+"""How far the seeds of a campaign lie apart: each of them is the whole campaign with other draws.
+
+An interval over runs takes these as independent, and says nothing of what was drawn. Here whole seeds are
+drawn anew, as often as there are seeds: that is how far the share of another campaign of as many may lie.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mutator.statistics.frame import hazard_names
+from mutator.statistics.paired import resampled_interval
+from mutator.statistics.shares import share
+from mutator.statistics.sheet import Cell, Rate, Sheet
+
+ALL = "all"  # what the lines of all faults begin with
+_NOTE = (
+    "Beside the 95 % Wilson interval of all seeds together, the one between seeds: whole seeds drawn anew, "
+    "9,999 times, percentiles (none where all seeds say the same); then the seeds with the least and the "
+    "largest share."
+)
+_HEADS = (
+    *("faults", "what", "of", "all seeds", "between seeds, low", "between seeds, high"),
+    *("least", "seed of the least", "largest", "seed of the largest", "seeds"),
+)
+_INJECTED, _ACTIVATED, _HAZARDS = "injected", "activated", "hazards"
+_BY_KIND = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTED))
+
+
+def seeds_of(frame: pd.DataFrame) -> list[str]:
+    """The seeds of a frame, by their size; '' of a row stands for none."""
+    return sorted(filter(None, map(str, frame["seed"].unique())), key=int)
+
+
+def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
+    """Each share over all faults and over those of each method; `alerts` if the target has some. A single
+    seed has no lines."""
+    methods = sorted(map(str, frame["method"].unique()))
+    groups = {ALL: np.ones(len(frame), dtype=bool)}
+    if len(methods) > 1:
+        groups |= {name: (frame["method"] == name).to_numpy() for name in methods}
+    return Sheet(
+        name="seeds",
+        title="Spread between seeds",
+        note=_NOTE,
+        heads=_HEADS,
+        lines=tuple(_lines(frame, groups, _shares(frame, alerts=alerts))),
+    )
+
+
+def kinds_sheet(frame: pd.DataFrame) -> Sheet:
+    """The same of each fault type, in few shares."""
+    kinds = sorted(map(str, frame["kind"].unique()))
+    groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
+    return Sheet(
+        name="seeds_by_fault_type",
+        title="Spread between seeds by fault type",
+        note=_NOTE,
+        heads=("fault type", *_HEADS[1:]),
+        lines=tuple(_lines(frame, groups, _BY_KIND)),
+    )
+
+
+def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
+    """What is counted, of what."""
+    made = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_BY_KIND[1:]]
+    made += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
+    if alerts:
+        made += [("alerts", _ACTIVATED), ("alerts", _INJECTED)]
+        made += [("hazards without alert", whole) for whole in (_ACTIVATED, _HAZARDS)]
+        made += [("alerts without hazard", _ACTIVATED)]
+    return made
+
+
+def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Whether each run is counted, by what may be counted."""
+    hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
+    return {
+        _INJECTED: np.ones(len(frame), dtype=bool),
+        _ACTIVATED: frame["is_activated"].to_numpy(dtype=bool),
+        "manifested": frame["is_manifested"].to_numpy(dtype=bool),
+        _HAZARDS: hazard,
+        "alerts": alert,
+        "hazards without alert": hazard & ~alert,
+        "alerts without hazard": alert & ~hazard,
+        **{name: frame[f"t_{name.lower()}"].notna().to_numpy() for name in hazard_names(frame)},
+    }
+
+
+def _lines(
+    frame: pd.DataFrame, groups: Mapping[str, np.ndarray], shares: Sequence[tuple[str, str]]
+) -> Iterator[tuple[Cell, ...]]:
+    seeds = seeds_of(frame)
+    if len(seeds) < 2:
+        return
+    codes, flags = pd.Categorical(frame["seed"].astype(str), categories=seeds).codes, _flags(frame)
+    for group, chosen in groups.items():
+        for part, whole in shares:
+            of = chosen & flags[whole] & (codes >= 0)
+            counts, wholes = (
+                np.bincount(codes[rows], minlength=len(seeds)) for rows in (of & flags[part], of)
+            )
+            yield (group, part, whole, *_spread(seeds, counts, wholes))
+
+
+def _spread(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[Cell, ...]:
+    """The cells of a share, by its counts and wholes in each seed."""
+    low, high = resampled_interval((counts, wholes), _rate)
+    known = [(count / of, int(seed)) for seed, count, of in zip(seeds, counts, wholes, strict=True) if of]
+    least, largest = min(known, default=None), min(known, key=lambda k: (-k[0], k[1]), default=None)
+    return (
+        share(int(counts.sum()), int(wholes.sum())),
+        *(Rate(low), Rate(high)),
+        *((Rate(least[0]), least[1]) if least else (None, None)),
+        *((Rate(largest[0]), largest[1]) if largest else (None, None)),
+        len(known),
+    )
+
+
+def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:
+    with np.errstate(invalid="ignore"):  # of draws in which there was nothing to count: NaN
+        return np.sum(counts, axis=axis) / np.sum(wholes, axis=axis)

@@ -1,0 +1,55 @@
+"""The experiments of a plan by id, each parsed when it is asked for."""
+
+import json
+import re
+from array import array
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from mutator.model import Experiment
+from mutator.store import plan_file
+from mutator.store.indexed_lines import Files
+
+_ID = re.compile(rb'"id":"([^"\\]+)"')
+
+
+class Planned(Mapping[str, Experiment]):
+    """Those of the run folder at `run`, in the plan's order.
+
+    MutatorError, when one is asked for, for a line that is damaged or is not what its id stands for.
+    """
+
+    def __init__(self, run: Path) -> None:
+        self._path = run / plan_file.EXPERIMENTS
+        self._faults = plan_file.read_faults(run)
+        self._files = Files([self._path])
+        self._index: dict[str, int] = {}
+        self._offsets = array("Q", [0])
+        for number, line in enumerate(plan_file.lines_of(self._path)):
+            self._offsets.append(self._offsets[-1] + len(line))
+            self._index.setdefault(_id(line) or str(number), number)
+
+    def __getitem__(self, name: str) -> Experiment:
+        number = self._index[name]
+        begin, end = self._offsets[number : number + 2]
+        line = self._files.read(0, begin, end - begin)
+        return plan_file.experiment_on(self._path, number + 1, line, self._faults)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._index
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._index)
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+
+def _id(line: bytes) -> str | None:
+    """The id on a line; None where there is none: what is on it is told when it is asked for."""
+    if found := _ID.search(line):
+        return found[1].decode()
+    try:
+        return str(json.loads(line)["id"])
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return None

@@ -1,0 +1,67 @@
+"""The observations seed by seed: how many seeds show each, of hand-made results with known answers."""
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from mutator.paper.observations import Verdict, judge
+from mutator.paper.seeds import judge_by_seed, sheet, table
+
+from ..statistics.results_frame import results
+
+OBSERVATIONS = """\
+schema: paper_observations/1
+source: made up
+observations:
+  - title: Most faults are hazards.
+    claims:
+      - {says: most are, measure: share, of: is_activated, part: is_hazard, holds: {above: 0.5}, needed: true}
+      - {says: all are, measure: share, of: is_activated, part: is_hazard, holds: {above: 0.99}}
+  - title: There are alerts.
+    claims:
+      - says: one has
+        measure: share
+        of: is_activated
+        part: is_alert
+        holds: {some: 0.3}
+        needed: true
+        mixture: true
+"""
+
+
+def seed(number: int, hazards: int, *, alert: bool = False) -> list[dict[str, Any]]:
+    """20 activated runs of a seed, of which the first ones have a hazard, and the very first one an alert."""
+    ran = {"seed": number, "t_activation": 1.0}
+    made = [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(20)]
+    return [made[0] | ({"t_alert": 3.0} if alert else {}), *made[1:]]
+
+
+def frame() -> pd.DataFrame:
+    """Seed 3 shows the first observation, seed 1 denies it, two cannot tell; all but 12 show the other."""
+    return results(*seed(11, 11, alert=True), *seed(3, 20, alert=True), *seed(1, 0, alert=True), *seed(12, 9))
+
+
+def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
+    """Of each observation: what all seeds say together, and in how many it holds, does not, and cannot be
+    told; the seeds by their size; claims on which nothing rests are not asked."""
+    file = tmp_path / "observations.yaml"
+    file.write_text(OBSERVATIONS)
+    found = judge_by_seed(file, frame(), lambda runs: [])
+    assert list(found) == ["1", "3", "11", "12"]
+    rows = table(judge(file, frame(), []), found).rows
+    assert [row[2:] for row in rows] == [
+        (Verdict.UNDECIDED, "1", "1", "2", "4"),
+        (Verdict.HOLDS, "3", "1", "0", "4"),
+    ]
+    lines = sheet(found).lines
+    assert len(lines) == 8 and lines[2][:4] == (3, 1, "holds", "1.1")
+
+
+def test_seeds_that_lack_fault_types_cannot_tell_of_all(tmp_path: Path) -> None:
+    """What a seed lacks is asked of its own runs; one seed alone has nothing beside it."""
+    file = tmp_path / "observations.yaml"
+    file.write_text(OBSERVATIONS)
+    found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {"3"} else [])
+    assert [found[name][1].verdict for name in ("1", "3")] == [Verdict.HOLDS, Verdict.UNDECIDED]
+    assert judge_by_seed(file, results(*seed(1, 5)), lambda runs: []) == {}

@@ -1,0 +1,66 @@
+"""Lines of files by the experiment that they are of: read when asked for, verified at once."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.store.indexed_lines import IndexedLines
+from mutator.store.lines import LineWriter, written
+
+SCHEMA = "things/1"
+
+
+def things(folder: Path, **files: list[dict[str, Any]]) -> IndexedLines[dict[str, Any]]:
+    """The newest line of each experiment in these files."""
+    for name, lines in files.items():
+        path = folder / f"{name}.jsonl"
+        path.write_bytes(written(path, {"schema": SCHEMA}, lines))
+    return opened(folder)
+
+
+def opened(folder: Path) -> IndexedLines[dict[str, Any]]:
+    paths = sorted(folder.glob("*.jsonl"))
+    return IndexedLines(paths, SCHEMA, dict, lambda line, known: True, checksums=True)
+
+
+def test_the_newest_line_counts_in_the_place_of_the_first(tmp_path: Path) -> None:
+    """Experiments come in the order of their first lines, each with its last one, whatever else names one;
+    many files are read with few of them open."""
+    told = {"note": '"experiment_id":"zz"', "within": ['{"experiment_id":"yy"}']}
+    many = {f"f{i:02}": [{"experiment_id": f"e{i}", "n": i}] for i in range(30)}
+    found = things(tmp_path, a=[{"experiment_id": "aa", "n": 0, **told}], b=[{"experiment_id": "bb"}], **many)
+    assert list(found)[:3] == ["aa", "bb", "e0"] and len(found) == 32 and "zz" not in found
+    assert found["aa"] == {"experiment_id": "aa", "n": 0, **told}
+    assert [found[f"e{i}"]["n"] for _ in range(2) for i in range(30)] == [*range(30)] * 2
+    again = things(tmp_path, g=[{"experiment_id": "aa", "n": 1}])
+    assert next(iter(again)) == "aa" and again["aa"]["n"] == 1
+
+
+def test_damage_is_told_before_anything_is_read(tmp_path: Path) -> None:
+    """A changed line is an error with its number at once; what a kill cut off at the end is none."""
+    things(tmp_path, a=[{"experiment_id": "aa", "n": 10}, {"experiment_id": "bb", "n": 20}])
+    path = tmp_path / "a.jsonl"
+    data = path.read_bytes()
+    path.write_bytes(data[:-4])
+    assert list(opened(tmp_path)) == ["aa"]
+    path.write_bytes(data.replace(b"10", b"11"))
+    with pytest.raises(MutatorError, match=r"a\.jsonl:2: a damaged line"):
+        opened(tmp_path)
+
+
+def test_a_line_that_is_nothing_of_the_kind(tmp_path: Path) -> None:
+    """A line without an experiment is an error at once, one that cannot be made into what it should be is
+    one when it is asked for, both with file and line."""
+    path = tmp_path / "a.jsonl"
+    lines = LineWriter(path, {"schema": SCHEMA})
+    lines.append({"experiment_id": "aa"})
+    lines.close()
+    found = IndexedLines(
+        [path], SCHEMA, lambda line: int(line["n"]), lambda line, known: True, checksums=True
+    )
+    with pytest.raises(MutatorError, match=r"a\.jsonl:2: a damaged line"):
+        found["aa"]
+    with pytest.raises(MutatorError, match=r"b\.jsonl:2: a damaged line"):
+        things(tmp_path, b=[{"n": 1}])
