@@ -1,0 +1,213 @@
+"""Cluster files: which kind of cluster is started for a run, with how many workers and which options.
+
+The kinds are a fixed list of classes of dask-jobqueue and dask-kubernetes; a file never names what to import.
+"""
+
+import difflib
+import importlib
+import inspect
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field
+
+from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.errors import MutatorError
+from mutator.execution.cluster.connecting import (
+    certificates,
+    connected,
+    importing,
+    is_closed,
+    is_loopback,
+    own_scheduler,
+    refused,
+)
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+SCHEMA = "cluster/1"
+KUBERNETES = "kubernetes"
+_CLASSES = {
+    "slurm": ("dask_jobqueue", "SLURMCluster"),
+    "pbs": ("dask_jobqueue", "PBSCluster"),
+    "sge": ("dask_jobqueue", "SGECluster"),
+    "lsf": ("dask_jobqueue", "LSFCluster"),
+    KUBERNETES: ("dask_kubernetes.operator", "KubeCluster"),
+}
+# Not for a file to say: what is set here, and what takes Python objects.
+_OURS = {
+    "self",
+    "args",
+    "kwargs",
+    "base_class_kwargs",
+    "job_kwargs",
+    "asynchronous",
+    "loop",
+    "n_workers",
+    "name",
+}
+_OURS |= {"scheduler", "scheduler_cls", "job_cls", "config_name", "shutdown_on_close"}
+_RENEWED_EVERY = "5s"  # a job that has ended, as its time was over, is replaced by another
+
+
+class ClusterModel(StrictModel):
+    """A cluster that a run starts, and ends when it ends itself."""
+
+    kind: Literal["slurm", "pbs", "sge", "lsf", "kubernetes"] = Field(
+        description="The queueing system that starts the workers as jobs, or Kubernetes with Dask's operator."
+    )
+    workers: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        description="How many worker processes, of one thread each. The run begins with the first one."
+    )
+    options: dict[str, Any] = Field(
+        default={},
+        description="Keyword options of the class that starts them: `SLURMCluster`, `PBSCluster`, "
+        "`SGECluster` or `LSFCluster` of dask-jobqueue, `KubeCluster` of dask-kubernetes.",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterFile:
+    """A cluster file, checked but for the names of its options, which the class alone knows."""
+
+    model: ClusterModel
+    source: Source
+
+    @asynccontextmanager
+    async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
+        """As of `Where`: starts the cluster, and ends it with all its jobs or pods."""
+        if not insecure:
+            self._check_closed()
+        module, name = _CLASSES[self.model.kind]
+        with importing(KUBERNETES if self.model.kind == KUBERNETES else "cluster"):
+            cluster_class = getattr(importlib.import_module(module), name)
+        self._check_options(cluster_class)
+        options, problems = self._options(), list[Exception]()
+        if self.model.kind != KUBERNETES:
+            options["job_cls"] = _noting(cluster_class.job_cls, problems)
+        with own_scheduler():
+            with self._blamed():
+                cluster = cluster_class(asynchronous=True, n_workers=0, **options)
+            try:
+                await self._started(cluster, insecure, problems)
+                async with connected(cluster, where=self.source.path) as client:
+                    yield client
+            finally:
+                await cluster.close()
+
+    async def _started(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
+        """Once scheduler and jobs are started; `problems` is filled by jobs that the system refuses."""
+        with self._blamed():
+            await cluster
+        if not insecure and not is_closed(cluster.scheduler_address):
+            raise refused(cluster.scheduler_address, where=self.source.path)
+        workers = self.model.workers
+        with self._blamed():
+            await cluster.scale(workers)
+            await cluster
+            if problems:
+                raise problems[0]
+        if self.model.kind != KUBERNETES:  # there the operator does it
+            cluster.adapt(minimum=workers, maximum=workers, interval=_RENEWED_EVERY)
+
+    def _check_closed(self) -> None:
+        """MutatorError where it is known before the start that others could reach the scheduler."""
+        options = self.model.options
+        scheduler = options.get("scheduler_options")
+        scheduler = scheduler if isinstance(scheduler, Mapping) else {}
+        what = "the network of the cluster's pods"
+        if self.model.kind != KUBERNETES:
+            tls = options.get("security") is True or str(options.get("protocol")).startswith("tls")
+            loopback = "lo" in (options.get("interface"), scheduler.get("interface"))
+            if tls or loopback or is_loopback(str(scheduler.get("host"))):
+                return
+            what = "the network of the cluster's scheduler"
+        raise refused(what, where=self.source.path, line=self.source.line(("options",)))
+
+    def _check_options(self, cluster_class: type) -> None:
+        """MutatorError for an option that the class does not have, or that is not for a file to say."""
+        known = set(_parameters(cluster_class)) - _OURS
+        for name, value in self.model.options.items():
+            if name not in known:
+                close = difflib.get_close_matches(name, sorted(known), n=1)
+                raise self._error(
+                    ("options", name),
+                    f"option '{name}'",
+                    expected=f"an option of {cluster_class.__name__}",
+                    remedy=f"write `{close[0]}`" if close else "remove it",
+                )
+            if name == "security" and value is not True:
+                remedy = "write `security: true`, or `protocol: tls://` for Dask's configured certificates"
+                raise self._error(("options", name), f"security: {value!r}", expected="true", remedy=remedy)
+        processes = self.model.options.get("processes", self.model.options.get("cores"))
+        if processes != self.model.options.get("cores"):
+            raise self._error(
+                ("options", "processes"),
+                f"{processes} processes on {self.model.options.get('cores')} cores",
+                expected="a process for each core: a worker has one thread",
+                remedy="leave `processes` out",
+            )
+
+    def _options(self) -> dict[str, Any]:
+        """What the class is given: one thread for each worker, a dashboard for this machine alone."""
+        options = dict(self.model.options)
+        if self.model.kind == KUBERNETES:
+            defaults = {"worker_command": "dask worker --nthreads 1", "quiet": True}
+            return defaults | options | {"shutdown_on_close": True}
+        if "cores" in options:
+            options["processes"] = options["cores"]
+        scheduler = options.get("scheduler_options") or {}
+        options["scheduler_options"] = {"dashboard_address": "127.0.0.1:0"} | scheduler
+        if "security" not in options and str(options.get("protocol")).startswith("tls"):
+            options["security"] = certificates()
+        return options
+
+    @contextmanager
+    def _blamed(self) -> Iterator[None]:
+        """Have what the class does not like about the options, or the queueing system about a job, told as an
+        error of the file."""
+        try:
+            yield
+        except FileNotFoundError as error:
+            raise self._error(
+                ("kind",), str(error), remedy="submit from a machine that has this command"
+            ) from None
+        except (ImportError, TypeError, ValueError, RuntimeError, OSError) as error:
+            remedy = f"correct the options as the documentation of {_CLASSES[self.model.kind][1]} has them"
+            raise self._error(("options",), " ".join(str(error).split()), remedy=remedy) from None
+
+    def _error(self, keys: tuple[str, ...], got: str, **more: str) -> MutatorError:
+        return self.source.error(keys, got, **more)
+
+
+def load_cluster(path: Path) -> ClusterFile:
+    """Read a cluster file strictly; MutatorError with file and line for anything wrong with it."""
+    model, source = read(path, ClusterModel, SCHEMA)
+    return ClusterFile(model=model, source=source)
+
+
+def _noting(job_class: Any, problems: list[Exception]) -> type:
+    """The class of jobs, but one that cannot be submitted is noted: Dask would only log it."""
+
+    from distributed import Status
+
+    class Noting(job_class):  # type: ignore[misc]
+        async def start(self) -> None:
+            try:
+                await super().start()
+            except (OSError, RuntimeError, ValueError) as error:
+                problems.append(error.with_traceback(None))  # which would keep the job alive
+                self.status = Status.running
+
+    return Noting
+
+
+def _parameters(cluster_class: type) -> Iterator[str]:
+    """Names of the options of a class, those of its bases and of its jobs included."""
+    for part in (*cluster_class.__mro__, *getattr(cluster_class, "job_cls", object).__mro__):
+        if part.__module__.startswith(("dask_jobqueue", "dask_kubernetes")) and "__init__" in vars(part):
+            yield from inspect.signature(part).parameters

@@ -1,0 +1,131 @@
+"""`WHERE` of a run on a cluster: what is written there, and the Dask client that comes of it.
+
+`parse` is cheap and imports no Dask. What a person may write: the address of a scheduler, the file that it
+has written, `local:N`, or a cluster file, which says what to start.
+"""
+
+import json
+import re
+import tempfile
+from collections.abc import AsyncIterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from mutator._common.files import no_pipe
+from mutator.errors import MutatorError
+from mutator.execution.cluster.cluster_files import load_cluster
+from mutator.execution.cluster.connecting import (
+    checked_address,
+    connected,
+    importing,
+    is_closed,
+    own_scheduler,
+    refused,
+)
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_LOCAL = re.compile(r"local:(\d{1,4})")
+
+
+class Where(Protocol):
+    """A cluster that can be used. `open` gives an asynchronous Dask client, in a running event loop.
+
+    What `open` has started ends with it; a scheduler that was there before stays. MutatorError when there is
+    no such cluster, when the extra is not installed, or, unless `insecure`, for a network on which others can
+    reach it.
+    """
+
+    def open(self, *, insecure: bool) -> AbstractAsyncContextManager["Client"]: ...
+
+
+def parse(text: str) -> Where:
+    """What `WHERE` means; MutatorError for what means nothing, and for a file that is not as it must be."""
+    if "://" in text:
+        return Scheduler(address=checked_address(text))
+    if match := _LOCAL.fullmatch(text):
+        return Local(workers=_counted(int(match[1])))
+    suffix = Path(text).suffix.lower()
+    if suffix == ".json":
+        return _scheduler_file(Path(text))
+    if suffix in (".yaml", ".yml"):
+        return load_cluster(Path(text))
+    raise MutatorError(
+        f"'{text}'",
+        argument="cluster",
+        expected="the address of a Dask scheduler (tls://HOST:PORT), its scheduler file (FILE.json), "
+        "local:N for N workers on this machine, or a cluster file (FILE.yaml)",
+    )
+
+
+def _counted(workers: int) -> int:
+    if workers:
+        return workers
+    raise MutatorError("local:0", argument="cluster", expected="at least one worker", remedy="write local:2")
+
+
+def _scheduler_file(path: Path) -> "Scheduler":
+    """The scheduler that wrote this file (`dask scheduler --scheduler-file`)."""
+    remedy = "give the file that `dask scheduler --scheduler-file FILE` has written"
+    try:
+        content = json.loads(no_pipe(path).read_bytes())
+        address = content["address"]
+    except OSError as error:
+        raise MutatorError(
+            f"cannot be read ({error.strerror})", where=path, remedy=f"{remedy}, once it has started"
+        ) from None
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise MutatorError(
+            "no scheduler file", where=path, expected="JSON with an address", remedy=remedy
+        ) from None
+    return Scheduler(address=checked_address(str(address), where=path), file=path)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scheduler:
+    """A scheduler that runs already; `file` is where its address was read."""
+
+    address: str
+    file: Path | None = None
+
+    @asynccontextmanager
+    async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
+        if not insecure and not is_closed(self.address):
+            raise refused(self.address, where=self.file)
+        with importing("cluster"):
+            import distributed  # noqa: F401
+        async with connected(self.address, where=self.file) as client:
+            yield client
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Local:
+    """Worker processes of one thread each on this machine, with a scheduler of their own."""
+
+    workers: int
+
+    @asynccontextmanager
+    async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
+        with importing("cluster"):
+            from distributed import LocalCluster
+        with (
+            tempfile.TemporaryDirectory(prefix="mutator-workers-", ignore_cleanup_errors=True) as folder,
+            own_scheduler(),
+        ):
+            cluster: Any = LocalCluster(
+                n_workers=self.workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                local_directory=folder,
+                asynchronous=True,
+            )
+            try:
+                await cluster
+                async with connected(cluster) as client:
+                    yield client
+            finally:
+                await cluster.close()

@@ -1,0 +1,125 @@
+"""Cluster files: what may stand in one, and that a queueing system is asked for what it says."""
+
+import asyncio
+import gc
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.execution.cluster.where import parse
+
+SLURM = """\
+schema: cluster/1
+kind: slurm
+workers: 4
+options:
+  cores: 2
+  memory: 1 GB
+  scheduler_options: {host: 127.0.0.1}
+"""
+
+
+async def opened(folder: Path, text: str, insecure: bool = False) -> str:
+    """The dashboard's address of the cluster that a file with this text names, once it is open."""
+    file = folder / "some.yaml"
+    file.write_text(text)
+    async with parse(str(file)).open(insecure=insecure) as client:
+        return str(client.dashboard_link)
+
+
+def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> None:
+    """Slurm's commands are scripts in this folder: one keeps the jobs, the other notes which are to end."""
+    for name, script in (("sbatch", sbatch), ("scancel", "echo $1 >> cancelled")):
+        (folder / name).write_text(f"#!/bin/sh\ncd {folder}\n{script}\n")
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "error"),
+    [
+        ("kind: slurm", "kind: dask_jobqueue.SLURMCluster", r"some.yaml:2: .*'slurm', 'pbs', 'sge', 'lsf'"),
+        ("kind: slurm", "class: slurm", r"some.yaml.*class"),
+        ("cluster/1", "cluster/2", r"some.yaml:1: .*newer"),
+        ("workers: 4", "workers: 0", r"some.yaml:3: .*workers"),
+        ("workers: 4", "workers: many", r"some.yaml:3: .*workers"),
+        ("  cores: 2", "  core: 2", r"some.yaml:5: option 'core'; .*SLURMCluster; write `cores`"),
+        ("  cores: 2", "  cores: 2\n  job_cls: os.system", r"some.yaml:6: option 'job_cls'"),
+        (
+            "  cores: 2",
+            "  cores: 2\n  security: cert.pem",
+            r"some.yaml:6: security: 'cert.pem'; expected true",
+        ),
+        ("  cores: 2", "  cores: 2\n  processes: 1", r"some.yaml:6: 1 processes on 2 cores"),
+        ("1 GB", "much", r"some.yaml:4: Could not interpret 'much'"),
+        ("  cores: 2\n", "", r"some.yaml:4: .*cores and memory"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: str, tmp_path: Path) -> None:
+    """Unknown kinds, keys and options, and what the class itself does not like."""
+    with pytest.raises(MutatorError, match=error):
+        asyncio.run(opened(tmp_path, SLURM.replace(before, after)))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SLURM.replace("host: 127.0.0.1", ""),
+        SLURM.replace("127.0.0.1", "0.0.0.0"),
+        SLURM.replace("kind: slurm", "kind: kubernetes"),
+    ],
+)
+def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path) -> None:
+    """The error names the file and the line of the options, and nothing is asked of the queueing system."""
+    with pytest.raises(
+        MutatorError, match=r"some.yaml:4: the network .* neither on the loopback nor encrypted"
+    ):
+        asyncio.run(opened(tmp_path, text))
+
+
+def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four workers on two cores each are two jobs, of workers with one thread; at the end none is left."""
+    with_slurm(tmp_path, monkeypatch, "cp $1 job$$; echo Submitted batch job $$")
+    dashboard = asyncio.run(opened(tmp_path, SLURM))
+    assert dashboard.startswith("http://127.0.0.1:")
+    jobs = {job.name.removeprefix("job"): job.read_text() for job in tmp_path.glob("job*")}
+    assert len(jobs) == 2
+    assert all(
+        "--nthreads 1 " in job and "--nworkers 2" in job and "tcp://127.0.0.1:" in job
+        for job in jobs.values()
+    )
+    assert sorted((tmp_path / "cancelled").read_text().split()) == sorted(jobs)
+
+
+def test_workers_over_tls_are_told_of_the_certificates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`security: true` makes certificates for this cluster alone, and needs no `--insecure-network`."""
+    with_slurm(tmp_path, monkeypatch, "cp $1 job; echo Submitted batch job 7")
+    options = f"  security: true\n  shared_temp_directory: {tmp_path}\n  interface: lo"
+    asyncio.run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))
+    job = (tmp_path / "job").read_text()
+    assert "tls://127.0.0.1:" in job and f"--tls-ca-file {tmp_path}" in job
+    gc.collect()
+    assert not list(tmp_path.glob(".dask*")), "the key outlives the cluster"
+
+
+@pytest.mark.parametrize("script", ["echo no such partition >&2; exit 1", "echo this is no answer"])
+def test_a_job_that_is_refused_ends_it(
+    script: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    """What the queueing system said is in the error, and nothing else is printed."""
+    with_slurm(tmp_path, monkeypatch, script)
+    with pytest.raises(MutatorError, match=r"some.yaml:4: .*(no such partition|this is no answer)"):
+        asyncio.run(opened(tmp_path, SLURM))
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+def test_a_machine_without_the_command_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jobs are submitted where the queueing system is installed."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(MutatorError, match=r"some.yaml:2: .*sbatch.*; submit from a machine"):
+        asyncio.run(opened(tmp_path, SLURM))

@@ -1,0 +1,155 @@
+"""What `WHERE` may be, what is refused before anything is started, and what is opened and closed again."""
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.execution.cluster import connecting
+from mutator.execution.cluster.where import Local, Scheduler, Where, parse
+
+
+async def opened(where: Where, insecure: bool = False) -> None:
+    async with where.open(insecure=insecure):
+        pass
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tls://far.example:1", "tls://[::1]:8786"])
+def test_an_address_is_a_scheduler(address: str) -> None:
+    """TCP and TLS, hosts by name and by number."""
+    assert parse(address) == Scheduler(address=address)
+
+
+def test_local_names_how_many_workers() -> None:
+    """`local:4` are four worker processes."""
+    assert parse("local:4") == Local(workers=4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "slurm", "local", "local:0", "local:-1", "local:2x", "dask_jobqueue.SLURMCluster", "some.txt"),
+        *("http://x:1", "tcp://x", "tcp://x:0", "tcp://x:65536", "tcp://:1", "tls://a b:1", "tcp://u@x:1"),
+    ],
+)
+def test_what_means_no_cluster_is_refused(text: str) -> None:
+    """The error names the argument, what was written, and what may be."""
+    with pytest.raises(MutatorError) as caught:
+        parse(text)
+    assert caught.value.argument == "cluster"
+    assert text in caught.value.got
+    assert caught.value.expected
+
+
+def test_parsing_needs_no_dask() -> None:
+    """`parse` costs no more than a look at the text, and works where the extra is not installed."""
+    code = (
+        "import sys; from mutator.execution.cluster.where import parse; parse('local:2'); print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"dask", "distributed", "tornado"} & set(done.stdout.split())
+
+
+def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
+    """As `dask scheduler --scheduler-file` writes it; an error about it names the file."""
+    file = tmp_path / "scheduler.json"
+    file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
+    where = parse(str(file))
+    assert where == Scheduler(address="tcp://10.0.0.1:8786", file=file)
+    with pytest.raises(MutatorError, match=r"scheduler.json: tcp://10.0.0.1:8786, which is neither"):
+        asyncio.run(opened(where))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"address": 7}', '{"address": "http://x:1"}', "\xff", "[" * 9999]
+)
+def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None:
+    """The error names the file, also when it is not there."""
+    file = tmp_path / "scheduler.json"
+    with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
+        parse(str(file))
+    file.write_text(text, encoding="latin-1")
+    with pytest.raises(MutatorError, match=r"scheduler.json: (no scheduler file|address ')"):
+        parse(str(file))
+
+
+@pytest.mark.parametrize(
+    ("address", "closed"),
+    [
+        ("tcp://127.0.0.1:1", True),
+        ("tcp://127.8.0.1:1", True),
+        ("tcp://localhost:1", True),
+        ("tcp://[::1]:1", True),
+        ("tls://10.0.0.1:1", True),
+        ("tcp://10.0.0.1:1", False),
+        ("tcp://0.0.0.0:1", False),
+        ("tcp://localhost.example.org:1", False),
+        ("tcp://127.0.0.1.example.org:1", False),
+        ("tcp://[fe80::1]:1", False),
+    ],
+)
+def test_only_the_loopback_and_tls_are_closed(address: str, closed: bool) -> None:
+    """Anywhere else, others can reach the scheduler."""
+    assert connecting.is_closed(address) is closed
+
+
+def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No connection is tried; the remedy names TLS and the argument that allows it."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(
+        MutatorError, match=r"neither on the loopback nor encrypted.*tls://.*`insecure_network`"
+    ):
+        asyncio.run(opened(parse("tcp://10.0.0.1:8786")))
+
+
+def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever has not installed Dask is told how."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    for text in ("local:1", "tcp://127.0.0.1:1"):
+        with pytest.raises(MutatorError, match=r"no package distributed; pip install 'mutator\[cluster\]'"):
+            asyncio.run(opened(parse(text)))
+
+
+def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a limited time, with an error that says why."""
+    monkeypatch.setattr(connecting, "CONNECT_S", 0.3)
+    with pytest.raises(MutatorError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1 \(.*refused"):
+        asyncio.run(opened(parse("tcp://127.0.0.1:1")))
+
+
+def test_tls_needs_certificates() -> None:
+    """Without them, or with files that are not there, the error says how to name them."""
+    import dask
+
+    with pytest.raises(
+        MutatorError, match=r"tls:// without certificates; .*DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
+    ):
+        asyncio.run(opened(parse("tls://127.0.0.1:1")))
+    files = {"ca-file": "/no/ca.pem", "client.cert": "/no/cert.pem", "client.key": "/no/key.pem"}
+    with (
+        dask.config.set({f"distributed.comm.tls.{key}": file for key, file in files.items()}),
+        pytest.raises(MutatorError, match="the TLS certificates"),
+    ):
+        asyncio.run(opened(parse("tls://127.0.0.1:1")))
+
+
+def test_local_workers_work_and_end() -> None:
+    """A worker process of one thread, on the loopback, in a folder of its own; all is gone afterwards."""
+
+    async def used() -> tuple[str, dict[str, int], int, str]:
+        async with parse("local:1").open(insecure=False) as client:
+            await client.wait_for_workers(1)
+            found = await client.run(lambda dask_worker: (os.getpid(), dask_worker.local_directory))
+            [(pid, folder)] = found.values()
+            return client.scheduler.address, await client.nthreads(), pid, folder
+
+    address, threads, pid, folder = asyncio.run(used())
+    assert address.startswith("tcp://127.0.0.1:")
+    assert list(threads.values()) == [1]
+    assert pid != os.getpid() and not Path(f"/proc/{pid}").exists()
+    assert "mutator-workers-" in folder and not Path(folder).exists()
