@@ -64,10 +64,19 @@ def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def mark_points(road: np.ndarray, find: Crests = crests) -> Points:
     """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
-    at, weight = find(road)
+    return points_at(*strongest(*find(road)), road)
+
+
+def strongest(at: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers and weights of the points that are kept."""
     if len(at) > STRONGEST:
         keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
-        at, weight = at[keep], weight[keep]
+        return at[keep], weight[keep]
+    return at, weight
+
+
+def points_at(at: np.ndarray, weight: np.ndarray, road: np.ndarray) -> Points:
+    """The points with these numbers and weights in `road`."""
     row, column = np.divmod(at, road.shape[1] - 2 * EDGE)
     return Points(row, column + EDGE, weight)
 

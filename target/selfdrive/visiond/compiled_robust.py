@@ -2,19 +2,19 @@
 
 import ctypes
 from functools import cache
+from math import exp
 from pathlib import Path
 
 import numpy as np
 
 from selfdrive.common import compiled
-from selfdrive.common.array_math import product
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, Points, crests
+from selfdrive.visiond.band_filter import EDGE, NEIGHBOURHOOD, STEEPNESS, STRONGEST, crests
 from selfdrive.visiond.compiled_sums import adds_up_alike
 from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Fitted, Pose, Voters, elect
+from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Pose, vote
 
 CANDIDATES = 512  # points where lines may meet, MOST of the C file
 AT_ONCE = 8  # rows, of the C file
@@ -28,12 +28,12 @@ def build_robust_detector(model: CameraModel) -> RobustDetector:
         return RobustDetector(model)
     bands, voting, mapping = libraries
     alike = maps_alike(mapping, model) and finds_alike(bands)
-    if not (alike and adds_up_alike(voting) and elects_alike(voting, model)):
+    if not (alike and adds_up_alike(voting) and votes_alike(voting, model)):
         return RobustDetector(model)
     view = CompiledRoadView(model, mapping)
     digests = "".join(library.digest.hex() for library in libraries)
     find = CompiledCrests(bands, (len(view.drop), len(view.y)))
-    return RobustDetector(model, view, find, CompiledElect(voting), CompiledSettle(voting), digests)
+    return RobustDetector(model, view, find, CompiledVote(voting, view), digests)
 
 
 class _Bands(ctypes.Structure):
@@ -101,62 +101,61 @@ def finds_alike(library: compiled.Library) -> bool:
     return all(np.array_equal(one, other) for one, other in zip(found, wanted, strict=True))
 
 
-class CompiledElect:
-    """Does what `elect` does: `library` is `voting.c`, compiled."""
+class _Map(ctypes.Structure):
+    """`Map` of voting.c."""
 
-    def __init__(self, library: compiled.Library) -> None:
-        pointer, number, real = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
-        self._elect = library.code.elect
-        self._elect.argtypes = [*[pointer] * 4, number, real, *[pointer] * 3]
-        self._elect.restype = number
-        self._room = np.empty((CANDIDATES, round(2 * SIDEWAYS / BIN)))
-        self._belief, self._pose = (ctypes.c_double * 8)(), (ctypes.c_double * 4)()
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("y", "drop", "scale", "share")),
+        *((name, ctypes.c_int64) for name in ("rows", "columns", "edge")),
+        *((name, ctypes.c_void_p) for name in ("left", "below", "metre", "weight", "precision")),
+        *((name, ctypes.c_void_p) for name in ("room", "found", "supports")),
+    )
 
-    def __call__(self, voters: Voters, belief: Belief) -> Pose:
-        """The pair of lines with the most support."""
-        points = voters.left, voters.drop, voters.metre, voters.weight
-        given = [np.ascontiguousarray(part, np.float32) for part in points]
+
+class CompiledVote:
+    """Does what `vote` does with maps of `view`: `library` is `voting.c`, compiled."""
+
+    def __init__(self, library: compiled.Library, view: RoadView) -> None:
+        pointer, number = ctypes.c_void_p, ctypes.c_long
+        self._vote = library.code.vote
+        self._vote.argtypes, self._vote.restype = [*[pointer] * 4, number, *[pointer] * 2], number
+        self._shape = len(view.drop), len(view.y)
+        self._arrays = {name: getattr(view, name) for name in ("y", "drop", "scale", "share")}
+        for name in ("left", "below", "metre", "weight", "precision"):
+            self._arrays[name] = np.empty(STRONGEST, np.float32)
+        self._arrays |= {
+            "room": np.empty((18, STRONGEST)),
+            "found": np.empty((5, STRONGEST)),
+            "supports": np.empty((CANDIDATES, round(2 * SIDEWAYS / BIN))),
+        }
+        places = {name: array.ctypes.data for name, array in self._arrays.items()}
+        self._map = _Map(rows=self._shape[0], columns=self._shape[1], edge=EDGE, **places)
+        self._belief, self._pose = (ctypes.c_double * 8)(), (ctypes.c_double * 6)()
+
+    def __call__(
+        self, view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief
+    ) -> Pose:
+        """The lines that points and belief tell."""
+        if road.shape != self._shape or road.dtype != np.uint8 or not road.flags.c_contiguous:
+            return vote(view, road, at, weight, belief)  # a fault may do that to a picture
+        at, weight = np.ascontiguousarray(at, np.int64), np.ascontiguousarray(weight, np.float32)
         self._belief[:] = [*belief.left, *belief.dip, *belief.middle, *belief.width]
-        used = [part.ctypes.data for part in given], len(voters.left), voters.rows
-        room = self._room.ctypes.data
-        if not self._elect(*used[0], *used[1:], self._belief, room, self._pose):
-            return elect(voters, belief)
-        return Pose(*self._pose)
+        points = at.ctypes.data, weight.ctypes.data, len(at)
+        of = ctypes.addressof(self._map)
+        if not self._vote(of, road.ctypes.data, *points, self._belief, self._pose):
+            return vote(view, road, at, weight, belief)
+        *pose, left, right = self._pose
+        return Pose(*pose, 1.0 - exp(left), 1.0 - exp(right))
 
 
 @cache
-def elects_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether an election has the bits of OpenCV's filters: those of another version may add up otherwise."""
+def votes_alike(library: compiled.Library, model: CameraModel) -> bool:
+    """Whether votes have the bits of OpenCV's filters: those of another version may add up otherwise."""
     view = RoadView(model)
     number = np.arange(400)
-    row, column = number * 7 % len(view.drop), number * number * 13 % len(view.y)
-    points = Points(row, column, np.sqrt(number / 400).astype(np.float32))
-    voters = Voters(view, points, 100.0)
+    road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)
+    row, column = number * 7 % len(view.drop), number * number * 13 % (len(view.y) - 2 * EDGE)
+    given = row * (len(view.y) - 2 * EDGE) + column, np.sqrt(number / 400).astype(np.float32)
     beliefs = Belief(), Belief(left=(3.3, 7.1), width=(3.4, 0.02), dip=(0.7, 1.5))
-    return all(CompiledElect(library)(voters, belief) == elect(voters, belief) for belief in beliefs)
-
-
-class CompiledSettle:
-    """Does what `settled` does: `library` is `voting.c`, compiled."""
-
-    def __init__(self, library: compiled.Library) -> None:
-        self._settle = library.code.settle
-        self._settle.argtypes = [*[ctypes.c_void_p] * 4, ctypes.c_long, *[ctypes.c_void_p] * 8]
-        self._settle.restype = None
-        self._room = np.empty((18, STRONGEST))
-        self._results = np.empty((5, STRONGEST))
-
-    def __call__(
-        self, state: np.ndarray, voters: Voters, expected: np.ndarray, believed: np.ndarray
-    ) -> Fitted:
-        """The state moved, and what the last step had."""
-        points = voters.left, voters.drop, voters.metre, voters.precision
-        n = len(voters.left)
-        prior, state = product(expected.T, expected), state.copy()
-        numbers = self._results.ravel()
-        metre, error, count = numbers[:n], numbers[n : 3 * n], numbers[3 * n : 5 * n]
-        given = [np.ascontiguousarray(part, np.float32) for part in points]
-        beliefs = [np.ascontiguousarray(part) for part in (expected, believed, prior)]
-        used = (*beliefs, state, metre, error, count, self._room)
-        self._settle(*[part.ctypes.data for part in given], n, *[part.ctypes.data for part in used])
-        return Fitted(state, metre, error.reshape(2, n), count.reshape(2, n))
+    compiled_vote = CompiledVote(library, view)
+    return all(compiled_vote(view, road, *given, each) == vote(view, road, *given, each) for each in beliefs)

@@ -6,10 +6,10 @@ count; a line that is not seen stays where the other one puts it, and both stay 
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.visiond.band_filter import Crests, crests, mark_points
+from selfdrive.visiond.band_filter import Crests, crests, strongest
 from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_between
 from selfdrive.visiond.road_view import RoadView
-from selfdrive.visiond.voting import Belief, Elect, Pose, Settle, Voters, elect, fit, settled
+from selfdrive.visiond.voting import Belief, Pose, Vote, vote
 
 SEEN = 0.5  # probability from which on a line is believed to be where it was found
 FADING = 0.92  # by how much a line not seen is less probable with each picture
@@ -23,7 +23,7 @@ BEYOND = 0.3  # m over a line from which on the car is in the next lane
 class RobustDetector:
     """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last.
 
-    `calculated_by` tells which compiled code `view`, `find`, `choose` and `settle` calculate with, if any.
+    `calculated_by` tells which compiled code `view`, `find` and `choose` calculate with, if any.
     """
 
     def __init__(
@@ -31,11 +31,10 @@ class RobustDetector:
         model: CameraModel,
         view: RoadView | None = None,
         find: Crests = crests,
-        choose: Elect = elect,
-        settle: Settle = settled,
+        choose: Vote = vote,
         calculated_by: str = "",
     ) -> None:
-        self._find, self._choose, self._settle, self.calculated_by = find, choose, settle, calculated_by
+        self._find, self._choose, self.calculated_by = find, choose, calculated_by
         self._model = model
         self._view = view or RoadView(model)
         self._pose: Pose | None = None
@@ -56,10 +55,8 @@ class RobustDetector:
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in the view's picture, which is of the camera's size."""
         road = self._view.map(view.picture)
-        voters = Voters(self._view, mark_points(road, self._find), self._view.rows_with_content(road))
-        belief = self._belief()
-        pose = fit(self._choose(voters, belief), voters, belief, self._settle)
-        self._remember(pose)
+        points = strongest(*self._find(road))
+        self._remember(self._choose(self._view, road, *points, self._belief()))
         return self._lines()
 
     def _belief(self) -> Belief:

@@ -1,6 +1,6 @@
-/* Stands for: voting.py, ../common/array_math.py, sums.h.
- * Election and steps of the fit, with the bits of the Python: the same operations in the same order and
- * precision, sums in numpy's order, filters in OpenCV's. */
+/* Stands for: voting.py, band_filter.py, road_view.py, ../common/array_math.py, sums.h.
+ * From points in the map of the road to lines, with the bits of the Python: the same operations in the same order
+ * and precision, sums in numpy's order, filters in OpenCV's. */
 
 #include <math.h>
 #include <stdint.h>
@@ -9,6 +9,8 @@
 enum { BINS = 80, OUTSIDE = 1, AROUND = 10, GAP = 3, LOG_TERMS = 10, MOST = 512 };
 static const double BIN = 0.1, SIDEWAYS = 4.0, LEFT_STEP = 4.0, DIP_STEP = 6.0;
 static const float SCATTER = 0.005f;
+static const double BESIDE = 0.8;
+static const float FAINT = 0.02f, ALIKE = 10.0f, BLUR[2] = {0.5f, 0.05f};
 
 enum { UNKNOWN = 4, TERMS = UNKNOWN + 1, ROUNDS = 4 };
 static const double NEAR[ROUNDS] = {0.30, 0.20, 0.15, 0.15};
@@ -119,6 +121,10 @@ INLINE void all_steps(const float *left, const float *drop, const float *voters_
              room, scalar_product);
 }
 
+typedef void Settle(const float *left, const float *drop, const float *voters_metre, const float *precision, long n,
+                    const double *expected, const double *believed, const double *prior, double *state,
+                    double *metre, double *error, double *count, double *room);
+
 static void settle_plain(const float *left, const float *drop, const float *voters_metre, const float *precision,
                          long n, const double *expected, const double *believed, const double *prior, double *state,
                          double *metre, double *error, double *count, double *room)
@@ -138,20 +144,15 @@ settle_fast(const float *left, const float *drop, const float *voters_metre, con
 }
 #endif
 
-/* Move `state` by all steps. `metre` (n), `error` and `count` (2, n) become those of the last one, before it moved.
+/* Moves `state` by all steps. `metre` (n), `error` and `count` (2, n) become those of the last one, before it moved.
  * `expected` (4, 4) times its own transpose is `prior`; `room` has space for 18 numbers for each point. */
-void settle(const float *left, const float *drop, const float *voters_metre, const float *precision, long n,
-            const double *expected, const double *believed, const double *prior, double *state, double *metre,
-            double *error, double *count, double *room)
+static Settle *settle(void)
 {
 #if defined(__x86_64__) && !defined(PLAIN)
-    if (__builtin_cpu_supports("avx2")) {
-        settle_fast(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count,
-                    room);
-        return;
-    }
+    if (__builtin_cpu_supports("avx2"))
+        return settle_fast;
 #endif
-    settle_plain(left, drop, voters_metre, precision, n, expected, believed, prior, state, metre, error, count, room);
+    return settle_plain;
 }
 
 /* What is expected of one number, and the candidates for it; no `count` where there would be more than fit. */
@@ -231,8 +232,8 @@ static void take_support(const float *votes, float unlikely, double *support)
 /* Choose the pair of lines: `pose` becomes left, dip, y_left, y_right. `belief` has means and deviations of left,
  * dip, middle and width; `room` has space for the supports of MOST candidates. Returns 0 where it cannot tell: for
  * more candidates, or a lane that does not fit in. */
-long elect(const float *lefts, const float *drops, const float *metres, const float *weights, long n, double rows,
-           const double *belief, double *room, double *pose)
+static long elect(const float *lefts, const float *drops, const float *metres, const float *weights, long n, double rows,
+                  const double *belief, double *room, double *pose)
 {
     Expected left, dip, middle, width;
     expect(belief, LEFT_STEP, &left);
@@ -274,4 +275,111 @@ long elect(const float *lefts, const float *drops, const float *metres, const fl
             }
     }
     return best > -INFINITY;
+}
+
+/* The map of the road: `y` of its columns; `drop`, `scale` and `share` of its rows; `edge` columns at each side without
+ * points. Then room: for the points as voters, for the fit (18 and 5 numbers for each), for supports. */
+typedef struct {
+    const float *y, *drop, *scale, *share;
+    int64_t rows, columns, edge;
+    float *left, *below, *metre, *weight, *precision;
+    double *room, *found, *supports;
+} Map;
+
+/* How many of the picture's rows stand behind the map's rows that are not all of one tone. */
+static double rows_with_content(const Map *map, const uint8_t *road)
+{
+    float rows = 0.0f; /* shares are powers of two, so the order of the sum does not matter */
+    for (long row = 0; row < map->rows; row++, road += map->columns) {
+        long column = 1;
+        while (column < map->columns && road[column] == road[0])
+            column++;
+        if (column < map->columns)
+            rows += map->share[row];
+    }
+    return rows > 1.0f ? (double)rows : 1.0;
+}
+
+static void take_voters(const Map *map, const int64_t *at, const float *sure, long n)
+{
+    int64_t columns = map->columns - 2 * map->edge;
+    for (long i = 0; i < n; i++) {
+        long row = at[i] / columns, column = at[i] % columns + map->edge;
+        float scale = map->scale[row], blur = BLUR[0] + BLUR[1] * scale;
+        map->left[i] = map->y[column] * scale;
+        map->below[i] = map->drop[row];
+        map->metre[i] = scale / map->drop[row];
+        map->weight[i] = sure[i] * map->share[row];
+        map->precision[i] = map->weight[i] / (ALIKE * (blur * blur));
+    }
+}
+
+/* `sum_of` of sums.h in single precision. */
+static float sum_of_floats(const float *values, long count)
+{
+    if (count > 128) {
+        long half = count / 2 - count / 2 % 8;
+        return sum_of_floats(values, half) + sum_of_floats(values + half, count - half);
+    }
+    float s[8], sum = 0.0f;
+    long k = 0;
+    if (count >= 8) {
+        memcpy(s, values, sizeof s);
+        for (k = 8; k < count - count % 8; k += 8)
+            for (long lane = 0; lane < 8; lane++)
+                s[lane] += values[k + lane];
+        sum = ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+    }
+    for (; k < count; k++)
+        sum += values[k];
+    return sum;
+}
+
+/* Logarithm of how improbable a line is: the more so, the fewer points are on it and the more beside it. */
+static double doubt(const Map *map, const double *metre, const double *error, const double *count, long n, double rows)
+{
+    const double near = NEAR[ROUNDS - 1];
+    float *beside = map->precision; /* which has had its use */
+    double *seen = map->room;
+    for (long i = 0; i < n; i++) {
+        double off = fabs(error[i] / metre[i]);
+        beside[i] = (off > near && off < BESIDE ? 1.0f : 0.0f) * map->weight[i];
+        seen[i] = count[i] * (double)map->weight[i];
+    }
+    float share = sum_of_floats(beside, n) / (float)rows;
+    float chance = share * (float)(4.0 / 3.0 * near / (2.0 * (BESIDE - near)));
+    double above = sum_of(seen, n) / rows - (double)chance;
+    return -(above <= 0.0 ? 0.0 : above) / (double)(FAINT + chance);
+}
+
+/* Find the lines in the map `road`, whose `n` points have the numbers `at` and are so `sure`. `pose` becomes left, dip,
+ * y_left, y_right, and the logarithms of how improbable each line is. Returns 0 where `elect` does. */
+long vote(const Map *map, const uint8_t *road, const int64_t *at, const float *sure, long n, const double *belief,
+          double *pose)
+{
+    static const double MIXED[UNKNOWN][UNKNOWN] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 0.5, 0.5}, {0, 0, 1, -1}};
+    double expected[UNKNOWN * UNKNOWN], believed[UNKNOWN], prior[UNKNOWN * UNKNOWN];
+    double *metre = map->found, *error = metre + n, *count = error + 2 * n;
+    double rows = rows_with_content(map, road);
+    take_voters(map, at, sure, n);
+    if (!elect(map->left, map->below, map->metre, map->weight, n, rows, belief, map->supports, pose))
+        return 0;
+    for (int i = 0; i < UNKNOWN; i++) {
+        double sigma = belief[2 * i + 1];
+        believed[i] = belief[2 * i] / sigma;
+        for (int j = 0; j < UNKNOWN; j++)
+            expected[UNKNOWN * i + j] = MIXED[i][j] / sigma;
+    }
+    for (int i = 0; i < UNKNOWN; i++)
+        for (int j = 0; j < UNKNOWN; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < UNKNOWN; k++)
+                sum += expected[UNKNOWN * k + i] * expected[UNKNOWN * k + j];
+            prior[UNKNOWN * i + j] = sum;
+        }
+    settle()(map->left, map->below, map->metre, map->precision, n, expected, believed, prior, pose, metre, error,
+             count, map->room);
+    for (int side = 0; side < 2; side++)
+        pose[4 + side] = doubt(map, metre, error + side * n, count + side * n, n, rows);
+    return 1;
 }

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from selfdrive.common.array_math import each, log, product
-from selfdrive.visiond.band_filter import Points
+from selfdrive.visiond.band_filter import Points, points_at
 from selfdrive.visiond.road_view import RoadView
 
 BIN = 0.1  # m, of the votes
@@ -81,7 +81,13 @@ class Voters:
         self.rows = max(rows, 1.0)
 
 
-Elect = Callable[[Voters, Belief], Pose]
+Vote = Callable[[RoadView, np.ndarray, np.ndarray, np.ndarray, Belief], Pose]
+
+
+def vote(view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief) -> Pose:
+    """The lines that belief and points tell; points by number in the map `road`, with weights (`crests`)."""
+    voters = Voters(view, points_at(at, weight, road), view.rows_with_content(road))
+    return fit(elect(voters, belief), voters, belief)
 
 
 def elect(voters: Voters, belief: Belief) -> Pose:
@@ -146,9 +152,6 @@ class Fitted(NamedTuple):
     count: np.ndarray
 
 
-Settle = Callable[[np.ndarray, Voters, np.ndarray, np.ndarray], Fitted]
-
-
 def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: np.ndarray) -> Fitted:
     """`state` (left, dip, y_left, y_right) moved by weighted Gauss-Newton steps.
 
@@ -174,11 +177,11 @@ def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: n
     return Fitted(state, metre, error, count)
 
 
-def fit(pose: Pose, voters: Voters, belief: Belief, settle: Settle = settled) -> Pose:
+def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
     """`pose` moved to where the points around its lines are; belief decides what points leave open."""
     means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
     expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
-    state, metre, error, count = settle(np.array(pose[:4]), voters, expected, means / sigmas)
+    state, metre, error, count = settled(np.array(pose[:4]), voters, expected, means / sigmas)
     near = ROUNDS[-1]
     off = np.abs(error / metre)
     beside = (((off > near) & (off < BESIDE)) * voters.weight).sum(axis=1) / voters.rows

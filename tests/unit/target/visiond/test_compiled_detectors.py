@@ -14,11 +14,11 @@ from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond import compiled_robust, compiled_view, compiled_windows
-from selfdrive.visiond.band_filter import Points
+from selfdrive.visiond.band_filter import EDGE, STRONGEST
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.compiled_coded import CompiledCodedDetector, build_coded_detector
 from selfdrive.visiond.compiled_paper import CompiledPaperDetector, build_paper_detector
-from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledElect, build_robust_detector
+from selfdrive.visiond.compiled_robust import C_SOURCES, CompiledVote, build_robust_detector
 from selfdrive.visiond.compiled_view import CompiledRoadView
 from selfdrive.visiond.compiled_windows import MarkWindows
 from selfdrive.visiond.hog import FEATURES, Hog, windows
@@ -26,7 +26,7 @@ from selfdrive.visiond.lane_net import FEATURE_STEPS, LaneNet
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
-from selfdrive.visiond.voting import Belief, Voters, elect
+from selfdrive.visiond.voting import Belief, vote
 
 pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is no C compiler")
 MODEL = CameraModel()
@@ -156,29 +156,33 @@ def test_maps_of_any_camera_are_the_same(width, rows, focal):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_same_lines_are_elected(seed):
-    """Among points anywhere, before anything is known and after, also where no lane of that width fits in."""
+def test_the_same_lines_are_voted_for(seed):
+    """Among any number of points, in maps with and without content, before anything is known and after, also
+    where no lane of that width fits in, and where there are too many candidates for C."""
     chance = np.random.default_rng(seed)
     view = RoadView(MODEL)
-    at = np.sort(chance.choice(len(view.drop) * len(view.y), chance.integers(0, 900), replace=False))
+    road = chance.integers(0, 2, (len(view.drop), len(view.y)), np.uint8)
+    road[chance.random(len(view.drop)) < chance.choice([0.0, 0.5, 1.0])] = 7
+    numbers = len(view.drop) * (len(view.y) - 2 * EDGE)
+    count = chance.choice([seed % 10, chance.integers(0, 900), STRONGEST])
+    at = np.sort(chance.choice(numbers, count, replace=False))
     weight = chance.uniform(0.0, 1.0, len(at)).astype(np.float32)
-    voters = Voters(view, Points(*np.divmod(at, len(view.y)), weight), chance.uniform(1.0, 280.0))
-    fast = CompiledElect(compiled.library(VOTING))
+    fast = CompiledVote(compiled.library(VOTING), view)
     first, then = Belief(), Belief((0.3, 0.19), (3.5, 0.02), (-9.1, 11.14), (1.7, 1.5))
-    wider = then._replace(width=(7.9, 0.2))
-    for belief in (first, then, then._replace(left=(2.0, 41.0), width=(3.3, 0.2)), wider):
-        found = [_elected(each, voters, belief) for each in (fast, elect)]
+    wider, anywhere = then._replace(width=(7.9, 0.2)), first._replace(left=(0.0, 2000.0))
+    for belief in (first, then, then._replace(left=(2.0, 41.0), width=(3.3, 0.2)), wider, anywhere):
+        found = [_voted(each, view, road, at, weight, belief) for each in (fast, vote)]
         assert found[0] == found[1]
 
 
-def _elected(choose, voters, belief) -> str:
+def _voted(choose, *given) -> str:
     try:
-        return repr(choose(voters, belief))
+        return repr(choose(*given))
     except ValueError as error:
         return repr(type(error))
 
 
-@pytest.mark.parametrize("name", ["RoadView", "crests", "elect"])
+@pytest.mark.parametrize("name", ["RoadView", "crests", "vote"])
 def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
     """Another version of OpenCV may filter otherwise: then the Python does all of it."""
     here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
@@ -187,7 +191,7 @@ def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
         first, *others = here(*given)
         return [first + 1, *others]
 
-    checks = compiled_robust.maps_alike, compiled_robust.finds_alike, compiled_robust.elects_alike
+    checks = compiled_robust.maps_alike, compiled_robust.finds_alike, compiled_robust.votes_alike
     monkeypatch.setattr(*((RoadView, "map") if name == "RoadView" else (compiled_robust, name)), otherwise)
     for check in checks:
         check.cache_clear()
