@@ -47,7 +47,7 @@ def undisturbed(whole: Path) -> Bytes:
     return results(whole)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Bytes, workers: int) -> None:
     """One or two xdist workers give the bytes of a run without workers."""
     summary = run_campaign(toy, "small", tmp_path / "run", workers=workers)
@@ -56,38 +56,25 @@ def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Byte
     assert results(tmp_path / "run") == undisturbed
 
 
-def test_any_order(
+def test_any_order_in_any_number_of_sessions(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Chunks run in a shuffled order give the same bytes."""
-    prepare = Session.prepare
+    """A run that is given up after every two chunks, not the next ones, and resumed, gives the same bytes."""
+    prepare, draw = Session.prepare, random.Random(3)
+    taken: list[int] = []
 
-    def shuffled(self: Session) -> None:
+    def two_chunks(self: Session) -> None:
         prepare(self)
-        self.pending = tuple(random.Random(3).sample(self.pending, len(self.pending)))
+        self.pending = tuple(draw.sample(self.pending, min(2, len(self.pending))))
+        taken.extend(item.chunk for item in self.pending)
 
-    monkeypatch.setattr(Session, "prepare", shuffled)
-    assert run_campaign(toy, "small", tmp_path / "run").exit_code == 0
-    assert results(tmp_path / "run") == undisturbed
-
-
-def test_one_by_one(
-    toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run that is given up after every chunk and resumed, again and again, gives the same bytes."""
-    prepare = Session.prepare
-
-    def one_chunk(self: Session) -> None:
-        prepare(self)
-        self.pending = self.pending[:1]
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Session, "prepare", one_chunk)
+    monkeypatch.setattr(Session, "prepare", two_chunks)
+    ends = [(summary := run_campaign(toy, "small", tmp_path / "run")).exit_code]
+    while summary.ran:
         summary = run_campaign(toy, "small", tmp_path / "run")
-        assert summary.exit_code == 3
-        while summary.ran:
-            summary = run_campaign(toy, "small", tmp_path / "run")
-    assert (summary.done, summary.exit_code) == (12, 0)
+        ends.append(summary.exit_code)
+    assert (summary.done, ends) == (12, [3, 3, 0, 0])
+    assert sorted(taken) == [0, 1, 2, 3, 4, 5] and any(taken[k] > taken[k + 1] for k in (0, 2, 4))
     assert results(tmp_path / "run") == undisturbed
 
 
@@ -134,20 +121,25 @@ GENTLE = [pytest.param(number, marks=pytest.mark.slow) for number in (signal.SIG
 def test_killed_and_resumed(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
 ) -> None:
-    """A command killed half-way leaves no process behind; given again, it completes to the same bytes."""
+    """A command killed half-way leaves no process behind; given again, it completes to the same bytes, and
+    leaves no registrations, also not those of killed workers."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(4)
+    assert len(command.workers()) == 2
     if number is signal.SIGINT:  # as a terminal does it: everyone in the foreground gets it
         os.killpg(command.process.pid, number)
     else:
         command.process.send_signal(number)
     command.end()
+    if number is signal.SIGKILL:
+        assert len(list((out / "workers").iterdir())) == 2
     again = Command(toy, out, *pytest_words(out))
     printed = again.end()
     assert again.process.returncode == 0, printed
     assert "12 of 12 experiments done" in printed
     assert "12 now" not in printed
+    assert not (out / "workers").exists()
     assert results(out) == undisturbed
 
 
@@ -176,7 +168,11 @@ def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> 
     assert results(out) == undisturbed
 
 
-@pytest.mark.parametrize("words", [["-m", "mutator", "run", "small", "-n", "1", "--out"], None])
+@pytest.mark.parametrize(
+    "words",
+    [["-m", "mutator", "run", "small", "-n", "1", "--out"], pytest.param(None, marks=pytest.mark.slow)],
+    ids=["mutator", "pytest"],
+)
 def test_a_worker_dies_with_its_command_from_its_first_moment(
     toy: Workspace, tmp_path: Path, words: list[str] | None
 ) -> None:
@@ -198,20 +194,6 @@ def test_a_worker_dies_with_its_command_from_its_first_moment(
         command.end()
 
 
-def test_registrations_of_workers_are_removed(toy: Workspace, tmp_path: Path) -> None:
-    """A run folder has no registrations when its command has ended, also those that killed workers left."""
-    out = tmp_path / "run"
-    command = Command(toy, out, *pytest_words(out))
-    command.wait_for_records(2)
-    assert len(command.workers()) == 2
-    command.process.kill()
-    command.end()
-    assert len(list((out / "workers").iterdir())) == 2
-    again = Command(toy, out, *pytest_words(out))
-    assert "12 of 12" in again.end()
-    assert not (out / "workers").exists()
-
-
 def test_the_command_line_is_the_same_thing(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """`mutator run` gives the bytes of pytest's campaign, and each resumes what the other began."""
     out = tmp_path / "run"
@@ -227,10 +209,14 @@ def test_the_command_line_is_the_same_thing(toy: Workspace, tmp_path: Path, undi
 def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """A second command in a folder at work is told who works there, and disturbs nothing."""
     out = tmp_path / "run"
-    first = Command(toy, out, *pytest_words(out))
+    first = Command(toy, out, *pytest_words(out, workers=0))
     first.wait_for_records(1)
-    second = Command(toy, out, *pytest_words(out))
-    printed = second.process.communicate(timeout=60)[0]
+    first.process.send_signal(signal.SIGSTOP)  # so that it is not done before the second has begun
+    try:
+        second = Command(toy, out, *pytest_words(out))
+        printed = second.process.communicate(timeout=60)[0]
+    finally:
+        first.process.send_signal(signal.SIGCONT)
     assert second.process.returncode == 2, printed
     assert f"in use by process {first.process.pid}" in printed
     assert "Traceback" not in printed
