@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from mutator._common.tables import Table
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
+from mutator.execution.cluster import cluster_files
 from mutator.faults import specs
 from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
@@ -104,6 +105,21 @@ def hazard_analysis(workspace: Workspace) -> str:
             analysis.UnsafeActionsModel,
             analysis.FactorsModel,
         ),
+    )
+
+
+def clusters(workspace: Workspace) -> str:
+    """docs/reference/cluster-file.md."""
+    return _page(
+        generated("Cluster files"),
+        "Which cluster `mutator run --cluster FILE.yaml` starts, and ends with the run. [Run on many "
+        "machines](../how-to/run-on-many-machines.md)\nhas one [for Slurm](../how-to/clusters/slurm.yaml) "
+        "and one [for Kubernetes](../how-to/clusters/kubernetes.yaml).\n",
+        f"The first key is `schema: {cluster_files.SCHEMA}`. {_SAME}\n",
+        *sections("cluster-file.md", cluster_files.ClusterModel),
+        "Of the options, the run sets these itself, and refuses them: "
+        f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED)}.\n`security` is `true` or left out; "
+        "`processes` is the number of `cores`, as a worker has one thread.\n",
     )
 
 

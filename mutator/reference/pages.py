@@ -14,6 +14,7 @@ SCHEMAS = FOLDER / "schemas"
 PAGES: dict[str, Callable[[Workspace], str]] = {
     "campaign.md": formats.campaigns,
     "channels.md": recorded.channels,
+    "cluster-file.md": formats.clusters,
     "cli.md": cli.command_line,
     "fault-models.md": models.fault_models_page,
     "fault-spec.md": formats.fault_spec,

@@ -11,6 +11,7 @@ from typing import Any
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
+from mutator.execution.cluster import cluster_files
 from mutator.faults import fault_models, readings
 from mutator.faults import specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
@@ -62,11 +63,14 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
 
 
 def file_formats(declared: Readings) -> tuple[Format, ...]:
-    """The kinds of YAML files of a library that declares these readings, and of templates."""
+    """The kinds of YAML files: of a library that declares these readings, of templates, and of clusters."""
     specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
         Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
+        Format(
+            model=cluster_files.ClusterModel, schema=cluster_files.SCHEMA, files="docs/how-to/clusters/*.yaml"
+        ),
     )
 
 

@@ -38,23 +38,21 @@ _CLASSES = {
     "lsf": ("dask_jobqueue", "LSFCluster"),
     KUBERNETES: ("dask_kubernetes.operator", "KubeCluster"),
 }
-# Not for a file to say: what is set here, and what takes Python objects.
-_OURS = {
-    "self",
-    "args",
-    "kwargs",
-    "base_class_kwargs",
-    "job_kwargs",
+# Not for a file to say: what is set here, and what names Python objects.
+RESERVED = (
     "asynchronous",
+    "config_name",
+    "job_cls",
     "loop",
     "n_workers",
-    "name",
-}
-_OURS |= {"scheduler", "scheduler_cls", "job_cls", "config_name", "shutdown_on_close"}
+    "scheduler_cls",
+    "shutdown_on_close",
+)
+_NO_OPTIONS = {"self", "args", "kwargs", "base_class_kwargs", "job_kwargs", "scheduler", "name", *RESERVED}
 _RENEWED_EVERY = "5s"  # a job that has ended, as its time was over, is replaced by another
 
 
-class ClusterModel(StrictModel):
+class ClusterModel(StrictModel, title="A cluster file"):
     """A cluster that a run starts, and ends when it ends itself."""
 
     kind: Literal["slurm", "pbs", "sge", "lsf", "kubernetes"] = Field(
@@ -130,7 +128,7 @@ class ClusterFile:
 
     def _check_options(self, cluster_class: type) -> None:
         """MutatorError for an option that the class does not have, or that is not for a file to say."""
-        known = set(_parameters(cluster_class)) - _OURS
+        known = set(_parameters(cluster_class)) - _NO_OPTIONS
         for name, value in self.model.options.items():
             if name not in known:
                 close = difflib.get_close_matches(name, sorted(known), n=1)

@@ -29,7 +29,7 @@ _TO_CLOSE = (
 def checked_address(address: str, *, where: Path | None = None) -> str:
     """The address of a scheduler, as it is; MutatorError for what is none.
 
-    `where` is the file that it was read from; without one it is the argument `cluster`.
+    `where` is the file that it was read from.
     """
     found = _ADDRESS.fullmatch(address)
     if found and 0 < int(found["port"]) < 2**16:
@@ -37,7 +37,7 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
     raise MutatorError(
         f"address '{address}'",
         where=where,
-        argument=None if where else "cluster",
+        argument="cluster",
         expected="tcp://HOST:PORT or tls://HOST:PORT",
     )
 
@@ -65,7 +65,7 @@ def refused(what: str, *, where: Path | None = None, line: int | None = None) ->
         f"{what}, which is neither on the loopback nor encrypted",
         where=where,
         line=line,
-        argument=None if where else "cluster",
+        argument="cluster",
         remedy=_TO_CLOSE,
     )
 
@@ -77,7 +77,9 @@ def importing(extra: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         raise MutatorError(
-            f"no package {error.name}", argument="cluster", remedy=f"pip install 'mutator[{extra}]'"
+            f"no package {error.name}",
+            argument="cluster",
+            remedy=f"pip install '.[{extra}]' in a clone; of a wheel: pip install 'FILE.whl[{extra}]'",
         ) from None
 
 
@@ -137,7 +139,7 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
             raise MutatorError(
                 f"no Dask scheduler answers at {address}{_reason(error)}",
                 where=where,
-                argument=None if where else "cluster",
+                argument="cluster",
                 remedy="start it (`dask scheduler`), or check address, firewall and certificates",
             ) from None
         yield client
