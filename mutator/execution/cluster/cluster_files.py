@@ -7,7 +7,7 @@ import difflib
 import importlib
 import inspect
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -92,6 +92,11 @@ class ClusterFile:
                 cluster = cluster_class(asynchronous=True, n_workers=0, **options)
             try:
                 await self._started(cluster, insecure, problems)
+            except BaseException:
+                with suppress(Exception):  # what went wrong is known
+                    await cluster.close()
+                raise
+            try:
                 async with connected(cluster, where=self.source.path) as client:
                     yield client
             finally:
@@ -154,8 +159,10 @@ class ClusterFile:
         """What the class is given: one thread for each worker, a dashboard for this machine alone."""
         options = dict(self.model.options)
         if self.model.kind == KUBERNETES:
+            from tornado.ioloop import IOLoop
+
             defaults = {"worker_command": "dask worker --nthreads 1", "quiet": True}
-            return defaults | options | {"shutdown_on_close": True}
+            return defaults | options | {"shutdown_on_close": True, "loop": IOLoop.current()}
         if "cores" in options:
             options["processes"] = options["cores"]
         scheduler = options.get("scheduler_options") or {}
@@ -176,6 +183,8 @@ class ClusterFile:
             ) from None
         except (ImportError, TypeError, ValueError, RuntimeError, OSError) as error:
             remedy = f"correct the options as the documentation of {_CLASSES[self.model.kind][1]} has them"
+            if self.model.kind == KUBERNETES:
+                remedy += ", and see that kubectl works here"
             raise self._error(("options",), " ".join(str(error).split()), remedy=remedy) from None
 
     def _error(self, keys: tuple[str, ...], got: str, **more: str) -> MutatorError:

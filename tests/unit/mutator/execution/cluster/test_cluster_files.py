@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,14 @@ def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path)
         MutatorError, match=r"some.yaml:4: the network .* neither on the loopback nor encrypted"
     ):
         asyncio.run(opened(tmp_path, text))
+
+
+def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is named where it is missing; a network that others may be on was allowed before that."""
+    monkeypatch.setitem(sys.modules, "dask_kubernetes", None)
+    monkeypatch.setitem(sys.modules, "dask_kubernetes.operator", None)
+    with pytest.raises(MutatorError, match=r"no package dask_kubernetes.*'.\[kubernetes\]'"):
+        asyncio.run(opened(tmp_path, SLURM.replace("kind: slurm", "kind: kubernetes"), insecure=True))
 
 
 def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
