@@ -28,7 +28,7 @@ from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
 from mutator.outcomes import golden  # noqa: E402
-from mutator.store.run_folder import golden_key  # noqa: E402
+from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
@@ -68,25 +68,25 @@ class Bench:
         }
         self._drive_goldens(ReferenceEngine(*arguments))
 
-    def golden(self, scenario: str, changes: tuple[str, ...]) -> Path:
-        return self.folder / "golden" / golden_key(scenario, changes)
+    def golden(self, experiment: Experiment) -> Path:
+        return self.folder / "golden" / GoldenRun.of(experiment, several_seeds=False).key
 
     def steps(self, experiment: Experiment) -> int:
         """Steps of the golden run, which all that end well have."""
-        trace = golden.load_trace(self.manifest, self.golden(experiment.scenario, experiment.changes))
+        trace = golden.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 
     def _drive_goldens(self, engine: ReferenceEngine) -> None:
         (self.folder / "golden").mkdir()
-        for scenario, changes in self.plan.goldens():
+        for one in self.plan.goldens():
             job = Job(
-                name=golden_key(scenario, changes),
-                scenario=self.workspace.scenario(scenario),
+                name=one.key,
+                scenario=self.workspace.scenario(one.scenario),
                 seed=self.plan.seed,
-                changes=changes,
+                changes=one.changes,
             )
             execution = engine.execute(job, engine.work / job.name)
-            execution.out.rename(self.golden(scenario, changes))
+            execution.out.rename(self.folder / "golden" / one.key)
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
         """What an engine took for all of the experiments, and what it took beforehand for each golden run."""

@@ -24,7 +24,7 @@ from growth import record
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns import machine
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plans import Planning
 from mutator.campaigns.provenance import add_stretch
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
@@ -38,7 +38,7 @@ from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest
 from mutator.store.patches import _Packer
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.series import INDEX, Index, write_index
 from mutator.store.series_format import encode
 from mutator.store.series_script import name_of, write_script
@@ -86,25 +86,25 @@ def make(size: int, out: Path) -> str:
     return seal_of(RunFolder(out)) or ""
 
 
-def campaign(folder: Path) -> Path:
-    """The paper's campaign, driven without pictures, written into a folder."""
+def campaign(folder: Path, size: int) -> Path:
+    """The paper's campaign without pictures, with as many seeds as are needed, written into a folder."""
     text = (ROOT / "fault_library" / "campaigns" / "paper.yaml").read_text()
-    for name in ("pictures, paper_detector", "pictures, coded_detector"):
-        text = text.replace(f"[{name}]", "[]")
+    for old, new in (
+        ("[pictures, paper_detector]", "[]"),
+        ("[pictures, coded_detector]", "[]"),
+        ("name: paper\n", "name: million\n"),
+        ("seed: 1\n", f"seeds: {{from: 1, to: {-(-size // SEED)}}}\n"),
+    ):
+        text = text.replace(old, new)
     path = folder / "million.yaml"
-    path.write_text(text.replace("name: paper\n", "name: million\n"))
+    path.write_text(text)
     return path
 
 
 def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
-    """The campaign's plan with as many seeds as are needed, cut to size, frozen in `out`."""
+    """The plan of at least so many experiments, frozen in `out`."""
     with TemporaryDirectory() as place:
-        plan = make_plan(workspace, campaign(Path(place)))
-        seeds = range(1, -(-size // len(plan.experiments)) + 1)
-        more = (replace(e, seed=seed) for seed in seeds for e in plan.experiments)
-        experiments = tuple(islice(more, size))
-        chunks = tuple(min(PIECE, size - first) for first in range(0, size, PIECE))
-        return freeze(replace(plan, experiments=experiments, chunks=chunks, runs=size), out, workspace)
+        return freeze(Planning(workspace, campaign(Path(place), size)), out, workspace)
 
 
 def _experiments(folder: RunFolder) -> Iterator[Experiment]:
@@ -114,19 +114,23 @@ def _experiments(folder: RunFolder) -> Iterator[Experiment]:
 
 
 def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Experiment]) -> None:
-    """Drive the golden runs, and leave checks that have passed."""
+    """Drive the golden runs of the first seed, copy them for the others, and leave passed checks."""
     manifest, run = workspace.manifest(folder.head["target"]), folder.path
-    known = {}
-    for scenario, changes in folder.head["goldens"]:
-        place = folder.golden(scenario, tuple(changes))
-        like = next(
-            e for e in (*experiments, folder.canary) if (e.scenario, list(e.changes)) == (scenario, changes)
-        )
-        with TemporaryDirectory(dir=run) as scratch:
-            found = run_golden(workspace, manifest, like, Path(scratch) / "one", limits=folder.limits)
-            place.parent.mkdir(exist_ok=True)
-            shutil.move(found, place)
-        known[golden_key(scenario, changes)] = digest_of(manifest, place)
+    known, driven = {}, dict[GoldenRun, Path]()
+    for one in folder.goldens:
+        like, place = one._replace(seed=None), folder.golden(*one)
+        place.parent.mkdir(exist_ok=True)
+        if like in driven:
+            shutil.copytree(driven[like], place)
+        else:
+            drives = (
+                e for e in (*experiments, folder.canary) if GoldenRun.of(e, several_seeds=False) == like
+            )
+            with TemporaryDirectory(dir=run) as scratch:
+                limits = folder.limits
+                found = run_golden(workspace, manifest, next(drives), Path(scratch) / "one", limits=limits)
+                driven[like] = Path(shutil.move(found, place))
+        known[one.key] = digest_of(manifest, place)
     checks = {"schema": CHECKS_SCHEMA, "digest": "", "results": [], "goldens": known}
     data = json.dumps(checks | {"packages": [], "run_cpu_s": 1.0}).encode()
     files = [path for path in (run / "golden").rglob("*") if path.is_file()]
@@ -248,8 +252,8 @@ def write_series(
     """A packed index in which the experiments that have room share a few series."""
     manifest, place = workspace.manifest("openpilot"), folder.path / "series"
     place.mkdir()
-    scenario, changes = folder.head["goldens"][0]
-    golden = load_trace(manifest, folder.golden(scenario, tuple(changes)))
+    first = folder.goldens[0]
+    golden = dict(load_trace(manifest, folder.golden(*first)))
     sampler, draw = Sampler(manifest, golden), np.random.default_rng(1)
     names = [channel.name for channel in manifest.compared]
     made = [sampler.encoded]
@@ -263,7 +267,7 @@ def write_series(
         )
     data = b"".join(made)
     write_script(place / f"{name_of(data)}.js", data)
-    key, kept = golden_key(scenario, changes), ids[:SERIES_MOST]
+    key, kept = first.key, ids[:SERIES_MOST]
     index = Index(
         plan=folder.head["plan"],
         chunks=((name_of(data), len(made)),),

@@ -28,7 +28,7 @@ GOALS = {"plan": (60.0, 1000.0), "resume": (10.0, None)}  # wall s and MB at mos
 
 
 def plan(size: int, run: Path) -> None:
-    """Plan into a new folder."""
+    """Plan into a new folder, as `mutator plan` does."""
     with tempfile.TemporaryDirectory(dir=run.parent) as place:
         made_up_run.planned(Workspace.find(root=made_up_run.ROOT), size, Path(place) / "run")
 
@@ -41,7 +41,7 @@ def opened(size: int, run: Path) -> None:
 def resume(size: int, run: Path) -> None:
     """Give the command again: there is nothing to do."""
     summary = run_campaign(Workspace.find(root=made_up_run.ROOT), run / "campaign.yaml", run)
-    if (summary.done, summary.ran) != (size, 0):
+    if summary.done < size or summary.ran:
         raise SystemExit(f"{summary.done} done, {summary.ran} now")
 
 

@@ -91,7 +91,7 @@ class Bench:
         them must be forked."""
         null = build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
-        goldens = Goldens(self.manifest, lambda scenario, changes: self.folder / "golden" / "out")
+        goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
         runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)
         records = LineWriter(self.folder / "records.jsonl", {"schema": SCHEMA})
 

@@ -26,7 +26,7 @@ from mutator.store.check_results import FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import RunFolder
 from mutator.verification import preflight, preflight_cache, preflight_rules
 from mutator.workspace import Workspace
 
@@ -72,8 +72,8 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
     """Have the cache believe that the checks of this plan passed."""
     looked_at = preflight._Checks(workspace, folder)
     goldens = {}
-    for scenario, changes in looked_at.keys:
-        key = golden_key(scenario, changes)
+    for one in looked_at.keys:
+        key = one.key
         out = looked_at.kept / "golden" / key
         out.mkdir(parents=True)
         for name in looked_at.manifest.outputs:

@@ -12,7 +12,7 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
@@ -191,6 +191,13 @@ def half_written(path: Path) -> Iterator[Path]:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+@contextmanager
+def writing_atomic(path: Path) -> Iterator[BinaryIO]:
+    """As `half_written`, opened for writing."""
+    with half_written(path) as temporary, temporary.open("wb") as file:
+        yield file
 
 
 def is_half_written(name: str) -> bool:

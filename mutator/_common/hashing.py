@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 _ADDED = "added"  # key in a field's metadata
+_SCALARS = frozenset((str, int, float, bool, type(None)))
 
 
 def added(default: Any) -> Any:
@@ -43,6 +44,8 @@ def plain(value: Any) -> Any:
 
     Of a record's `added` fields only those count that differ from their defaults.
     """
+    if type(value) in _SCALARS:
+        return value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         first, _ = _fields(type(value))
         return {name: plain(getattr(value, name)) for name in first} | added_values(value)
@@ -55,13 +58,13 @@ def plain(value: Any) -> Any:
     return value
 
 
+# only what JSON does not know goes through `plain`: a plan has a million ids
+_ENCODER = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+
+
 def canonical(value: Any) -> str:
     """One text for one value: sorted keys, no spaces, shortest exact floats."""
-    return _CANONICAL.encode(value)
-
-
-# only what JSON does not know goes through `plain`: a plan has thousands of ids
-_CANONICAL = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return _ENCODER.encode(value)
 
 
 def digest(value: Any) -> str:

@@ -69,3 +69,8 @@ def _folded_line(line: str, width: int) -> str:
 
 def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
+
+
+def seeds_text(seeds: range) -> str:
+    """`seed 1`, `seeds 1 to 90`."""
+    return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"

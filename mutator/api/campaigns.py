@@ -6,8 +6,8 @@ from pathlib import Path
 from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, Plan, load_plan, make_plan
+from mutator.campaigns.freezing import freeze_and_tell
+from mutator.campaigns.plans import Choices, Plan, Planning, load_plan, make_plan
 from mutator.engines.forkable import not_forked
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary
@@ -28,20 +28,21 @@ def plan(
 ) -> Plan:
     """Expand a campaign (a name of the library or a file) into its experiments; none is run.
 
-    With `out` the plan is frozen there: `run` with the same folder runs exactly these experiments.
+    With `out` the plan is frozen there: `run` with the same folder runs exactly these experiments. It is then
+    written seed by seed, and the experiments of a very large one are read when asked for.
     MutatorError for a mistake in campaign or choices, when no experiment is left, and for a folder that holds
     anything else.
     """
     found = open_workspace(workspace)
-    made = make_plan(found, campaign, choices)
     if out is None:
-        return made
-    return load_plan(freeze(made, Path(out), found))  # knows what a run took, once one was driven here
+        return make_plan(found, campaign, choices)
+    folder, tally = freeze_and_tell(Planning(found, campaign, choices), Path(out), found)
+    return load_plan(folder, tally)  # knows what a run took, once one was driven here
 
 
 def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:
     """The variants of a plan that only the reference engine can run, and why."""
-    faults = [experiment.fault for experiment in plan.experiments]
+    faults = plan.tally.variants.values()
     return not_forked(workspace.manifest(plan.campaign.target), workspace.fault_models(), faults)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mutator._common.arguments import check_type
 from mutator._common.places import run_folders
 from mutator._common.tables import Table
+from mutator._common.text import seeds_text
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.html import facts_html, text_html
@@ -28,7 +29,7 @@ from mutator.outcomes.golden import load_trace
 from mutator.report import building
 from mutator.report.stills import take_stills
 from mutator.store import cleaning
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.verification import equivalence
 from mutator.verification.seal import not_verifiable, seal_of
 
@@ -115,20 +116,28 @@ class Run(RunContents):
         wanted = self.folder.find(id)
         return RunExperiment(experiment=self.experiments[wanted], record=self.records.get(wanted), run=self)
 
-    def golden(self, scenario: str, changes: tuple[str, ...] | None = None) -> "pd.DataFrame":
+    def golden(
+        self, scenario: str, changes: tuple[str, ...] | None = None, *, seed: int | None = None
+    ) -> "pd.DataFrame":
         """The fault-free run of a scenario: a column per channel, by time in s.
 
         `changes` of the scenario tell apart what was driven in several ways, `("alone",)`; default: those
-        of most experiments. MutatorError for one that was not driven.
+        of most experiments. `seed` is one of several; default: the first. MutatorError for one that was not
+        driven.
         """
         driven = [e.changes for e in self.experiments.values() if e.scenario == scenario]
         if changes is None and driven:
             changes = max(dict.fromkeys(driven), key=driven.count)
-        folder = self.folder.golden(scenario, changes or ())
+        seeds = self.folder.seeds
+        if seed is not None and seed not in seeds:
+            raise MutatorError(f"seed {seed}", argument="seed", expected=seeds_text(seeds))
+        several = seeds[0] if seed is None else seed
+        wanted = GoldenRun(scenario, changes or (), several if len(seeds) > 1 else None)
+        folder = self.folder.golden(*wanted)
         if not folder.is_dir():
             known = sorted(path.name for path in (self.path / "golden").glob("*"))
             raise MutatorError(
-                f"no golden run {golden_key(scenario, changes or ())}",
+                f"no golden run {wanted.key}",
                 where=self.path,
                 expected=f"one of {', '.join(known) or 'none'}",
             )

@@ -59,6 +59,7 @@ class Campaign:
     `reading` is None for the library's default. Before `armed_after(reading)` no trigger fires and no random
     time is drawn; None: as the target's manifest says. Triggers are those of the context table `table`, or
     `listed`.
+    It is made with each of its `seeds`.
     `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
     random time to the end). `after_hazard` says whether runs end at their first terminal hazard.
     """
@@ -82,12 +83,17 @@ class Campaign:
     hold_s: float | None
     sample: int | None
     proportional: bool
-    seed: int
+    seeds: range
     canary: Canary
     limits: Limits
     chunk: int
     after_hazard: AfterHazard
     yaml: Source
+
+    @property
+    def seed(self) -> int:
+        """The seed, or the first of several."""
+        return self.seeds[0]
 
     def armed_after(self, reading: str) -> float | None:
         """When triggers are armed under a reading; None: the campaign does not say."""
@@ -141,13 +147,20 @@ def load_campaign(path: Path) -> Campaign:
         hold_s=triggers.hold_s,
         sample=model.sample,
         proportional=model.proportional,
-        seed=model.seed,
+        seeds=_seeds(model),
         canary=Canary(**model.canary.model_dump()),
         limits=Limits(**{field.name: getattr(model.limits, field.name) for field in fields(Limits)}),
         chunk=model.chunk,
         after_hazard=model.after_hazard,
         yaml=source,
     )
+
+
+def _seeds(model: CampaignModel) -> range:
+    if model.seeds is not None:
+        return range(model.seeds.from_, model.seeds.to + 1)
+    assert model.seed is not None  # the model has one of the two
+    return range(model.seed, model.seed + 1)
 
 
 def _check_once(model: CampaignModel, source: Source) -> None:

@@ -27,6 +27,7 @@ class _SelectionModel(StrictModel, title="A selection"):
     )
 
 
+MOST_SEEDS = 10_000
 _NAMES = {"type": "array", "items": {"type": "string"}}
 
 
@@ -55,6 +56,19 @@ class _LimitsModel(StrictModel, title="Limits"):
         le=MOST,
         description="MiB in its output folder and TMPDIR together, and in any single file that it writes.",
     )
+
+
+class SeedsModel(StrictModel, title="Seeds"):
+    """The campaign is repeated with each of these seeds, as if each were its `seed`."""
+
+    from_: int = Field(alias="from", ge=0, lt=2**63, description="The first seed.")
+    to: int = Field(ge=0, lt=2**63, description="The last one, which counts, too.")
+
+    @model_validator(mode="after")
+    def _check(self) -> "SeedsModel":
+        if not 0 <= self.to - self.from_ < MOST_SEEDS:
+            raise ValueError(f"`to` from {self.from_} to {self.from_ + MOST_SEEDS - 1}, not {self.to}")
+        return self
 
 
 class CampaignModel(StrictModel, title="The file"):
@@ -96,7 +110,17 @@ class CampaignModel(StrictModel, title="The file"):
         description="The sample takes each fault type in each scenario in proportion to its number, guided "
         "and random ones in pairs.",
     )
-    seed: int = Field(ge=0, lt=2**63, description="The seed of all that is drawn; `--seed` overrides it.")
+    seed: int | None = Field(
+        None,
+        ge=0,
+        lt=2**63,
+        description="The seed of all that is drawn; `--seed` overrides it. Either this or `seeds`.",
+    )
+    seeds: SeedsModel | None = Field(
+        None,
+        description="Several seeds: the campaign is repeated with each, `sample` included. `--seed` takes "
+        "one seed instead.",
+    )
     canary: _CanaryModel = Field(description="The check that a known fault does harm.")
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON,
@@ -115,6 +139,10 @@ class CampaignModel(StrictModel, title="The file"):
     def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
             raise ValueError("proportional without sample: say how many")
+        if (self.seed is None) == (self.seeds is None):
+            raise ValueError(
+                "either `seed` or `seeds`" if self.seed is None else "`seed` or `seeds`, not both"
+            )
         if Method.RANDOM in self.methods and self.triggers.random_until_s is None:
             raise ValueError("`random_until_s` in `triggers` for random times")
         return self

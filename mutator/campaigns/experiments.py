@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from fnmatch import fnmatchcase
 from itertools import chain
 from pathlib import Path
@@ -36,6 +37,14 @@ class Expansion:
         armed_after_s = campaign.armed_after(reading)
         self.armed_after_s = manifest.armed_after_s if armed_after_s is None else armed_after_s
         self._digests: dict[str, str] = {}
+        self._specs: list[tuple[FaultSpec, ...]] = []
+        self._models = workspace.fault_models()
+
+    def with_seed(self, seed: int) -> "Expansion":
+        """The same with another seed; files that were read are not read again."""
+        other = copy(self)
+        other.seed = seed
+        return other
 
     def experiments(self) -> tuple[Experiment, ...]:
         """All of them, runs of the same scenario and changes side by side (they share a golden run)."""
@@ -81,7 +90,9 @@ class Expansion:
 
     def _library(self) -> list[_Numbered]:
         """Every fault of the library with its number within its variant."""
-        return self._expanded(self.workspace.specs())
+        if not self._specs:
+            self._specs.append(self.workspace.specs())
+        return self._expanded(self._specs[0])
 
     def _files(self) -> dict[int, list[_Numbered]]:
         """The faults of the spec files that the campaign names, by the places of its selections."""
@@ -111,10 +122,9 @@ class Expansion:
     def _expanded(self, specs: Iterable[FaultSpec]) -> list[_Numbered]:
         """Every fault of these specs with its number within its variant."""
         numbered: list[_Numbered] = []
-        models = self.workspace.fault_models()
         for spec in specs:
             seen: dict[str, int] = {}
-            for fault in expand(spec, self.seed, self.reading, models=models, manifest=self.manifest):
+            for fault in expand(spec, self.seed, self.reading, models=self._models, manifest=self.manifest):
                 number = seen.get(fault.spec, 0)
                 seen[fault.spec] = number + 1
                 numbered.append((number, fault))

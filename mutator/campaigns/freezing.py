@@ -2,21 +2,33 @@
 
 import csv
 import io
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from dataclasses import asdict
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import is_half_written, json_bytes, make_folder, write_atomic
+from mutator._common.files import (
+    is_half_written,
+    json_bytes,
+    make_folder,
+    remove_folder,
+    write_atomic,
+    writing_atomic,
+)
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.version import VERSION
-from mutator.campaigns.plans import Plan
+from mutator.campaigns.plan_parts import Part, PlanDigest, Tally
+from mutator.campaigns.plans import Plan, Planning
 from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
-from mutator.outcomes.columns import PLAN_COLUMNS, metric_columns
+from mutator.model import Experiment
+from mutator.outcomes.columns import PLAN_COLUMNS, metric_columns, plan_row
 from mutator.outcomes.propagation import channel_facts
 from mutator.store import digests, plan_file
-from mutator.store.digests import Digest, Ledger
+from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.workspace import Workspace
@@ -25,15 +37,26 @@ CSV = "plan.csv"
 _OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # what a killed freeze leaves
 
 
-def freeze(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
+def freeze(plan: Plan | Planning, out: Path, workspace: Workspace) -> RunFolder:
     """Write the plan (and plan.csv) into the run folder `out`, made if missing.
 
     A folder that holds the same plan is left as it is; another plan, or other sources than it was frozen
     with, is a MutatorError, as is a folder in use or one that holds other things.
     """
+    return freeze_and_tell(plan, out, workspace)[0]
+
+
+def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
+    """As `freeze`; also what the plan comes to."""
+    is_new = not out.exists()
     make_run_folder(out)
-    with owned(out):
-        return freeze_owned(plan, out, workspace)
+    try:
+        with owned(out):
+            return freeze_owned(plan, out, workspace)
+    except BaseException:
+        if is_new and not RunFolder.exists(out):
+            remove_folder(out)
+        raise
 
 
 def make_run_folder(out: Path) -> None:
@@ -52,52 +75,90 @@ def make_run_folder(out: Path) -> None:
     make_folder(out)
 
 
-def freeze_owned(plan: Plan, out: Path, workspace: Workspace) -> RunFolder:
-    """As `freeze`, by who owns the folder already."""
+def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
+    """As `freeze_and_tell`, by who owns the folder already."""
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
-        if folder.head["plan"] != plan.digest:
+        tally, found = _counted(plan)
+        if folder.head["plan"] != found:
             raise MutatorError(
                 "holds another plan",
                 where=out,
-                expected=f"plan {plan.digest[:16]}",
+                expected=f"plan {found[:16]}",
                 remedy="use another folder, or the campaign and options it was planned with",
             )
         check_version(out, folder.head["schema"], folder.head["provenance"])
-        check_sources(out, folder.head["sources"], _sources(plan, workspace))
-        return folder
-    write_atomic(out / CAMPAIGN, plan.campaign.source)
-    write_atomic(out / CSV, plan_csv(plan))
-    chunks = plan_file.write(out, plan.experiments, plan.chunks)
-    head = json_bytes(_head(plan, workspace, chunks))
-    written = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
-    files = {name: Digest.of((out / name).read_bytes()) for name in written}
+        check_sources(out, folder.head["sources"], _sources(tally, plan, workspace))
+        return folder, tally
+    tally, found, places, files = _written(plan, out)
+    head = json_bytes(_head(plan, tally, found, workspace, places))
     digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
     write_atomic(out / HEAD, head)  # last: from now on it is a run folder
-    return RunFolder.open(out)
+    return RunFolder.open(out), tally
 
 
-def _sources(plan: Plan, workspace: Workspace) -> dict[str, str]:
-    scenarios = {scenario for scenario, _ in plan.goldens()}
+def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: None) -> tuple[Tally, str]:
+    """What a plan comes to, and its digest; `each` is called with each part of it."""
+    tally, made = plan.empty_tally(), PlanDigest()
+    for part in plan.parts():
+        tally.add(part)
+        made.add([experiment.id for experiment in part.experiments])
+        each(part)
+    known = plan.digest if isinstance(plan, Plan) else made.end(tally.chunks, plan.canary.id, plan.campaign)
+    return tally, known
+
+
+def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, Digest]]:
+    """Write the plan's files part by part: what it comes to, its digest, where the chunks are, and what each
+    file is."""
+    plan_file.make_folder(out)
+    write_atomic(out / CAMPAIGN, plan.campaign.source)
+    with ExitStack() as stack:
+        rows, lines, faults = (
+            DigestingFile(stack.enter_context(writing_atomic(out / name)))
+            for name in (CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+        )
+        writer = plan_file.PlanWriter(lines, faults)
+        rows.write(csv_bytes([], head=True))
+
+        def write(part: Part) -> None:
+            rows.write(csv_bytes(part.experiments))
+            writer.append(part.experiments, part.chunks)
+
+        tally, found = _counted(plan, write)
+    files = {
+        CAMPAIGN: Digest.of(plan.campaign.source),
+        CSV: rows.digest,
+        plan_file.EXPERIMENTS: lines.digest,
+        plan_file.FAULTS: faults.digest,
+    }
+    return tally, found, writer.places, files
+
+
+def _sources(tally: Tally, plan: Plan | Planning, workspace: Workspace) -> dict[str, str]:
+    scenarios = {one.scenario for one in tally.needed()}
     return sources(workspace, workspace.manifest(plan.campaign.target), scenarios)
 
 
-def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> dict[str, Any]:
+def _head(
+    plan: Plan | Planning, tally: Tally, found: str, workspace: Workspace, chunks: list[plan_file.Chunk]
+) -> dict[str, Any]:
     manifest = workspace.manifest(plan.campaign.target)
     structure = workspace.structure(manifest)
     canary = plan_file.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
     return {
         "schema": SCHEMA,
-        "plan": plan.digest,
+        "plan": found,
         "campaign": plan.campaign.name,
         "campaign_digest": digest(plan.campaign.source),
         "study": plan.campaign.study,
         "target": plan.campaign.target,
         "seed": plan.seed,
+        **({"seeds": [plan.seeds[0], plan.seeds[-1]]} if len(plan.seeds) > 1 else {}),
         "reading": plan.reading,
         "choices": asdict(plan.choices),
-        "experiments": len(plan.experiments),
-        "runs": plan.runs,
+        "experiments": tally.experiments,
+        "runs": tally.runs,
         "limits": plain(plan.campaign.limits),
         "hazards": list(manifest.hazards),
         "alerts": list(manifest.alerts),
@@ -109,11 +170,11 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
         "severity": scale.plain() if (scale := workspace.scale_of(manifest)) else None,
         "channels": channel_facts(manifest),
         "structure": structure.model_dump(mode="json", by_alias=True) if structure else None,
-        "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "goldens": [one.plain() for one in tally.needed()],
         "golden_files": list(manifest.outputs),
         "canary": canary,
         "canary_hazard": plan.campaign.canary.hazard,
-        "sources": _sources(plan, workspace),
+        "sources": _sources(tally, plan, workspace),
         "target_files": manifest.tree.digests,
         "provenance": {"mutator": VERSION},
         "stretches": [],
@@ -121,9 +182,16 @@ def _head(plan: Plan, workspace: Workspace, chunks: list[plan_file.Chunk]) -> di
     }
 
 
+def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:
+    """The rows of experiments in plan.csv, after the line with the names of its columns or without."""
+    writer = csv.writer(text := io.StringIO(), lineterminator="\n")
+    if head:
+        writer.writerow(PLAN_COLUMNS)
+    cells = itemgetter(*PLAN_COLUMNS)
+    writer.writerows(cells(plan_row(experiment)) for experiment in experiments)
+    return text.getvalue().encode()
+
+
 def plan_csv(plan: Plan) -> bytes:
     """What plan.csv holds."""
-    writer = csv.DictWriter(text := io.StringIO(), PLAN_COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(plan.rows())
-    return text.getvalue().encode()
+    return csv_bytes(plan.experiments, head=True)

@@ -11,20 +11,32 @@ from mutator.model import Experiment, Fault
 _NAMED = 3  # faults that a warning names
 
 
-def warn_of_values(experiments: Sequence[Experiment], models: FaultModels) -> None:
-    """A MutatorWarning for faults whose value changes nothing, with how many experiments have one."""
-    faults = {experiment.fault.id: experiment.fault for experiment in experiments}
-    idle = {name: fault for name, fault in faults.items() if changes_nothing(fault, models)}
-    if idle:
-        count = sum(experiment.fault.id in idle for experiment in experiments)
-        labels = [fault.label for fault in idle.values()]
-        more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
-        warnings.warn(
-            f"the value of {count} of {counted(len(experiments), 'experiment')} changes nothing: "
-            f"{', '.join(labels[:_NAMED])}{more}",
-            MutatorWarning,
-            stacklevel=2,
-        )
+class IdleValues:
+    """Faults whose value changes nothing, with how many experiments have one."""
+
+    def __init__(self, models: FaultModels) -> None:
+        self._models = models
+        self._labels: list[str] = []
+        self._count = self._of = 0
+
+    def add(self, experiments: Sequence[Experiment]) -> None:
+        """Look at more experiments."""
+        faults = {experiment.fault.id: experiment.fault for experiment in experiments}
+        idle = {name: fault for name, fault in faults.items() if changes_nothing(fault, self._models)}
+        self._labels += [fault.label for fault in idle.values()]
+        self._count += sum(experiment.fault.id in idle for experiment in experiments) if idle else 0
+        self._of += len(experiments)
+
+    def warn(self) -> None:
+        """A MutatorWarning, if there are any."""
+        if labels := list(dict.fromkeys(self._labels)):
+            more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
+            warnings.warn(
+                f"the value of {self._count} of {counted(self._of, 'experiment')} changes nothing: "
+                f"{', '.join(labels[:_NAMED])}{more}",
+                MutatorWarning,
+                stacklevel=2,
+            )
 
 
 def changes_nothing(fault: Fault, models: FaultModels) -> bool:

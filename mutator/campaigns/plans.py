@@ -1,21 +1,23 @@
 """Plans: the frozen, ordered list of a campaign's experiments, and what running them will take."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from html import escape
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mutator._common.arguments import check_type, check_whole
-from mutator._common.hashing import digest, plain
 from mutator._common.tables import Table
-from mutator._common.text import counted
+from mutator._common.text import counted, seeds_text
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.chunks import cut_runs
 from mutator.campaigns.experiments import Expansion
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.plan_warnings import warn_of_values
+from mutator.campaigns.plan_parts import Group, Part, Tally, plan_digest
+from mutator.campaigns.plan_warnings import IdleValues
 from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
@@ -23,7 +25,7 @@ from mutator.model import AfterHazard, Experiment
 from mutator.outcomes.columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN
 from mutator.store.shards import Shard
 from mutator.targets.stopping import stop_source
@@ -32,13 +34,12 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     import pandas as pd
 
-# First part of every plan digest. Digests are cited, so this text stays whatever becomes of the run schema.
-_DIGEST_PREFIX = "run/1"
 RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
 _DEFAULT_CPU_S = 1.4  # one run on the reference engine, interpreter start included
 _START_S = 3.0  # of a campaign, before and after its runs
 _BYTES_PER_EXPERIMENT = 9_000  # its series, patch, record and rows
 _BYTES_PER_GOLDEN = 1_200_000
+_IN_MEMORY = 50_000  # experiments at most of a plan that is read as a whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +97,7 @@ class Plan:
     choices: Choices
     seed: int
     reading: str
-    experiments: tuple[Experiment, ...]
+    experiments: Sequence[Experiment]
     chunks: tuple[int, ...]
     canary: Experiment
     runs: int
@@ -105,7 +106,28 @@ class Plan:
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
-        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, seed {self.seed}>"
+        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, {seeds_text(self.seeds)}>"
+
+    @property
+    def seeds(self) -> range:
+        """The seed, or all of several."""
+        return _seeds(self.campaign, self.choices)
+
+    @cached_property
+    def tally(self) -> Tally:
+        """What it comes to."""
+        found = self.empty_tally()
+        for part in self.parts():
+            found.add(part)
+        return found
+
+    def empty_tally(self) -> Tally:
+        """A tally of no part yet."""
+        return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+
+    def parts(self) -> Iterator[Part]:
+        """All of it, as one part."""
+        yield Part(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
 
     def _repr_html_(self) -> str:
         groups = sorted(self.groups().items())
@@ -120,18 +142,17 @@ class Plan:
 
         return pd.DataFrame(self.rows()).set_index("experiment_id")
 
-    def groups(self) -> Counter[tuple[str, str, str]]:
+    def groups(self) -> Counter[Group]:
         """How many experiments there are of each (module, fault type, method)."""
-        return Counter((e.fault.module, e.fault.fault_type, e.method.value) for e in self.experiments)
+        return self.tally.groups
 
     def rows(self) -> list[dict[str, object]]:
         """One dict per experiment: the columns of the results table that are known before running."""
         return [plan_row(experiment) for experiment in self.experiments]
 
-    def goldens(self) -> list[tuple[str, tuple[str, ...]]]:
-        """(scenario, changes) of every fault-free run that is needed, the canary's included."""
-        needed = dict.fromkeys((e.scenario, e.changes) for e in (*self.experiments, self.canary))
-        return list(needed)
+    def goldens(self) -> tuple[GoldenRun, ...]:
+        """Every fault-free run that is needed, the canary's included."""
+        return self.tally.needed()
 
     def cost(self, workers: int = 2) -> Cost:
         """Expected time and disk of all of it."""
@@ -147,76 +168,127 @@ class Plan:
         )
 
 
+class Planning:
+    """A campaign with what was chosen, checked, which is expanded seed by seed.
+
+    MutatorError for a choice that does not fit the campaign.
+    """
+
+    def __init__(self, workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> None:
+        self.choices = Choices() if choices is None else choices
+        check_type("choices", self.choices, Choices, "mutator.Choices")
+        self.campaign = load_campaign(workspace.campaign(campaign))
+        self.seeds = _seeds(self.campaign, self.choices)
+        readings = workspace.readings()
+        check_readings(self.campaign, readings)
+        load_study(self.campaign)
+        self.reading = self.choices.reading or self.campaign.reading or readings.default
+        if self.choices.reading is not None:
+            readings.check(self.choices.reading)
+        self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
+        if self.campaign.after_hazard is AfterHazard.STOP:
+            stop_source(self._manifest)  # refused here, not by each run
+        self._expansion = Expansion(workspace, self.campaign, self._manifest, self.seeds[0], self.reading)
+        self.canary = self._expansion.canary()
+
+    @property
+    def seed(self) -> int:
+        """The seed, or the first of several."""
+        return self.seeds[0]
+
+    def empty_tally(self) -> Tally:
+        """A tally of no part yet."""
+        return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+
+    def parts(self) -> Iterator[Part]:
+        """The experiments of each seed that has any.
+
+        MutatorError when none is left of all seeds, and for more shards than chunks; MutatorWarning for
+        values that change nothing.
+        """
+        idle, chunks = IdleValues(self._workspace.fault_models()), 0
+        limit = self.choices.limit
+        for number, seed in enumerate(self.seeds):
+            if limit == 0:
+                break
+            most = None if limit is None else -(-limit // (len(self.seeds) - number))
+            part = self._part(seed, most)
+            limit = None if limit is None else limit - len(part.experiments)
+            chunks += len(part.chunks)
+            idle.add(part.experiments)
+            if part.experiments:
+                yield part
+        if not chunks:
+            raise MutatorError(
+                "no experiment is left",
+                where=self.campaign.path,
+                argument="only",
+                expected="at least one",
+                remedy="widen `only`, `exclude` or the campaign's faults",
+            )
+        self._check_shards(chunks)
+        idle.warn()
+
+    def _part(self, seed: int, most: int | None) -> Part:
+        """The experiments of a seed, at most so many."""
+        found = self._expansion.with_seed(seed).experiments()
+        once = in_turn(runs(self._manifest, _choose(found, self.campaign, self.choices, seed, most)))
+        return Part(
+            experiments=tuple(experiment for same in once for experiment in same),
+            chunks=cut_runs(once, self.campaign.chunk),
+            runs=len(once),
+        )
+
+    def _check_shards(self, chunks: int) -> None:
+        if self.choices.shard is not None and Shard.parse(self.choices.shard).of > chunks:
+            raise MutatorError(
+                self.choices.shard,
+                argument="shard",
+                expected=f"at most {chunks} shards, one for each chunk of the plan",
+                remedy="use fewer shards, or a smaller chunk in the campaign",
+            )
+
+
+def _seeds(campaign: Campaign, choices: Choices) -> range:
+    """The campaign's, or the one that was chosen."""
+    return campaign.seeds if choices.seed is None else range(choices.seed, choices.seed + 1)
+
+
 def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
     """Expand a campaign (a name of the library or a file) into its plan; nothing is written or run.
 
     MutatorError for a choice that does not fit the campaign, and when no experiment is left; MutatorWarning
     for values that change nothing.
     """
-    choices = Choices() if choices is None else choices
-    check_type("choices", choices, Choices, "mutator.Choices")
-    loaded = load_campaign(workspace.campaign(campaign))
-    seed = loaded.seed if choices.seed is None else choices.seed
-    readings = workspace.readings()
-    check_readings(loaded, readings)
-    load_study(loaded)
-    reading = choices.reading or loaded.reading or readings.default
-    if choices.reading is not None:
-        readings.check(choices.reading)
-    expansion = Expansion(workspace, loaded, workspace.manifest(loaded.target), seed, reading)
-    if loaded.after_hazard is AfterHazard.STOP:
-        stop_source(expansion.manifest)  # refused here, not by each run
-    once = in_turn(runs(expansion.manifest, _choose(expansion.experiments(), loaded, choices, seed)))
-    experiments = tuple(experiment for same in once for experiment in same)
-    warn_of_values(experiments, workspace.fault_models())
-    canary = expansion.canary()
-    chunks = cut_runs(once, loaded.chunk)
-    if choices.shard is not None and Shard.parse(choices.shard).of > len(chunks):
-        raise MutatorError(
-            choices.shard,
-            argument="shard",
-            expected=f"at most {len(chunks)} shards, one for each chunk of the plan",
-            remedy="use fewer shards, or a smaller chunk in the campaign",
-        )
+    planning = Planning(workspace, campaign, choices)
+    parts = tuple(planning.parts())
+    experiments = tuple(chain.from_iterable(part.experiments for part in parts))
+    chunks = tuple(chain.from_iterable(part.chunks for part in parts))
+    canary, loaded = planning.canary, planning.campaign
     return Plan(
         campaign=loaded,
-        choices=choices,
-        seed=seed,
-        reading=reading,
+        choices=planning.choices,
+        seed=planning.seed,
+        reading=planning.reading,
         experiments=experiments,
         chunks=chunks,
         canary=canary,
         digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
-        runs=len(once),
+        runs=sum(part.runs for part in parts),
     )
 
 
-def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-    """The digest that follows from ids and chunks of the experiments, the canary's id, and the campaign."""
-    content = [ids, chunks, canary, plain(campaign.canary), plain(campaign.limits)]
-    return digest([_DIGEST_PREFIX, *content])
-
-
 def _choose(
-    experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int
+    experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int, most: int | None
 ) -> tuple[Experiment, ...]:
+    """What of a seed's experiments is planned, at most so many."""
     if campaign.sample is not None:
         experiments = _sample(experiments, campaign, campaign.sample, seed)
     for text, wanted in ((choices.only, True), (choices.exclude, False)):
         if text is not None:
             accepts = compile_filter(text, PLAN_COLUMNS)
             experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
-    if choices.limit is not None:
-        experiments = pick_pairs(experiments, choices.limit, seed)
-    if not experiments:
-        raise MutatorError(
-            "no experiment is left",
-            where=campaign.path,
-            argument="only",
-            expected="at least one",
-            remedy="widen `only`, `exclude` or the campaign's faults",
-        )
-    return experiments
+    return experiments if most is None else pick_pairs(experiments, most, seed)
 
 
 def _sample(
@@ -232,18 +304,25 @@ def _sample(
         ) from None
 
 
-def load_plan(folder: RunFolder) -> Plan:
-    """The frozen plan of a run folder, complete (for reports; workers read single chunks instead)."""
+def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
+    """The frozen plan of a run folder (workers read single chunks instead); `tally` is what it comes to, if
+    that is known. Of a very large one no experiment is kept in memory."""
     head = folder.head
-    return Plan(
+    large = head["experiments"] > _IN_MEMORY
+    plan = Plan(
         campaign=load_campaign(folder.path / CAMPAIGN),
         choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
         seed=head["seed"],
         reading=head["reading"],
-        experiments=plan_file.read_all(folder.path),
+        experiments=plan_file.ExperimentsInOrder(folder.path, head["chunks"])
+        if large
+        else plan_file.read_all(folder.path),
         chunks=tuple(count for _, _, count in head["chunks"]),
         canary=folder.canary,
         runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),
     )
+    if tally is not None:
+        vars(plan)["tally"] = tally  # what the cached property would find out, experiment by experiment
+    return plan

@@ -11,7 +11,7 @@ import typer
 
 import mutator
 from mutator._common.cores import usable_cores
-from mutator._common.text import counted
+from mutator._common.text import counted, seeds_text
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
@@ -111,6 +111,7 @@ def _emit_plan(
         for (m, f, how), n in sorted(made.groups().items())
     ]
     facts = {"run": str(folder), "digest": made.digest, "seed": made.seed, "reading": made.reading}
+    facts |= {"seeds": [made.seeds[0], made.seeds[-1]]} if len(made.seeds) > 1 else {}
     facts |= {"experiments": len(made.experiments), "runs": made.runs, "groups": kinds, "cost": cost}
     terminal.emit(facts | {"not_forked": anew})
 
@@ -124,6 +125,8 @@ def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: di
         right=(2,),
         total=True,
     )
+    if len(made.seeds) > 1:
+        terminal.say(f"{seeds_text(made.seeds)}: {len(made.goldens())} golden runs, as each seed has its own")
     if shared := len(made.experiments) - made.runs:
         terminal.say(f"{made.runs} runs: {shared} are the same run as one in another scenario, and share it")
     for why, variants in _by_reason(anew).items():

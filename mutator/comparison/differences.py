@@ -53,6 +53,8 @@ def facts(a: Side, b: Side) -> tuple[Fact, ...]:
 def _facts(side: Side) -> dict[str, str]:
     head, stretches = side.folder.head, side.folder.stretches
     told = {name: str(head[name]) for name in _HEAD}
+    if len(seeds := side.folder.seeds) > 1:
+        told["seed"] = f"{seeds[0]} to {seeds[-1]}"
     told["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
     told["chosen"] = ", ".join(f"{k} {v}" for k, v in head["choices"].items() if v is not None) or "-"
     told |= {f"digest of {name}": value[:_SHORT] for name, value in head["sources"].items()}

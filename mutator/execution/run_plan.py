@@ -6,7 +6,7 @@ from pathlib import Path
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.freezing import freeze_owned
-from mutator.campaigns.plans import Choices, load_plan, make_plan
+from mutator.campaigns.plans import Choices, Planning, load_plan, make_plan
 from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.review import gate
@@ -27,9 +27,9 @@ def open_frozen(
         folder = _found(workspace, campaign, out, choices)
         approvals = gate.approvals(workspace, load_plan(folder)) if reviewed else None
     else:
-        plan = make_plan(workspace, campaign, choices)
-        approvals = gate.approvals(workspace, plan) if reviewed else None
-        folder = freeze_owned(plan, out, workspace)
+        planning = Planning(workspace, campaign, choices)
+        approvals = gate.approvals(workspace, make_plan(workspace, campaign, choices)) if reviewed else None
+        folder, _ = freeze_owned(planning, out, workspace)
     if approvals is not None:
         gate.write_approvals(folder.path, approvals)
     return folder
@@ -49,7 +49,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
         )
     for name, value in asdict(choices).items():
         frozen = head["choices"].get(name)
-        if name in ("seed", "reading"):
+        if name == "reading" or (name == "seed" and "seeds" not in head):
             frozen = head[name]
         if value is not None and value != frozen:
             raise MutatorError(
@@ -60,6 +60,6 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
                 argument=name,
                 remedy=f"leave out `{name}`, or use another folder",
             )
-    scenarios = {scenario for scenario, _ in head["goldens"]}
-    check_sources(out, head["sources"], sources(workspace, workspace.manifest(head["target"]), scenarios))
+    now = sources(workspace, workspace.manifest(head["target"]), folder.scenarios)
+    check_sources(out, head["sources"], now)
     return folder

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 
 from mutator._common.hashing import digest
@@ -21,10 +21,11 @@ from mutator.outcomes.judging import Judged, load_channels, load_judged
 from mutator.outcomes.propagation import departures
 from mutator.outcomes.sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge
-from mutator.store.run_folder import golden_key
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
+
+_KEPT = 32  # golden runs: those of one seed, and of the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,40 +48,25 @@ class Finished:
 
 
 class Goldens:
-    """The channels of golden runs, loaded when first asked for. `folder_of` finds a run's output."""
+    """The channels of golden runs, loaded when asked for; the last few are kept. `folder_of` finds where the
+    golden run of an experiment left its files."""
 
-    def __init__(self, manifest: TargetManifest, folder_of: Callable[[str, tuple[str, ...]], Path]) -> None:
-        self._manifest = manifest
-        self._folder_of = folder_of
-        self._traces: dict[tuple[str, tuple[str, ...]], Trace] = {}
-        self._samplers: dict[str, Sampler] = {}
-        self._ends: dict[tuple[str, tuple[str, ...]], bool] = {}
-
-    def folder(self, experiment: Experiment) -> Path:
-        """Where the run without the fault left its files."""
-        return self._folder_of(experiment.scenario, experiment.changes)
+    def __init__(self, manifest: TargetManifest, folder_of: Callable[[Experiment], Path]) -> None:
+        self.folder = folder_of  # where the run without the fault left its files
+        self._trace = lru_cache(_KEPT)(partial(load_channels, manifest))
+        self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
+        self._ends = lru_cache(_KEPT)(lambda folder: load_judged(manifest, folder)[1].t_end is not None)
 
     def trace(self, experiment: Experiment) -> Trace:
-        key = (experiment.scenario, experiment.changes)
-        if key not in self._traces:
-            folder = self.folder(experiment)
-            self._traces[key] = load_channels(self._manifest, folder)
-        return self._traces[key]
+        return self._trace(self.folder(experiment))
 
     def ends(self, experiment: Experiment) -> bool:
         """Whether a terminal hazard is in the golden run of an experiment."""
-        key = (experiment.scenario, experiment.changes)
-        if key not in self._ends:
-            _, judged = load_judged(self._manifest, self.folder(experiment))
-            self._ends[key] = judged.t_end is not None
-        return self._ends[key]
+        return self._ends(self.folder(experiment))
 
     def sampler(self, experiment: Experiment) -> Sampler:
         """What makes the series of runs that are compared with the golden run of an experiment."""
-        key = golden_key(experiment.scenario, experiment.changes)
-        if key not in self._samplers:
-            self._samplers[key] = Sampler(self._manifest, self.trace(experiment))
-        return self._samplers[key]
+        return self._sampler(self.folder(experiment))
 
 
 class Runner:
@@ -178,7 +164,7 @@ class Runner:
             return None
         sampler = self.goldens.sampler(experiment)
         return EncodedSeries(
-            key=golden_key(experiment.scenario, experiment.changes),
+            key=self.goldens.folder(experiment).name,
             golden=sampler.encoded,
             faulty=encode(sampler.series(faulty, record), sampler.golden),
         )

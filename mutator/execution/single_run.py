@@ -51,7 +51,7 @@ def run_single(
     """
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
-        goldens = Goldens(manifest, lambda scenario, changes: reference)
+        goldens = Goldens(manifest, lambda experiment: reference)
         runner = Runner(manifest, workspace.fault_models(), engine, goldens, workspace.scenario)
         (finished,) = _kept(runner.run([experiment]), out)
     return Single(
@@ -84,7 +84,7 @@ def rerun(
     manifest = manifest_of(workspace, folder)
     wanted = folder.find(experiment_id)
     experiment = next(e for e in plan_file.read_all(folder.path) if e.id == wanted)
-    golden = folder.golden(experiment.scenario, experiment.changes)
+    golden = folder.golden_folder(experiment)
     single = run_single(
         workspace,
         manifest,
@@ -108,8 +108,7 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
     """The target of a run; MutatorError when it, templates or scenarios are no longer those of the run."""
     manifest = workspace.manifest(folder.head["target"])
-    scenarios = {scenario for scenario, _ in folder.head["goldens"]}
-    check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, scenarios))
+    check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, folder.scenarios))
     return manifest
 
 

@@ -28,7 +28,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
     with ScratchFolder("mutator-verify-") as scratch:
         for name in ids:
             experiment = experiments[name]
-            golden = folder.golden(experiment.scenario, experiment.changes)
+            golden = folder.golden_folder(experiment)
             single = run_single(
                 workspace,
                 manifest,

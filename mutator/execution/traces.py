@@ -49,7 +49,7 @@ class Traces:
         """
         kept = self.folder.path / "traces" / experiment_id
         experiment = self._experiments[experiment_id]
-        golden = self.folder.golden(experiment.scenario, experiment.changes)
+        golden = self.folder.golden_folder(experiment)
         if not golden.is_dir():
             golden = kept / "golden"
         if not (golden.is_dir() and self.is_kept(experiment_id)):

@@ -45,8 +45,8 @@ class Worker:
         self._name = assignment.name
         head = self.folder.head
         manifest = workspace.manifest(head["target"])
-        scenarios = {scenario for scenario, _ in head["goldens"]}
-        check_sources(self.folder.path, head["sources"], sources(workspace, manifest, scenarios))
+        now = sources(workspace, manifest, self.folder.scenarios)
+        check_sources(self.folder.path, head["sources"], now)
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
@@ -108,7 +108,7 @@ class Worker:
                 writer.close()
 
     def _make_runner(self, engine: Engine, *, with_series: bool = False) -> Runner:
-        goldens = Goldens(self._manifest, self.folder.golden)
+        goldens = Goldens(self._manifest, self.folder.golden_folder)
         models = self._workspace.fault_models()
         return Runner(
             self._manifest, models, engine, goldens, self._workspace.scenario, with_series=with_series

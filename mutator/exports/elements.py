@@ -49,6 +49,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
         entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
     head = folder.head
     config = {name: head[name] for name in ("campaign", "target", "seed", "reading", "plan", "sources")}
+    config |= {"seeds": head["seeds"]} if "seeds" in head else {}
     return {
         "schemaVersion": SCHEMA_VERSION,
         "thresholds": {"high": 100, "low": 0},

@@ -124,7 +124,7 @@ class Content:
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
         experiment = self._experiments[experiment_id]
-        golden = self._folder.golden(experiment.scenario, experiment.changes)
+        golden = self._folder.golden_folder(experiment)
         if not (golden.is_dir() or (kept / "golden").is_dir()) or not self._traces.is_kept(experiment_id):
             return None
         return self._traces.of(experiment_id)

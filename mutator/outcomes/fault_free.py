@@ -8,7 +8,7 @@ import numpy as np
 from mutator._common.tables import Table
 from mutator.outcomes.golden import load_record, load_trace
 from mutator.outcomes.judging import judge_run
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 
 Events = tuple[tuple[str, float], ...]  # (name, s of simulation)
@@ -20,6 +20,7 @@ class FaultFreeRun:
 
     scenario: str
     changes: tuple[str, ...]
+    seed: int | None  # None: that of the run folder
     hazards: Events
     alerts: Events
     ranges: tuple[tuple[str, float, float], ...]
@@ -28,15 +29,14 @@ class FaultFreeRun:
 def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Those of a run folder, by name. MutatorError where one cannot be read."""
     found = []
-    for scenario, changes in sorted(folder.head["goldens"]):
-        place = folder.golden(scenario, tuple(changes))
+    for one in sorted(folder.goldens):
+        place = folder.golden(*one)
         trace = load_trace(manifest, place)
         judged = judge_run(manifest, trace, load_record(manifest, place))
         plotted = [channel.name for channel in manifest.plotted if channel.name in trace]
         found.append(
             FaultFreeRun(
-                scenario=scenario,
-                changes=tuple(changes),
+                **one._asdict(),
                 hazards=judged.hazards,
                 alerts=judged.alerts,
                 ranges=tuple((name, *_range(trace[name])) for name in plotted),
@@ -52,7 +52,7 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Ta
     rows = []
     for run in runs:
         ranges = {name: f"{least:.4g} to {largest:.4g}" for name, least, largest in run.ranges}
-        key = golden_key(run.scenario, run.changes)
+        key = GoldenRun(run.scenario, run.changes, run.seed).key
         events = [_told(run.alerts), _told(run.hazards)] if alerts else [_told(run.hazards)]
         rows.append([key, *events, *(ranges.get(name, "") for name in channels)])
     events = ["alerts", "hazards"] if alerts else ["hazards"]

@@ -14,7 +14,7 @@ from mutator.outcomes.reader import Results
 from mutator.report.film import Filming, Shot
 from mutator.store import plan_file
 from mutator.store.progress import Pace, Progress
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.workspace import Workspace
 
 MOST, ONE_IN = 10, 20  # at most so many experiments, and one of so many that are planned
@@ -69,7 +69,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
 
 
 def _golden_key(experiment: Experiment) -> str:
-    return golden_key(experiment.scenario, experiment.changes)
+    return GoldenRun.of(experiment, several_seeds=True).key
 
 
 def _due(

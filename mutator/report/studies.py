@@ -90,10 +90,10 @@ class ReportedRun:
         ends: dict[str, float] = {}
         try:
             manifest = self.workspace.manifest(self.folder.head["target"])
-            for scenario, changes in self.folder.head["goldens"]:
-                trace = load_trace(manifest, self.folder.golden(scenario, changes), [])
+            for one in self.folder.goldens:
+                trace = load_trace(manifest, self.folder.golden(*one), [])
                 end = float(trace[manifest.time_channel][-1])
-                ends[scenario] = max(end, ends.get(scenario, end))
+                ends[one.scenario] = max(end, ends.get(one.scenario, end))
         except (MutatorError, KeyError):
             return None
         return ends

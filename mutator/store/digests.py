@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from mutator._common.files import (
     is_no_file,
@@ -59,6 +59,23 @@ class Digest:
     def is_of(self, found: "Digest | None") -> bool:
         """Whether a file that was found is still what it was."""
         return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
+
+
+class DigestingFile:
+    """Writes to a file, and knows the digest of what was written."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._hash, self._size = file, hashlib.sha256(), 0
+
+    def write(self, data: bytes) -> None:
+        self._file.write(data)
+        self._hash.update(data)
+        self._size += len(data)
+
+    @property
+    def digest(self) -> Digest:
+        """Of all that was written."""
+        return Digest(size=self._size, sha256=self._hash.hexdigest())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,14 +1,16 @@
 """The frozen plan on disk: one line per experiment, read whole or one chunk at a time."""
 
 import json
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
+from itertools import accumulate, islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, overload
 
-from mutator._common.files import raising_disk_full, write_atomic
+from mutator._common.files import raising_disk_full, writing_atomic
 from mutator._common.hashing import added_values, canonical, content_id, plain
 from mutator.errors import MutatorError
 from mutator.model import (
@@ -35,21 +37,48 @@ _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
 
 
+class SupportsWrite(Protocol):
+    """What lines are written to."""
+
+    def write(self, data: bytes, /) -> object: ...
+
+
+class PlanWriter:
+    """Writes experiments and their faults, each once, to the files that are given; `places` has where each
+    chunk is."""
+
+    def __init__(self, experiments: SupportsWrite, faults: SupportsWrite) -> None:
+        self.places: list[Chunk] = []
+        self._experiments, self._faults = experiments, faults
+        self._known: set[str] = set()
+        self._offset = 0
+
+    def append(self, experiments: Sequence[Experiment], chunks: Iterable[int]) -> None:
+        """Write the experiments of the next chunks, which are so long."""
+        lines = (canonical(_line(experiment)).encode() + b"\n" for experiment in experiments)
+        for count in chunks:
+            data = b"".join(islice(lines, count))
+            self._experiments.write(data)
+            self.places.append((self._offset, len(data), count))
+            self._offset += len(data)
+        new = {one.fault.id: one.fault for one in experiments if one.fault.id not in self._known}
+        self._known.update(new)
+        self._faults.write(b"".join(canonical(plain(fault)).encode() + b"\n" for fault in new.values()))
+
+
 def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -> list[Chunk]:
     """Write the plan's files; returns where each chunk is."""
-    lines = [canonical(to_plain(experiment)).encode() + b"\n" for experiment in experiments]
-    faults = {experiment.fault.id: experiment.fault for experiment in experiments}
+    make_folder(run)
+    with writing_atomic(run / EXPERIMENTS) as lines, writing_atomic(run / FAULTS) as faults:
+        writer = PlanWriter(lines, faults)
+        writer.append(experiments, chunks)
+    return writer.places
+
+
+def make_folder(run: Path) -> None:
+    """The folder of the plan's files."""
     with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
-    write_atomic(run / EXPERIMENTS, b"".join(lines))
-    write_atomic(run / FAULTS, b"".join(canonical(plain(f)).encode() + b"\n" for f in faults.values()))
-    places: list[Chunk] = []
-    offset = first = 0
-    for count in chunks:
-        length = sum(map(len, lines[first : first + count]))
-        places.append((offset, length, count))
-        offset, first = offset + length, first + count
-    return places
 
 
 _Lines = Iterable[tuple[int | None, bytes]]  # number, where it is known, and text
@@ -100,8 +129,43 @@ def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
 
 def read_all(run: Path) -> tuple[Experiment, ...]:
     """Every experiment, in the plan's order."""
+    return tuple(iterate(run))
+
+
+class ExperimentsInOrder(Sequence[Experiment]):
+    """Every experiment, in the plan's order, read when asked for: a million need no room."""
+
+    def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
+        self._run, self._chunks = run, chunks
+        self._ends = list(accumulate(count for _, _, count in chunks))
+
+    def __len__(self) -> int:
+        return self._ends[-1] if self._ends else 0
+
+    def __iter__(self) -> Iterator[Experiment]:
+        return iterate(self._run)
+
+    @overload
+    def __getitem__(self, place: int) -> Experiment: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Experiment]: ...
+    def __getitem__(self, place: int | slice) -> Experiment | Sequence[Experiment]:
+        if isinstance(place, slice):
+            return [self[i] for i in range(len(self))[place]]
+        at = range(len(self))[place]
+        number = bisect_right(self._ends, at)
+        chunk = self._chunks[number]
+        return read_chunk(self._run, chunk, self._faults)[at - self._ends[number] + chunk[2]]
+
+    @cached_property
+    def _faults(self) -> dict[str, Fault]:
+        return read_faults(self._run)
+
+
+def iterate(run: Path) -> Iterator[Experiment]:
+    """As `read_all`, one after the other."""
     path, faults = run / EXPERIMENTS, read_faults(run)
-    return tuple(_read(path, _lines(path), partial(experiment_from, faults=faults)))
+    yield from _read(path, _lines(path), partial(experiment_from, faults=faults))
 
 
 def lines_of(path: Path) -> Iterator[bytes]:
@@ -143,15 +207,19 @@ def problems(run: Path) -> Iterator[MutatorError]:
 
 def to_plain(experiment: Experiment) -> dict[str, Any]:
     """What JSON knows of an experiment; its fault by id."""
+    return {name: plain(value) for name, value in _line(experiment).items()}
+
+
+def _line(experiment: Experiment) -> dict[str, Any]:
     return {
         "id": experiment.id,
         "fault": experiment.fault.id,
         "scenario": experiment.scenario,
         "scenario_digest": experiment.scenario_digest,
-        "method": experiment.method.value,
-        "trigger": plain(experiment.trigger),
+        "method": experiment.method,
+        "trigger": experiment.trigger,
         "seed": experiment.seed,
-        "setting": list(experiment.setting),
+        "setting": experiment.setting,
         **added_values(experiment),
     }
 

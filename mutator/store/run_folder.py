@@ -25,11 +25,11 @@ DIR/
   work/                                          scratch of running experiments
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mutator._common.files import check_is_text
 from mutator._common.hashing import plain
@@ -70,9 +70,28 @@ CONTENT = (  # all that may be in a run folder; * stands for any text, folders i
 )
 
 
-def golden_key(scenario: str, changes: Sequence[str]) -> str:
-    """Name of a golden run: `S1`, `S1+alone`."""
-    return "+".join((scenario, *changes))
+class GoldenRun(NamedTuple):
+    """A fault-free run: its scenario with changes, and its seed where a run has several seeds (None: that of
+    the run)."""
+
+    scenario: str
+    changes: tuple[str, ...] = ()
+    seed: int | None = None
+
+    @classmethod
+    def of(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
+        """What an experiment is compared with."""
+        return cls(experiment.scenario, experiment.changes, experiment.seed if several_seeds else None)
+
+    @property
+    def key(self) -> str:
+        """Its name: `S1`, `S1+alone`, `S1+alone@7` with seed 7."""
+        name = "+".join((self.scenario, *self.changes))
+        return name if self.seed is None else f"{name}@{self.seed}"
+
+    def plain(self) -> list[Any]:
+        """As run.json has it."""
+        return [self.scenario, list(self.changes), *([] if self.seed is None else [self.seed])]
 
 
 @dataclass(frozen=True)
@@ -153,7 +172,7 @@ class RunFolder:
         head = self.head
         stretches = [plain(stretch) for stretch in self.stretches]
         found = {"mutator": head["provenance"]["mutator"], "stretches": stretches}
-        return found | {key: head[key] for key in ("sources", "seed", "reading")}
+        return found | {key: head[key] for key in ("sources", "seed", "seeds", "reading") if key in head}
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
@@ -211,9 +230,34 @@ class RunFolder:
         stops = self.head.get("canary", {}).get("after_hazard") == AfterHazard.STOP
         return STOP_NOTE if stops else ""
 
-    def golden(self, scenario: str, changes: tuple[str, ...] = ()) -> Path:
-        """Folder with trace and record of the fault-free run."""
-        return self.path / "golden" / golden_key(scenario, changes)
+    @property
+    def seeds(self) -> range:
+        """The seed of all that is drawn, or several."""
+        first, last = self.head.get("seeds", (self.head["seed"], self.head["seed"]))
+        return range(first, last + 1)
+
+    @cached_property
+    def goldens(self) -> tuple[GoldenRun, ...]:
+        """Every fault-free run that is needed."""
+        told = self.head["goldens"]
+        return tuple(GoldenRun(scenario, tuple(changes), *seed) for scenario, changes, *seed in told)
+
+    @property
+    def scenarios(self) -> set[str]:
+        """The scenarios that are driven."""
+        return {one.scenario for one in self.goldens}
+
+    def golden_of(self, experiment: Experiment) -> GoldenRun:
+        """The fault-free run that an experiment is compared with."""
+        return GoldenRun.of(experiment, several_seeds=len(self.seeds) > 1)
+
+    def golden(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
+        """Folder with trace and record of a fault-free run."""
+        return self.path / "golden" / GoldenRun(scenario, changes, seed).key
+
+    def golden_folder(self, experiment: Experiment) -> Path:
+        """That of the run that an experiment is compared with."""
+        return self.golden(*self.golden_of(experiment))
 
     @cached_property
     def patches(self) -> Patches:

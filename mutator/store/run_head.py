@@ -34,6 +34,7 @@ _SHAPES: dict[str, Any] = {
     "campaign_digest": str,
     "target": str,
     "seed": int,
+    "seeds": [int],
     "reading": str,
     "choices": {str: str | int | None},
     "experiments": int,
@@ -57,7 +58,7 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": 2, "chunks": 3, "metrics": 4, "channels": 5}  # of each item
+_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)}  # of each item
 
 
 class Head(dict[str, Any]):
@@ -88,7 +89,9 @@ def _wrong(head: Head) -> Iterator[str]:
     known = {field.name for field in fields(Limits)}
     if not head.get("limits", {}).keys() <= known:
         yield "limits"
-    yield from (key for key, size in _SIZES.items() if any(len(item) != size for item in head.get(key, ())))
+    yield from (
+        key for key, size in _SIZES.items() if any(len(item) not in size for item in head.get(key, ()))
+    )
 
 
 def _fits(value: object, shape: Any) -> bool:

@@ -11,7 +11,8 @@ from pathlib import Path
 from mutator._common.files import read_json
 from mutator._common.hashing import digest, plain
 from mutator.campaigns.freezing import CSV, plan_csv
-from mutator.campaigns.plans import load_plan, plan_digest
+from mutator.campaigns.plan_parts import plan_digest
+from mutator.campaigns.plans import load_plan
 from mutator.campaigns.provenance import sources
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
@@ -127,7 +128,7 @@ def _plan(folder: RunFolder) -> Problems:
         "campaign_digest": digest(campaign.source),
         "target": campaign.target,
         "limits": plain(campaign.limits),
-        "goldens": [[scenario, list(changes)] for scenario, changes in plan.goldens()],
+        "goldens": [one.plain() for one in plan.goldens()],
         "canary_hazard": campaign.canary.hazard,
     }
     for key, value in follows.items():
@@ -166,7 +167,7 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
         )
         return
     manifest = workspace.manifest(head["target"])
-    now = sources(workspace, manifest, {scenario for scenario, _ in head["goldens"]})
+    now = sources(workspace, manifest, folder.scenarios)
     for name, known in head["sources"].items():
         if now.get(name) != known:
             yield MutatorError(

@@ -22,7 +22,7 @@ from mutator.mutants.building import InvalidMutant, build
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.digests import Digest
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.verification import preflight_cache, unreached
@@ -33,7 +33,7 @@ from mutator.verification.preflight_rules import (
     judge_null,
     judge_same,
 )
-from mutator.verification.preflight_runs import AGAIN, GOLDEN, NULL, CheckDriver, Notify, Runs, golden_keys
+from mutator.verification.preflight_runs import AGAIN, GOLDEN, NULL, CheckDriver, Notify, Runs
 from mutator.workspace import Workspace
 
 
@@ -67,7 +67,7 @@ def run_checks(
 def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
     """What to say of the plan's triggers that no golden run reaches; nothing unless the checks have just
     driven the golden runs, or found them cached."""
-    experiments = ((golden_key(e.scenario, e.changes), e) for e in plan_file.read_all(folder.path))
+    experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
     observed = unreached.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head["target"])
     return unreached.remarks(workspace, manifest, experiments, observed) if observed else []
@@ -75,7 +75,7 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
 
 def are_there(folder: RunFolder) -> bool:
     """Whether a run folder holds results of checks and all golden runs."""
-    places = (folder.golden(*key) for key in golden_keys(folder))
+    places = (folder.golden(*one) for one in folder.goldens)
     goldens = (place / name for place in places for name in folder.head["golden_files"])
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
@@ -95,8 +95,8 @@ class _Checks:
         self.kept = _kept(folder)
         self.manifest: TargetManifest = workspace.manifest(head["target"])
         self.models = workspace.fault_models()
-        self.keys = golden_keys(folder)
-        now = sources(workspace, self.manifest, {scenario for scenario, _ in self.keys})
+        self.keys = folder.goldens
+        now = sources(workspace, self.manifest, folder.scenarios)
         self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
         content = [
@@ -133,7 +133,7 @@ class _Checks:
     def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
         if said is None or said["digest"] != self.digest:
             return None
-        keys = [golden_key(*key) for key in self.keys]
+        keys = [one.key for one in self.keys]
         if any(digest_of(self.manifest, place / "golden" / key) != said["goldens"][key] for key in keys):
             return None
         results = tuple(CheckResult(**result) for result in said["results"])
@@ -149,7 +149,7 @@ class _Checks:
         )
         runs, canary_verdict = driver.drive(workers, notify)
         results = [anchors, *self._judge(runs), _result("canary", *canary_verdict)]
-        goldens = {golden_key(*key): runs[GOLDEN, key].digest for key in self.keys}
+        goldens = {one.key: runs[GOLDEN, one].digest for one in self.keys}
         self._check_same_as_before(goldens)
         cpu = [runs[GOLDEN, key].cpu_s for key in self.keys]
         checks = {
@@ -202,20 +202,21 @@ class _Checks:
         for key in self.keys:
             first, again, null = (runs[name, key] for name in (GOLDEN, AGAIN, NULL))
             detail = judge_golden(first, again)
-            yield _result(f"golden {golden_key(*key)}", detail, "the same bytes twice")
+            yield _result(f"golden {key.key}", detail, "the same bytes twice")
             if not first.problem:
                 detail = judge_null(first, null)
-                yield _result(f"null mutant {golden_key(*key)}", detail, "the same bytes as golden")
+                yield _result(f"null mutant {key.key}", detail, "the same bytes as golden")
         yield from self._judge_same(runs)
 
     def _judge_same(self, runs: Runs) -> Iterator[CheckResult]:
         """Scenarios that a change makes the same, as the manifest has it, drive to the same bytes."""
-        same: dict[tuple[str, ...], dict[str, CheckRun]] = {}
-        for scenario, changes in self.keys:
-            if scenario in same_in(self.manifest, changes):
-                same.setdefault(changes, {})[scenario] = runs[GOLDEN, (scenario, changes)]
-        for changes, goldens in same.items():
-            yield _result(f"same {'+'.join((*goldens, *changes))}", judge_same(goldens), "one run for all")
+        same: dict[GoldenRun, dict[str, CheckRun]] = {}
+        for one in self.keys:
+            if one.scenario in same_in(self.manifest, one.changes):
+                same.setdefault(one._replace(scenario=""), {})[one.scenario] = runs[GOLDEN, one]
+        for one, goldens in same.items():
+            name = one._replace(scenario="+".join(goldens)).key
+            yield _result(f"same {name}", judge_same(goldens), "one run for all")
 
     def _anchors(self) -> CheckResult:
         """Each variant of the plan finds its statements (not compiling is a result, told later)."""

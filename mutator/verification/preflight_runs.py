@@ -12,7 +12,7 @@ from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.model import Experiment
 from mutator.mutants.building import build
 from mutator.store.progress import Pace, Progress
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.verification import canary, unreached
@@ -24,7 +24,7 @@ _CANARY = "canary"
 _OTHER_HASH_SEED = 4242
 
 Notify = Callable[[Progress], None]
-Runs = dict[tuple[str, Any], CheckRun]  # by kind of run, and (scenario, changes)
+Runs = dict[tuple[str, Any], CheckRun]  # by kind of run, and `GoldenRun`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,14 +69,13 @@ class CheckDriver:
     def _jobs(self) -> dict[tuple[str, Any], Job]:
         jobs: dict[tuple[str, Any], Job] = {}
         null = build(self.manifest, self.workspace.fault_models(), None, always())
-        for key in golden_keys(self.folder):
-            scenario, changes = key
+        for key in self.folder.goldens:
             common: dict[str, Any] = {
-                "scenario": self.workspace.scenario(scenario),
-                "seed": self.folder.head["seed"],
-                "changes": changes,
+                "scenario": self.workspace.scenario(key.scenario),
+                "seed": self.folder.head["seed"] if key.seed is None else key.seed,
+                "changes": key.changes,
             }
-            name = golden_key(*key)
+            name = key.key
             jobs[NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
             jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
             jobs[AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
@@ -88,19 +87,14 @@ class CheckDriver:
             execution = engine.execute(job, scratch)
             run = look(self.manifest, execution)
             if name[0] == NULL:
-                unreached.write_observed(self.kept, golden_key(*name[1]), execution.watched.get("seen", ()))
+                unreached.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
             if name[0] == GOLDEN and not run.problem:
-                place = self.kept / "golden" / golden_key(*name[1])
+                place = self.kept / "golden" / name[1].key
                 place.parent.mkdir(parents=True, exist_ok=True)
                 execution.out.rename(place)
             return run
         finally:
             remove_folder(scratch)
-
-
-def golden_keys(folder: RunFolder) -> list[tuple[str, tuple[str, ...]]]:
-    """(scenario, changes) of the golden runs that a run folder needs."""
-    return [(scenario, tuple(changes)) for scenario, changes in folder.head["goldens"]]
 
 
 def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:

@@ -15,7 +15,7 @@ from mutator.store import digests
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.lines import read_segment
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import RunFolder
 
 SCHEMA = "seal/1"
 # What run.json says of the results, and reports repeat.
@@ -32,6 +32,7 @@ def seal_of(folder: RunFolder) -> str | None:
         return None
     head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
     facts = {key: head[key] for key in _HEAD}
+    facts |= {"seeds": head["seeds"]} if "seeds" in head else {}
     facts |= {
         "choices": _choices(head["choices"]),
         "mutator": head["provenance"]["mutator"],
@@ -61,10 +62,10 @@ def not_verifiable(folder: RunFolder) -> str:
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
     """Digest of the files called `names`, trace and record, of each golden run."""
     found = {}
-    for scenario, changes in folder.head["goldens"]:
-        place = folder.golden(scenario, tuple(changes))
+    for one in folder.goldens:
+        place = folder.golden(*one)
         files = [digest((place / name).read_bytes()) for name in names]
-        found[golden_key(scenario, changes)] = digest(files)
+        found[one.key] = digest(files)
     return found
 
 

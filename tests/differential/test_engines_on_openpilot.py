@@ -12,7 +12,7 @@ from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
-from mutator.store.run_folder import golden_key
+from mutator.store.run_folder import GoldenRun
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -30,11 +30,10 @@ def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
     (tmp_path / "work").mkdir()
     limits = plan.campaign.limits
     reference = ReferenceEngine(manifest, base, tmp_path / "work", limits)
-    for scenario, changes in plan.goldens():
-        name = golden_key(scenario, changes)
-        job = Job(name=name, scenario=clone.scenario(scenario), seed=plan.seed, changes=changes)
-        reference.execute(job, tmp_path / name)
-    goldens = Goldens(manifest, lambda scenario, changes: tmp_path / golden_key(scenario, changes) / "out")
+    for one in plan.goldens():
+        job = Job(name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, changes=one.changes)
+        reference.execute(job, tmp_path / one.key)
+    goldens = Goldens(manifest, lambda e: tmp_path / GoldenRun.of(e, several_seeds=False).key / "out")
     found: dict[str, dict[str, Record]] = {}
     for name in ENGINES:
         work = tmp_path / name

@@ -17,7 +17,8 @@ import pytest
 import mutator
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import plan_csv
-from mutator.campaigns.plans import load_plan, plan_digest
+from mutator.campaigns.plan_parts import plan_digest
+from mutator.campaigns.plans import load_plan
 from mutator.cli.app import main
 from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign

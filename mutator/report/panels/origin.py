@@ -43,7 +43,9 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
         "campaign": head["campaign"],
         **_study(run),
         "plan": head["plan"],
-        "seed": head["seed"],
+        **(
+            {"seed": seeds[0]} if len(seeds := folder.seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
+        ),
         "reading": head["reading"],
         **{f"chosen: {name}": value for name, value in head["choices"].items() if value is not None},
         **{f"digest of {name}": value for name, value in head["sources"].items()},

@@ -103,7 +103,7 @@ def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
     path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
     after = make_plan(whole, "toy")
     assert {e.changes for e in (*after.experiments, after.canary)} == {("alone",)}
-    assert {changes for _, changes in after.goldens()} == {("alone",)}
+    assert {one.changes for one in after.goldens()} == {("alone",)}
     assert Counter(e.fault.id for e in before.experiments) == Counter(e.fault.id for e in after.experiments)
     assert not {e.id for e in before.experiments} & {e.id for e in after.experiments}
     path.write_text(path.read_text().replace("[alone]", "[rainy]"))

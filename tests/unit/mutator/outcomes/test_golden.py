@@ -21,7 +21,7 @@ from mutator.outcomes.golden import (
     sharing_times,
     trace_digest,
 )
-from mutator.store.run_folder import golden_key
+from mutator.store.run_folder import GoldenRun
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard
 
@@ -128,8 +128,8 @@ def test_flags_and_integers_compare_too() -> None:
 
 def test_key_of_a_golden_run() -> None:
     """Scenario and changes name a golden run."""
-    assert golden_key("S1", ()) == "S1"
-    assert golden_key("S1", ("no_lead",)) == "S1+no_lead"
+    assert GoldenRun("S1").key == "S1"
+    assert GoldenRun("S1", ("no_lead",)).key == "S1+no_lead"
 
 
 def test_trace_is_read(tmp_path: Path) -> None:

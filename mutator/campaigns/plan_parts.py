@@ -1,0 +1,83 @@
+"""Plans in parts, a part for each seed: what is counted and hashed of a plan needs one part at a time."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+
+from mutator._common.hashing import canonical, plain
+from mutator.campaigns.campaign_files import Campaign
+from mutator.model import Experiment, Fault
+from mutator.store.run_folder import GoldenRun
+
+# First part of every plan digest. Digests are cited, so this text stays whatever becomes of the run schema.
+_DIGEST_PREFIX = "run/1"
+
+Group = tuple[str, str, str]  # module, fault type, method
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """Experiments in the order they are run, the lengths of their chunks, and how many runs they take: one
+    that several scenarios have in common is run once."""
+
+    experiments: Sequence[Experiment]
+    chunks: Sequence[int]
+    runs: int
+
+
+@dataclass(slots=True, kw_only=True)
+class Tally:
+    """What is known of a plan once all its parts were added. With `several_seeds` each has golden runs of its
+    own. `variants` has a fault of each."""
+
+    canary: Experiment
+    several_seeds: bool
+    experiments: int = 0
+    runs: int = 0
+    chunks: list[int] = field(default_factory=list)
+    groups: Counter[Group] = field(default_factory=Counter)
+    goldens: dict[GoldenRun, None] = field(default_factory=dict)
+    variants: dict[str, Fault] = field(default_factory=dict)
+
+    def add(self, part: Part) -> None:
+        self.experiments += len(part.experiments)
+        self.runs += part.runs
+        self.chunks += part.chunks
+        for one in part.experiments:
+            fault = one.fault
+            self.groups[fault.module, fault.fault_type, one.method.value] += 1
+            self.goldens.setdefault(GoldenRun.of(one, several_seeds=self.several_seeds))
+            self.variants[fault.spec] = fault
+
+    def needed(self) -> tuple[GoldenRun, ...]:
+        """Every fault-free run that is needed, the canary's included."""
+        own = GoldenRun.of(self.canary, several_seeds=self.several_seeds)
+        return tuple(dict.fromkeys((*self.goldens, own)))
+
+
+class PlanDigest:
+    """The digest that follows from ids and chunks of the experiments, the canary's id, and the campaign."""
+
+    def __init__(self) -> None:
+        self._hash = sha256(f"[{canonical(_DIGEST_PREFIX)},[".encode())
+        self._joint = ""
+
+    def add(self, ids: Sequence[str]) -> None:
+        """Add the ids of the next experiments."""
+        if ids:
+            self._hash.update((self._joint + ",".join(f'"{name}"' for name in ids)).encode())
+            self._joint = ","
+
+    def end(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+        """The digest, once all were added."""
+        rest = [chunks, canary, plain(campaign.canary), plain(campaign.limits)]
+        self._hash.update(f"],{canonical(rest)[1:]}".encode())
+        return self._hash.hexdigest()
+
+
+def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
+    """The digest of a plan with these ids, chunks, and id of the canary."""
+    made = PlanDigest()
+    made.add(ids)
+    return made.end(chunks, canary, campaign)
