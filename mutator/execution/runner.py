@@ -21,6 +21,7 @@ from mutator.outcomes.judging import Judged, load_channels, load_judged
 from mutator.outcomes.propagation import departures
 from mutator.outcomes.sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge
+from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
@@ -49,13 +50,24 @@ class Finished:
 
 class Goldens:
     """The channels of golden runs, loaded when asked for; the last few are kept. `folder_of` finds where the
-    golden run of an experiment left its files."""
+    golden run of an experiment left its files; with `several_seeds` each has golden runs of its own."""
 
-    def __init__(self, manifest: TargetManifest, folder_of: Callable[[Experiment], Path]) -> None:
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        folder_of: Callable[[Experiment], Path],
+        *,
+        several_seeds: bool = False,
+    ) -> None:
         self.folder = folder_of  # where the run without the fault left its files
+        self._several_seeds = several_seeds
         self._trace = lru_cache(_KEPT)(partial(load_channels, manifest))
         self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
         self._ends = lru_cache(_KEPT)(lambda folder: load_judged(manifest, folder)[1].t_end is not None)
+
+    def key(self, experiment: Experiment) -> str:
+        """The name of its golden run."""
+        return GoldenRun.of(experiment, several_seeds=self._several_seeds).key
 
     def trace(self, experiment: Experiment) -> Trace:
         return self._trace(self.folder(experiment))
@@ -164,7 +176,7 @@ class Runner:
             return None
         sampler = self.goldens.sampler(experiment)
         return EncodedSeries(
-            key=self.goldens.folder(experiment).name,
+            key=self.goldens.key(experiment),
             golden=sampler.encoded,
             faulty=encode(sampler.series(faulty, record), sampler.golden),
         )

@@ -108,7 +108,9 @@ class Worker:
                 writer.close()
 
     def _make_runner(self, engine: Engine, *, with_series: bool = False) -> Runner:
-        goldens = Goldens(self._manifest, self.folder.golden_folder)
+        folder = self.folder
+        several = len(folder.seeds) > 1
+        goldens = Goldens(self._manifest, folder.golden_folder, several_seeds=several)
         models = self._workspace.fault_models()
         return Runner(
             self._manifest, models, engine, goldens, self._workspace.scenario, with_series=with_series

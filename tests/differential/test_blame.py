@@ -233,7 +233,8 @@ class Blamed:
             setting = Setting(manifest=self.manifest, models=self.models, base=base, work=work, limits=limits)
             self.engines[name] = make_engine(name, setting)
 
-    def golden(self, scenario: str, changes: tuple[str, ...]) -> Path:
+    def golden(self, experiment: Experiment) -> Path:
+        scenario = experiment.scenario
         folder = self.folder / f"golden-{scenario}"
         if not folder.exists():
             self.reference.execute(Job(name="g", scenario=self.toy.scenario(scenario), seed=SEED), folder)

@@ -66,7 +66,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
         seed=7,
         after_hazard=after,
     )
-    goldens = Goldens(manifest, lambda scenario, changes: fork.golden)
+    goldens = Goldens(manifest, lambda experiment: fork.golden)
     runner = Runner(manifest, fork.models, engine, goldens, fork.toy.scenario)
     finished: Finished
     (finished,) = runner.run([experiment])

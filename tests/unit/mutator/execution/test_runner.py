@@ -64,7 +64,7 @@ def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
     def judge(status: Status = Status.OK, **outputs: Any) -> Record:
         outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}} | outputs
         engine = PlayedEngine(tmp_path / "faulty", status, outputs)
-        goldens = Goldens(manifest, lambda scenario, changes: tmp_path / "golden")
+        goldens = Goldens(manifest, lambda experiment: tmp_path / "golden")
         runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
         (finished,) = runner.run([experiment])
         assert finished.experiment == experiment
@@ -152,7 +152,7 @@ def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Pa
     manifest = toycar.manifest("toycar")
     experiments: tuple[Experiment, ...] = make_plan(toycar, "hostile").experiments
     engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})
-    goldens = Goldens(manifest, lambda scenario, changes: tmp_path)
+    goldens = Goldens(manifest, lambda experiment: tmp_path)
     runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
     records = {f.experiment.fault.fault_type: f.record for f in runner.run(experiments)}
     assert len(records) == len(experiments)
