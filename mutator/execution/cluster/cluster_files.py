@@ -84,7 +84,9 @@ class ClusterFile:
         with importing(KUBERNETES if self.model.kind == KUBERNETES else "cluster"):
             cluster_class = getattr(importlib.import_module(module), name)
         self._check_options(cluster_class)
-        options, problems = self._options(), list[Exception]()
+        problems: list[Exception] = []
+        with self._blamed():
+            options = self._options()
         if self.model.kind != KUBERNETES:
             options["job_cls"] = _noting(cluster_class.job_cls, problems)
         with own_scheduler():
@@ -125,8 +127,8 @@ class ClusterFile:
         what = "the network of the cluster's pods"
         if self.model.kind != KUBERNETES:
             tls = options.get("security") is True or str(options.get("protocol")).startswith("tls")
-            loopback = "lo" in (options.get("interface"), scheduler.get("interface"))
-            if tls or loopback or is_loopback(str(scheduler.get("host"))):
+            on_loopback = scheduler.get("interface", options.get("interface")) == "lo"
+            if tls or (is_loopback(str(scheduler["host"])) if "host" in scheduler else on_loopback):
                 return
             what = "the network of the cluster's scheduler"
         raise refused(what, where=self.source.path, line=self.source.line(("options",)))

@@ -55,6 +55,7 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
             r"some.yaml:6: security: 'cert.pem'; expected true",
         ),
         ("  cores: 2", "  cores: 2\n  processes: 1", r"some.yaml:6: 1 processes on 2 cores"),
+        ("{host: 127.0.0.1}", "127.0.0.1\n  security: true", r"some.yaml:4: "),
         ("1 GB", "much", r"some.yaml:4: Could not interpret 'much'"),
         ("  cores: 2\n", "", r"some.yaml:4: .*cores and memory"),
     ],
@@ -70,6 +71,7 @@ def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: s
     [
         SLURM.replace("host: 127.0.0.1", ""),
         SLURM.replace("127.0.0.1", "0.0.0.0"),
+        SLURM.replace("127.0.0.1}", "0.0.0.0}\n  interface: lo"),
         SLURM.replace("kind: slurm", "kind: kubernetes"),
     ],
 )
