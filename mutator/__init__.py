@@ -12,7 +12,7 @@ from mutator._common.version import VERSION
 if TYPE_CHECKING:
     from mutator.api.audits import Audit, verify
     from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
-    from mutator.api.campaigns import IncompleteRun, plan, run
+    from mutator.api.campaigns import IncompleteRun, run
     from mutator.api.comparisons import RunComparison, compare
     from mutator.api.experiment_results import TraceFrames
     from mutator.api.histories import write_history
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     )
     from mutator.api.mutant_files import MutantSet
     from mutator.api.mutants import BuiltMutant, build_mutant
+    from mutator.api.plans import plan
     from mutator.api.reviews import ReviewedGroups, load_review
     from mutator.api.run_experiments import RunExperiment
     from mutator.api.runs import Run, load_run, merge_runs
@@ -48,7 +49,7 @@ __version__ = VERSION
 _HOMES = {
     "mutator.api.audits": ("Audit", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
-    "mutator.api.campaigns": ("IncompleteRun", "plan", "run"),
+    "mutator.api.campaigns": ("IncompleteRun", "run"),
     "mutator.api.comparisons": ("RunComparison", "compare"),
     "mutator.api.experiment_results": ("TraceFrames",),
     "mutator.api.histories": ("write_history",),
@@ -63,6 +64,7 @@ _HOMES = {
     ),
     "mutator.api.mutant_files": ("MutantSet",),
     "mutator.api.mutants": ("BuiltMutant", "build_mutant"),
+    "mutator.api.plans": ("plan",),
     "mutator.api.reviews": ("ReviewedGroups", "load_review"),
     "mutator.api.run_experiments": ("RunExperiment",),
     "mutator.api.runs": ("Run", "load_run", "merge_runs"),

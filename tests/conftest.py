@@ -61,11 +61,12 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """What fixtures of modules and sessions cache is not the user's. What matplotlib knows of fonts is kept
-    for all tests: each command that draws would look for them anew."""
+    for all tests, and so is bytecode: each command would look for them, or compile the harness, anew."""
     folder = tmp_path_factory.mktemp("caches")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MPLCONFIGDIR", str(folder / "matplotlib"))
         patch.setenv("XDG_CACHE_HOME", str(folder))
+        patch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
         patch.setenv("COLUMNS", "1000")  # so that no sentence that a test looks for is folded
         yield folder
 

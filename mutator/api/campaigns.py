@@ -1,4 +1,4 @@
-"""Campaigns: planned, run, resumed."""
+"""Campaigns: run, resumed."""
 
 import warnings
 from pathlib import Path
@@ -6,44 +6,14 @@ from pathlib import Path
 from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.campaigns.freezing import freeze_and_tell
-from mutator.campaigns.plans import Choices, Plan, Planning, load_plan, make_plan
-from mutator.engines.forkable import not_forked
+from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary
 from mutator.store.run_folder import RunFolder
-from mutator.workspace import Workspace
 
 
 class IncompleteRun(UserWarning):
     """A run ended before all of its experiments had a result, or with harness errors."""
-
-
-def plan(
-    campaign: str | Path,
-    out: str | Path | None = None,
-    *,
-    choices: Choices | None = None,
-    workspace: WorkspaceLike = None,
-) -> Plan:
-    """Expand a campaign (a name of the library or a file) into its experiments; none is run.
-
-    With `out` the plan is frozen there: `run` with the same folder runs exactly these experiments. It is then
-    written seed by seed, and the experiments of a very large one are read when asked for.
-    MutatorError for a mistake in campaign or choices, when no experiment is left, and for a folder that holds
-    anything else.
-    """
-    found = open_workspace(workspace)
-    if out is None:
-        return make_plan(found, campaign, choices)
-    folder, tally = freeze_and_tell(Planning(found, campaign, choices), Path(out), found)
-    return load_plan(folder, tally)  # knows what a run took, once one was driven here
-
-
-def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:
-    """The variants of a plan that only the reference engine can run, and why."""
-    faults = plan.tally.variants.values()
-    return not_forked(workspace.manifest(plan.campaign.target), workspace.fault_models(), faults)
 
 
 def run(

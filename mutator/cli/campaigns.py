@@ -85,7 +85,7 @@ def plan(
 
     Also says the expected time and disk. `run` with the same folder then runs exactly these.
     """
-    from mutator.api.campaigns import not_forkable
+    from mutator.api.plans import not_forkable
 
     terminal = Terminal(as_json)
     workspace = place.workspace()

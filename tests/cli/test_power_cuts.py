@@ -24,17 +24,42 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
 WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "reference")
 
 
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    """Where the run folder of the first test is kept for the others, and the seal that it comes to."""
+    return [tmp_path_factory.mktemp("driven") / "run"]
+
+
 @pytest.fixture
-def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A run folder whose experiments have run, and whose command came no further."""
+def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
+    """A run folder whose experiments have run, and whose command came no further. It is driven once, as each
+    test has the same library."""
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")
 
-    with monkeypatch.context() as patch:
-        patch.setattr(Session, "finish", end)
-        assert "the power is cut" in cli(*WORDS).err
+    kept = driven[0]
+    if not kept.exists():
+        with monkeypatch.context() as patch:
+            patch.setattr(Session, "finish", end)
+            assert "the power is cut" in cli(*WORDS).err
+        shutil.copytree("run", kept)
+    elif not Path("run").exists():
+        shutil.copytree(kept, "run")
     return Path("run").resolve()
+
+
+@pytest.fixture
+def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
+    """The seal of the run that nothing happens to after the power is back."""
+    if not driven[1:]:
+        shutil.copytree(cut, "whole")
+        whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
+        assert whole.code == 0, whole.err
+        found = re.search(r"^seal: (\w+)$", whole.out, re.MULTILINE)
+        assert found
+        driven.append(found[1])
+    return str(driven[1])
 
 
 def last_block(path: Path) -> int:
@@ -77,14 +102,9 @@ def test_records_are_synced_after_what_they_refer_to(
 
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
-def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, rest: str) -> None:
+def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest: str) -> None:
     """However much of the block is there: the folder is not believed, the answer says what mends it, and the
     run then comes to the result that it would have had."""
-    shutil.copytree(cut, "whole")
-    whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
-    assert whole.code == 0, whole.err
-    seal = re.search(r"^seal: (\w+)$", whole.out, re.MULTILINE)
-    assert seal
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
     for length in range(last_block(path), len(data)):
@@ -101,7 +121,7 @@ def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, rest: str) -> N
     assert f"repaired: patch of {name} put aside" in repaired.out
     again = cli(*WORDS)
     assert again.code == 0, again.err
-    assert "1 now" in again.out and f"seal: {seal[1]}" in again.out
+    assert "1 now" in again.out and f"seal: {seal}" in again.out
     assert cli("verify", "run").code == 0
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.running import run_campaign
+from mutator.execution.session import Summary
 from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
@@ -41,17 +43,34 @@ def toy(toy: Workspace, kept_checks: None) -> Workspace:
     return toy
 
 
+@dataclass(frozen=True)
+class Finished:
+    """A small campaign run by two workers without any cache, and the target's files before and after it."""
+
+    run: Path
+    summary: Summary
+    told: list[Progress]
+    before: dict[str, bytes]
+    after: dict[str, bytes]
+
+
 @pytest.fixture(scope="module")
-def finished_once(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
+def finished_once(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Finished:
     folder = tmp_path_factory.mktemp("finished")
-    assert run_campaign(copy_toycar(folder), "small", folder / "run").exit_code == 0
-    return folder / "run"
+    toy = copy_toycar(folder)
+    tree = toy.library.parent / "tree"
+    before, told = contents(tree), list[Progress]()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+        summary = run_campaign(toy, "small", folder / "run", workers=2, notify=told.append)
+    assert summary.exit_code == 0
+    return Finished(folder / "run", summary, told, before, contents(tree))
 
 
 @pytest.fixture
-def finished(finished_once: Path, tmp_path: Path) -> Path:
+def finished(finished_once: Finished, tmp_path: Path) -> Path:
     """The run folder of a small finished campaign."""
-    return Path(shutil.copytree(finished_once, tmp_path / "finished"))
+    return Path(shutil.copytree(finished_once.run, tmp_path / "finished"))
 
 
 def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
@@ -70,14 +89,10 @@ def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
     }
 
 
-def test_a_run_leaves_what_it_should(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_run_leaves_what_it_should(finished_once: Finished) -> None:
     """Plan, goldens, patches, records, tables; no scratch; and the target's tree is what it was."""
-    tree = toycar.library.parent / "tree"
-    before = contents(tree)
-    out = tmp_path / "run"
-    told: list[Progress] = []
-    summary = run_campaign(toycar, "small", out, workers=2, notify=told.append)
-    assert contents(tree) == before
+    out, summary, told = finished_once.run, finished_once.summary, finished_once.told
+    assert finished_once.after == finished_once.before
     assert {stage.stage for stage in told} == {"plan", "checks", "golden", "experiments", "tables"}
     assert told[-2].done == 12
     assert {p.name for p in out.iterdir()} == {
@@ -146,8 +161,8 @@ def test_rerun_gives_the_same_record_and_a_trace(
         assert (single.faulty / "log.npz").is_file()
         assert single.golden == finished / "golden" / single.golden.name
         assert not (single.faulty.parent / "work").exists()
-    path = next((finished / "records").iterdir())
-    path.write_text(path.read_text().replace('"outcome":"', '"outcome":"masked","x":"'))
+    for path in (finished / "records").iterdir():
+        path.write_text(path.read_text().replace('"outcome":"', '"outcome":"masked","x":"'))
     reseal(finished)
     assert not rerun(toy, finished, single.experiment.id)[1]
 

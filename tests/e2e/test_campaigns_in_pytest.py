@@ -75,7 +75,7 @@ def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
     assert "12 of 12 experiments done, 12 now" in answer.stdout
     stages = re.findall("^(checks|golden|tables)", answer.stdout, re.MULTILINE)
     assert stages == ["checks", "golden", "tables"]
-    again = pytest_campaign(toy, *words, "-n", "2")
+    again = pytest_campaign(toy, *words, "-n", "1")
     assert again.returncode == 0, again.stdout
     assert "12 of 12 experiments done, 0 now" in again.stdout
 
