@@ -35,9 +35,13 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
         "t_activation": 1,
         "h1": 1,
         "t_h1": 2,
-        "seed": 99,
+        "fault_id": "against",
+        "seed": 1,
     }
-    all_kinds = [{"module": m, "fault_type": kind, "seed": i} for i, (m, kind) in enumerate(kinds)]
+    all_kinds = [
+        {"module": module, "fault_type": kind, "fault_id": str(i), "seed": i % 2}
+        for i, (module, kind) in enumerate(kinds)
+    ]
     frame = results(
         *all_kinds, against
     )  # the paper saw no hazard of this kind: its second observation is decided
