@@ -1,8 +1,10 @@
-"""What a campaign of a million experiments costs around its runs: plan, open and resume, at three sizes.
+"""What a million experiments cost around their runs: plan, tables, resume, report and page, at three sizes.
 
 `python benchmarks/million.py [--sizes N ...] [--keep DIR]`. The runs are made up (`made_up_run.py`), and kept
 in DIR for the next time. Each row is a process of its own: seconds of CPU and of wall time, and the most
-memory that it ever had. Growth: CPU time for one experiment, beside that of the smallest size.
+memory that it, or a process that it started, ever had. The page is opened in the system's Chromium, headless:
+its wall time is from the navigation on until its list can be used. Growth: CPU time for one experiment,
+beside that of the smallest size.
 """
 
 import argparse
@@ -17,14 +19,24 @@ from pathlib import Path
 from time import perf_counter
 
 import made_up_run
+import report_page
+from playwright.sync_api import sync_playwright
 
 from mutator.execution.running import run_campaign
+from mutator.outcomes import results
+from mutator.report import building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 SIZES = (10_000, 100_000, 1_000_000)
 GOAL_SIZE = 1_000_000
-GOALS = {"plan": (60.0, 1000.0), "resume": (10.0, None)}  # wall s and MB at most, of GOAL_SIZE
+GOALS = {  # wall s and MB at most, of GOAL_SIZE
+    "plan": (60.0, 1000.0),
+    "table": (60.0, 2000.0),
+    "resume": (10.0, None),
+    "report": (180.0, 3000.0),
+    "page": (3.0, None),
+}
 
 
 def plan(size: int, run: Path) -> None:
@@ -45,7 +57,31 @@ def resume(size: int, run: Path) -> None:
         raise SystemExit(f"{summary.done} done, {summary.ran} now")
 
 
-ROWS: dict[str, Callable[[int, Path], None]] = {"plan": plan, "open": opened, "resume": resume}
+def table(size: int, run: Path) -> None:
+    """Make the tables."""
+    results.build(run)
+
+
+def report(size: int, run: Path) -> None:
+    """Write the report of the tables that are there."""
+    written = building.write(run, Workspace.find(root=made_up_run.ROOT))
+    if written.rows != size:
+        raise SystemExit(f"a report of {written.rows}")
+
+
+def page(size: int, run: Path) -> float:
+    """Open the report's page; s until its list can be used."""
+    with sync_playwright() as playwright:
+        browser = report_page.launched(playwright)
+        times = report_page.opened(browser, run / "report" / "index.html", 1)
+        browser.close()
+    return times["open_ms"] / 1000
+
+
+ROWS: dict[str, Callable[[int, Path], float | None]] = {
+    **{"plan": plan, "open": opened, "table": table},
+    **{"resume": resume, "report": report, "page": page},
+}
 
 
 def apart(row: str, size: int, run: Path) -> dict[str, float]:
@@ -58,8 +94,8 @@ def apart(row: str, size: int, run: Path) -> dict[str, float]:
 def measured(row: str, size: int, run: Path) -> dict[str, float]:
     """Do what a row stands for: seconds, and the most memory in MB."""
     began = perf_counter()
-    ROWS[row](size, run)
-    wall = perf_counter() - began
+    told = ROWS[row](size, run)
+    wall = perf_counter() - began if told is None else told
     uses = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     cpu = sum(use.ru_utime + use.ru_stime for use in uses)
     return {"cpu_s": cpu, "wall_s": wall, "mb": max(use.ru_maxrss for use in uses) / 1024}

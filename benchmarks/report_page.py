@@ -28,8 +28,8 @@ from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes import results
+from mutator.outcomes.counting import outcome_counts
 from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import outcome_counts
 from mutator.outcomes.sampling import Sampler
 from mutator.report import browse as report_browse
 from mutator.report import page as report_page
@@ -160,7 +160,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     content = Content(
         name=f"{size} experiments",
         alarm="",
-        outcomes=outcome_counts(rows),
+        outcomes=outcome_counts(run.texts),
         planned="",
         words=words_of(run),
         study="",
@@ -193,6 +193,15 @@ def opened(browser: Any, page_file: Path, repeat: int) -> dict[str, float]:
     return {name: min(values) for name, values in times.items()}
 
 
+def launched(playwright: Any) -> Any:
+    """The system's Chromium, headless; SystemExit where there is none."""
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        raise SystemExit("no Chromium on the PATH")
+    flags = [*FLAGS, "--no-sandbox"] if os.geteuid() == 0 else [*FLAGS]
+    return playwright.chromium.launch(executable_path=path, args=flags)
+
+
 def main() -> int:
     from playwright.sync_api import sync_playwright
 
@@ -201,15 +210,9 @@ def main() -> int:
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--json", type=Path, help="write the figures here")
     options = parser.parse_args()
-    browser_path = next(
-        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-    )
-    if browser_path is None:
-        parser.error("no Chromium on the PATH")
-    flags = [*FLAGS, "--no-sandbox"] if os.geteuid() == 0 else [*FLAGS]
     found = {}
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
-        browser = playwright.chromium.launch(executable_path=browser_path, args=flags)
+        browser = launched(playwright)
         for size in options.sizes:
             out = Path(folder) / str(size)
             found[size] = write(size, out)

@@ -11,7 +11,7 @@ from mutator.campaigns.plans import Plan, load_plan
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Experiment, Fault, Record, Status
-from mutator.outcomes import rows as tables
+from mutator.outcomes import counting
 from mutator.outcomes.paths import Ways, ways_of
 from mutator.outcomes.reader import Results
 from mutator.store import plan_file
@@ -96,12 +96,14 @@ class RunContents:
     @property
     def endings(self) -> dict[str, int]:
         """How many experiments ended how: outcomes of those that ended well, statuses of the others."""
-        return tables.outcome_counts(self._rows)
+        return counting.outcome_counts(self._texts)
 
     @property
     def harness_errors(self) -> dict[str, str]:
         """Experiments that the harness failed at, and why; `mutator.run` tries them again."""
-        return {r.experiment_id: r.detail for r in self._rows if r.status is Status.HARNESS_ERROR}
+        texts = self._texts
+        failed = texts[texts["status"] == Status.HARNESS_ERROR.value]
+        return dict(zip(failed["experiment_id"], failed["detail"], strict=True))
 
     @property
     def verifiable(self) -> bool:
@@ -109,8 +111,8 @@ class RunContents:
         return self.folder.verifiable
 
     @cached_property
-    def _rows(self) -> tuple[tables.Row, ...]:
-        return Results.up_to_date(self.path).rows()
+    def _texts(self) -> "pd.DataFrame":
+        return Results.up_to_date(self.path).texts()
 
     @cached_property
     def ways(self) -> Ways | None:

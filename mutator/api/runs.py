@@ -22,10 +22,11 @@ from mutator.execution.session import Notify, Summary
 from mutator.exports import Format
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import Parts, export
+from mutator.outcomes import counting
 from mutator.outcomes import results as results_table
-from mutator.outcomes import rows as tables
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs, own_alerts
 from mutator.outcomes.golden import load_trace
+from mutator.outcomes.rows import count_table
 from mutator.report import building
 from mutator.report.stills import take_stills
 from mutator.store import cleaning
@@ -97,9 +98,9 @@ class Run(RunContents):
 
     def counts(self) -> Table:
         """How the experiments of each fault type ended."""
-        hazards = tables.hazard_names(self._rows)
-        counts = tables.counts_by(self._rows, tables.by_fault_type)
-        heads, rows = tables.count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
+        texts = self._texts
+        hazards, counts = counting.hazard_names(texts), counting.counts_by(texts, counting.kinds(texts))
+        heads, rows = count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:

@@ -9,6 +9,7 @@ import pandas as pd
 
 from mutator.figures import hazards, heat_map, propagation
 from mutator.figures.run_plot import save
+from mutator.statistics.frame import slim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +37,7 @@ class Drawing:
 
 def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     """The figures of a frame of results; none of what has nothing to be compared with."""
+    frame = slim(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
     made = []
     if kinds > 1:

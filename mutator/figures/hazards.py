@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
 from mutator.figures import style
@@ -21,9 +22,9 @@ def hazard_sets(frame: pd.DataFrame) -> pd.Series:
     """The hazard of each run with just one, `several` of one with more, empty of one without."""
     names = hazard_names(frame)
     had = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
-    found = [
-        SEVERAL if row.sum() > 1 else next((n for n, h in zip(names, row, strict=True) if h), "")
-        for row in had
+    count = had.sum(axis=1)
+    found = np.array([*names, "", SEVERAL], dtype=object)[
+        np.where(count > 1, -1, np.where(count == 1, had.argmax(axis=1), -2))
     ]
     return pd.Series(found, index=frame.index, dtype=str)
 

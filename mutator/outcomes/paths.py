@@ -83,6 +83,11 @@ class Path:
     reached: str
     stopped_at: tuple[str, ...]
 
+    @property
+    def injected(self) -> tuple[str, ...]:
+        """The components that the fault was injected into."""
+        return tuple(stage.component for stage in self.stages if stage.state is State.INJECTED)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
@@ -90,7 +95,7 @@ class Course:
     order: all but the times.
 
     `late` has for each component that had changed before its channels show it the place of the time by which
-    it had, in the order of times.
+    it had, in the order of times. `entered` is the link by which the fault came to the first actuator.
     """
 
     states: Mapping[str, State]  # in causal order
@@ -98,6 +103,12 @@ class Course:
     crossings: tuple[Crossing, ...]
     reached: str
     stopped_at: tuple[str, ...]
+    entered: Crossing | None
+
+    @property
+    def injected(self) -> tuple[str, ...]:
+        """The components that the fault was injected into."""
+        return tuple(name for name, state in self.states.items() if state is State.INJECTED)
 
 
 class Ways:
@@ -111,6 +122,7 @@ class Ways:
     def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
         self.component_of = {name: component for name, _, _, component, _ in channels}
         self._roles = {component: role for _, _, role, component, _ in channels if component}
+        self._actuators = {component for _, _, role, component, _ in channels if role == Role.ACTUATOR.value}
         self.structure = structure
         self._links = links_of(structure) if structure else {}
         # from what is not recorded back to what leads to it
@@ -137,7 +149,7 @@ class Ways:
     def path(self, experiment: Experiment, record: Record) -> Path | None:
         """The path of an experiment; None where its fault was not active, ended without an outcome, or is in
         no component that is known."""
-        course = self.course(experiment, record)
+        course = self.course(experiment.fault, record)
         if course is None:
             return None
         left: dict[str, list[Departure]] = {}
@@ -160,8 +172,9 @@ class Ways:
             stopped_at=course.stopped_at,
         )
 
-    def course(self, experiment: Experiment, record: Record) -> Course | None:
-        """The course of an experiment, the same object for all that have it; None as of `path`."""
+    def course(self, fault: Fault, record: Record) -> Course | None:
+        """The course of an experiment with that fault, the same object for all that have it; None as of
+        `path`."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -170,7 +183,7 @@ class Ways:
             firsts[component] = min(first, firsts.get(component, inf))
         place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
         order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
-        return self._course(self._injected(experiment.fault), order, record.outcome is Outcome.MASKED)
+        return self._course(self._injected(fault), order, record.outcome is Outcome.MASKED)
 
     def _course_of(
         self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
@@ -186,15 +199,18 @@ class Ways:
         changed = [
             n for n, state in states.items() if n in times and state in (State.INJECTED, State.REACHED)
         ]
+        crossings = tuple(
+            Crossing(link=name, tail=tail, tip=tip, passage=_passage(tail, tip, states, arrived))
+            for name, (tail, tip) in way.links.items()
+        )
+        through = [c for c in crossings if c.tip in self._actuators and c.passage is Passage.THROUGH]
         return Course(
             states=states,
             late={name: int(place) for name, place in late.items() if place is not None},
-            crossings=tuple(
-                Crossing(link=name, tail=tail, tip=tip, passage=_passage(tail, tip, states, arrived))
-                for name, (tail, tip) in way.links.items()
-            ),
+            crossings=crossings,
             reached=min(reversed(changed), key=way.steps.__getitem__, default=""),
             stopped_at=_holding(way, states, arrived) if masked else (),
+            entered=min(through, key=lambda c: times.get(c.tip, inf), default=None),
         )
 
     def _states(

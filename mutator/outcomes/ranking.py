@@ -2,10 +2,17 @@
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
+from mutator.outcomes.columns import hazards_in
+from mutator.outcomes.counting import came, endings
 from mutator.outcomes.rows import Row
-from mutator.targets.severity import CLASSES
+from mutator.targets.severity import CLASSES, DELTA_V
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
 
 _ENDINGS = (  # the worst first
     Outcome.HAZARD.value,
@@ -36,6 +43,52 @@ def worst(rows: Iterable[Row]) -> list[Row]:
         return (0, -CLASSES.index(row.severity), -delta_v, ending, 0, row.experiment_id)
 
     return sorted(found, key=badness)
+
+
+def places(texts: "pd.DataFrame") -> "np.ndarray":
+    """The place of each row of `Results.texts` among the worst, from 0: the order of `worst`, a column at a
+    time."""
+    import numpy as np
+    import pandas as pd
+
+    def numbers(name: str, otherwise: float) -> np.ndarray:
+        found = pd.to_numeric(texts[name]) if name in texts else pd.Series(np.nan, texts.index)
+        return found.fillna(otherwise).to_numpy(dtype=float)
+
+    ending = pd.Index(_ENDINGS).get_indexer(pd.Index(endings(texts)))
+    severity = texts["severity"] if "severity" in texts else pd.Series("", texts.index)
+    classed = pd.Index(CLASSES).get_indexer(pd.Index(severity))
+    has_class = classed >= 0
+    by_id = np.empty(len(texts), dtype=np.int64)
+    by_id[np.argsort(texts["experiment_id"].to_numpy(dtype=object), kind="stable")] = np.arange(len(texts))
+    turn = np.where(has_class, 0.0, _turn(texts, ending, has_class, by_id))
+    delta_v = np.where(has_class, -numbers(DELTA_V, -1.0), 0.0)
+    order = np.lexsort((by_id, turn, ending, delta_v, -classed, ~has_class))
+    found = np.empty(len(texts), dtype=np.int64)
+    found[order] = np.arange(len(texts))
+    return found
+
+
+def _turn(
+    texts: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
+) -> "np.ndarray":
+    """As `_turns`; infinite for rows without a margin."""
+    import numpy as np
+    import pandas as pd
+
+    turn = np.full(len(texts), np.inf)
+    had = {name: came(texts, name).to_numpy() for name in hazards_in(texts.columns)}
+    any_came = np.any(list(had.values()), axis=0) if had else np.zeros(len(texts), dtype=bool)
+    for name, flag in had.items():
+        if (column := f"margin_{name.lower()}") not in texts:
+            continue
+        margin = pd.to_numeric(texts[column]).to_numpy(dtype=float)
+        counts = np.where(any_came, flag, (texts[name.lower()] != "").to_numpy())
+        rows = np.flatnonzero(counts & ~has_class & (texts[column] != "").to_numpy())
+        rows = rows[np.lexsort((by_id[rows], margin[rows], ending[rows]))]
+        _, first, sizes = np.unique(ending[rows], return_index=True, return_counts=True)
+        turn[rows] = np.minimum(turn[rows], np.arange(len(rows)) - np.repeat(first, sizes))
+    return turn
 
 
 def worth(rows: Iterable[Row]) -> dict[str, int]:

@@ -8,7 +8,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from mutator._common.files import no_pipe
 from mutator.errors import MutatorError
@@ -96,6 +96,10 @@ class Results:
         except (ValueError, csv.Error) as err:
             raise self._no_table(str(err)) from None
 
+    def count(self) -> int:
+        """How many rows there are."""
+        return len(self.texts())
+
     def rows(self) -> tuple[Row, ...]:
         """The rows, typed, in the order of the table."""
         try:
@@ -105,14 +109,31 @@ class Results:
 
     def texts(self) -> "pd.DataFrame":
         """A frame of the cells as text, '' where there is nothing, in the order of the table."""
-        import pandas as pd
+        import pyarrow as pa  # type: ignore[import-untyped]
+        from pyarrow import csv as arrow_csv
 
         try:
-            frame = pd.read_csv(io.BytesIO(self.csv()), dtype=str, keep_default_na=False)
+            with self._opened() as file:
+                names = next(csv.reader(io.TextIOWrapper(file, encoding="utf-8", newline="")), [])
+            self._check_header(names)
+            with self._opened() as file:
+                table = arrow_csv.read_csv(
+                    file,
+                    arrow_csv.ReadOptions(use_threads=False),  # as in `_table`
+                    arrow_csv.ParseOptions(newlines_in_values=True),
+                    arrow_csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string())),
+                )
         except ValueError as err:
             raise self._no_table(str(err)) from None
-        self._check_header(frame.columns)
+        frame: pd.DataFrame = table.combine_chunks().to_pandas(use_threads=False, self_destruct=True)
         return frame
+
+    def _opened(self) -> BinaryIO:
+        try:
+            return no_pipe(self.path).open("rb")
+        except OSError:
+            self._read(self.path)  # which says what is wrong
+            raise
 
     def frame(self) -> "pd.DataFrame":
         """A frame of all columns, typed, by experiment id.
@@ -188,7 +209,7 @@ def row_of(
 def same_parquet(path: Path, made: Path) -> bool:
     """Whether the Parquet file at `path` has the rows of one that was made now, maybe by another version of
     pyarrow."""
-    import pyarrow as pa  # type: ignore[import-untyped]
+    import pyarrow as pa
     from pyarrow import parquet
 
     try:

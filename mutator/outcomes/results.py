@@ -168,7 +168,7 @@ class _Table:
     def cells(self, experiment: Experiment, record: Record) -> list[object]:
         """A row, in the order of the columns."""
         made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
-        course = self._ways.course(experiment, record) if self._ways else None
+        course = self._ways.course(experiment.fault, record) if self._ways else None
         if course:
             made |= {"reached": course.reached or None, "stopped_at": ";".join(course.stopped_at) or None}
         return list(map(made.get, self._names))

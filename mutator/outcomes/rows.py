@@ -1,16 +1,15 @@
-"""Rows of the results table, typed, and counted: how many faults were activated, manifested, did harm.
+"""Rows of the results table, typed, a row for one experiment; and the table of what was counted of them."""
 
-A row stands for one experiment. An experiment whose harness failed, or whose mutant could not be made,
-says nothing about its fault: it is counted apart and is in no other number.
-"""
-
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status, fault_label
 from mutator.outcomes.columns import hazards_in
 from mutator.targets.severity import DELTA_V
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
@@ -79,51 +78,8 @@ class Count:
     unusable: int
 
 
-def hazard_names(rows: Iterable[Row]) -> tuple[str, ...]:
-    """Every hazard that was looked for: one that never came is a result too."""
-    return tuple(sorted({name for row in rows for name in row.checked}))
-
-
-def count(group: str, rows: Sequence[Row], hazards: Sequence[str]) -> Count:
-    """Count one group of rows."""
-    used = [r for r in rows if r.usable]
-    came = [{name for name, _ in r.hazards} for r in used]
-    statuses = Counter(r.status for r in used)
-    return Count(
-        group=group,
-        injected=len(used),
-        activated=sum(r.t_activation is not None for r in used),
-        manifested=sum(r.t_manifest is not None for r in used),
-        hazards=tuple(sum(h in names for names in came) for h in hazards),
-        any_hazard=sum(bool(names) for names in came),
-        alerts=sum(bool(r.alerts) for r in used),
-        hazards_without_alert=sum(bool(r.hazards) and not r.alerts for r in used),
-        crashed=statuses[Status.CRASHED],
-        timeout=statuses[Status.TIMEOUT],
-        unusable=len(rows) - len(used),
-    )
-
-
-def counts_by(rows: Sequence[Row], key: Callable[[Row], str]) -> tuple[Count, ...]:
-    """One count for each group that `key` makes, in order of their names, and the total last."""
-    hazards = hazard_names(rows)
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(key(row), []).append(row)
-    parts = tuple(count(name, groups[name], hazards) for name in sorted(groups))
-    return (*parts, count("total", rows, hazards))
-
-
 def by_fault_type(row: Row) -> str:
     return f"{row.module}/{row.fault_type}"
-
-
-def by_scenario(row: Row) -> str:
-    return row.scenario
-
-
-def by_method(row: Row) -> str:
-    return row.method
 
 
 def count_table(
@@ -145,11 +101,11 @@ def count_table(
     return heads, [[str(cell) for cell in line] for line in table]
 
 
-def outcome_counts(rows: Iterable[Row]) -> dict[str, int]:
-    """How many rows ended how: outcomes of the runs that worked, statuses of those that did not."""
-    seen = Counter(row.ending for row in rows)
-    order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
-    return {name: seen[name] for name in order if seen[name]}
+def lines_of(texts: "pd.DataFrame") -> list[dict[str, str]]:
+    """The cells of each row of a frame as text, by column."""
+    names = list(map(str, texts.columns))
+    columns = [texts[name].tolist() for name in names]
+    return [dict(zip(names, cells, strict=True)) for cells in zip(*columns, strict=True)]
 
 
 def row_from(line: Mapping[str, str]) -> Row:

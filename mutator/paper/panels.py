@@ -1,5 +1,6 @@
 """The published observations in the report of a run: judged on its results, written, shown."""
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from mutator.paper.published import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import write_csv
 from mutator.report.studies import ReportedRun
+from mutator.statistics.frame import slim
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,8 +40,8 @@ _HTML = """\
 </pre></details>
 </details>
 {% endfor %}
-<p>{{ rules | marked }}</p>
-{% if of_seeds %}
+<p>{{ rules | marked }}</p>{% if of_seeds %}
+
 <h3>Seed by seed</h3>
 <p>{{ about_seeds }}</p>
 {{ of_seeds.as_html() }}
@@ -65,7 +67,9 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     if len(missing) == len(kinds):
         return None
     ends = run.ends() or {}
-    frame = run.frame.assign(t_end=run.frame["scenario"].map(ends))
+    words = re.findall(r"\w+", file.read_text(encoding="utf-8"))
+    frame = slim(run.frame, *words)  # no query names another column
+    frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge(file, frame, list(_lacks(run, missing)))
     coverage = _coverage(run, len(kinds), missing)
     if all(one.verdict is Verdict.UNDECIDED for one in judged):

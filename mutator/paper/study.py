@@ -22,7 +22,7 @@ def published(run: ReportedRun) -> Published | None:
 def drawings(run: ReportedRun) -> tuple[Drawing, ...]:
     """Unsafe control actions in single experiments, of a finished run with published fault types only:
     experiments may have to be driven again for them."""
-    if published(run) is None or len(run.rows) != run.folder.planned:
+    if published(run) is None or len(run.texts) != run.folder.planned:
         return ()
     return example_drawings(run.folder, run.frame, run.workspace)
 

@@ -3,15 +3,12 @@
 An answer links to the list of experiments, filtered to those it speaks of.
 """
 
-from collections.abc import Mapping
-
 import pandas as pd
 
 from mutator._common.text import counted
 from mutator.engines.jobs import RunMode
 from mutator.execution.phases import duration
-from mutator.outcomes.ranking import worst
-from mutator.outcomes.rows import Row
+from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.answer_parts import (
     Answer,
     Link,
@@ -24,10 +21,11 @@ from mutator.report.answer_parts import (
     to_list,
     were,
 )
-from mutator.report.dangers import dangerous
+from mutator.report.dangers import dangerous, worst_of
 from mutator.report.fix_order import first_to_fix
+from mutator.report.seen import COURSE, PLACE
 from mutator.report.studies import ReportedRun
-from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warning
+from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
 
 TYPES = 6  # fault types that an answer lists
 
@@ -42,24 +40,24 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
     if has_alerts:
         made.append(unwarned(frame, run.folder.stop_note))
     made.append(survived(frame))
-    timings = run.folder.timings()
-    if timings:
-        made.append(time_spent(frame, timings))
+    if len(run.seen.timings):
+        made.append(time_spent(frame, run.seen.timings))
     return tuple(made)
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with their place among the worst, and the words for fault, hazards, warning."""
-    rows = {row.experiment_id: row for row in run.rows}
-    shown = [rows[name] for name in run.frame["experiment_id"]]
-    place = {row.experiment_id: i for i, row in enumerate(worst(run.rows))}
-    return run.frame.assign(
-        place=run.frame["experiment_id"].map(place),
-        fault=[row.fault for row in shown],
-        hazard_names=[", ".join(name for name, _ in row.hazards) for row in shown],
-        warning=[warning(row) for row in shown],
-        warned=[_warned(row) for row in shown],
-    )
+    """The usable experiments with their place among the worst, their course and warning; the words for fault
+    and hazards of those alone that may be listed."""
+    frame = run.frame
+    told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
+    shown = worst_of(told)
+    rows = [row_from(line) for line in lines_of(run.texts[run.texts["experiment_id"].isin(shown)])]
+    words = {
+        "fault": {row.experiment_id: row.fault for row in rows},
+        "hazard_names": {row.experiment_id: ", ".join(name for name, _ in row.hazards) for row in rows},
+        "warned": {row.experiment_id: _warned(row) for row in rows},
+    }
+    return told.assign(**{name: told["experiment_id"].map(word) for name, word in words.items()})
 
 
 def _warned(row: Row) -> str:
@@ -148,11 +146,11 @@ def survived(frame: pd.DataFrame) -> Answer:
     )
 
 
-def time_spent(frame: pd.DataFrame, timings: Mapping[str, Mapping[str, object]]) -> Answer:
+def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
     """CPU time of the experiments: in all, and by fault type; why some took none."""
-    cpu = frame["experiment_id"].map({name: float(str(line["cpu_s"])) for name, line in timings.items()})
+    cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"])
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
-    workers = len({line["worker"] for line in timings.values()})
+    workers = timings["worker"].nunique()
     says = f"The experiments took {duration(total)} of CPU time, by {counted(workers, 'worker')}: "
     says += f"{share(ran, len(frame), 'experiments')} {were(ran)} driven{_undriven(frame, cpu, timings)}."
     if ran:
@@ -172,10 +170,11 @@ def time_spent(frame: pd.DataFrame, timings: Mapping[str, Mapping[str, object]])
     )
 
 
-def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: Mapping[str, Mapping[str, object]]) -> str:
+def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str:
     """Why the other experiments needed no run of their own, each with a count."""
     rest = frame["experiment_id"][~(cpu > 0)]
-    idle = sum(timings.get(name, {}).get("engine") == RunMode.GOLDEN for name in rest)
+    golden = timings[timings["engine"] == RunMode.GOLDEN.value]
+    idle = int(rest.isin(golden["experiment_id"]).sum())
     why = {
         "whose trigger never held, so that the golden run's result stands": idle,
         "with the result of another experiment that is the same run": len(rest) - idle,

@@ -9,7 +9,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,13 +22,13 @@ from mutator.model import Anchor, Experiment, Fault
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes.columns import is_text
 from mutator.outcomes.ranking import worst
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row
+from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
 from mutator.report.series import sample_kept_traces, series_facts
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
+from mutator.report.whole_map import map_of
 from mutator.review.groups import Shape, shapes
 from mutator.store.run_folder import RunFolder
 from mutator.web import embedded
@@ -40,14 +40,17 @@ SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns
 STILLS_BYTES = 1_000_000  # of pictures in the page; more are links
+LISTED = 50_000  # experiments that the page lists: more would take it too long to open
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browse:
-    """What the page's scripts get: `facts` as JSON, the rest in script elements."""
+    """What the page's scripts get: `facts` as JSON, the rest in script elements. `listed` says which of the
+    experiments these are and how to see others; it is empty where they are all."""
 
     facts: Markup
     scripts: tuple[Markup, ...]
+    listed: str = ""
 
 
 def browse_data(run: ReportedRun) -> Browse:
@@ -55,10 +58,12 @@ def browse_data(run: ReportedRun) -> Browse:
     folder, workspace = run.folder, run.workspace
     if workspace:
         sample_kept_traces(folder, workspace)
-    data: dict[str, Any] = {"table": None, "details": None, "media": media(folder, run.out, STILLS_BYTES)}
-    data["table"], data["details"] = _tables(run)
+    rows, lines = _listed(run)
+    table_, details_ = _tables(run, rows, lines)
+    data: dict[str, Any] = {"table": table_, "details": details_}
+    data["media"] = media(folder, run.out, STILLS_BYTES)
     if run.paths:
-        data["paths"] = run.paths.data([row.experiment_id for row in sorted(run.rows, key=reading_order)])
+        data["paths"] = run.paths.data([row.experiment_id for row in rows])
     facts = {
         **_of_target(folder, workspace),
         "series": series_facts(folder),
@@ -69,6 +74,19 @@ def browse_data(run: ReportedRun) -> Browse:
     return Browse(
         facts=Markup(json.dumps(facts).replace("<", "\\u003c")),
         scripts=tuple(Markup(embedded(value, name)) for name, value in data.items()),
+        listed=_which(run),
+    )
+
+
+def _which(run: ReportedRun) -> str:
+    """Which experiments are listed, and how to see others; empty where all are."""
+    count, path = len(run.texts), run.folder.path.name
+    if count <= LISTED:
+        return ""
+    return (
+        f"The list has the {LISTED:,} worst of {count:,} experiments (by rank); everything above and below "
+        f"it counts all. To see another one: `mutator show ID --run {path}`; the worst of those that a "
+        f"filter leaves: `mutator show --run {path} --only 'FILTER'`; all of them: results.parquet."
     )
 
 
@@ -83,13 +101,27 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
     return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
 
 
-def _tables(run: ReportedRun) -> tuple[dict[str, Any], dict[str, Any]]:
+def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
+    """The rows that the page lists, in reading order, and their cells: of a large run the worst ones."""
+    lines = lines_of(run.texts[run.seen.places < LISTED])
+    rows = [row_from(line) for line in lines]
+    order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
+    return [rows[i] for i in order], [lines[i] for i in order]
+
+
+def _tables(
+    run: ReportedRun, rows: Sequence[Row], lines: Sequence[Mapping[str, str]]
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """The table and the details."""
-    lines = list(Results.of_run(run.folder.path).lines())
-    order = sorted(range(len(run.rows)), key=lambda i: reading_order(run.rows[i]))
-    rows, lines = [run.rows[i] for i in order], [lines[i] for i in order]
     planned = [run.experiments.get(row.experiment_id) for row in rows]
-    made = table(rows, lines, run.paths, alerts=run.folder.has_alerts)
+    paths = run.paths
+    if paths:
+        ids, places = run.texts["experiment_id"], run.seen.courses_of
+        some = (run.seen.places < LISTED) & (places >= 0)
+        paths = replace(paths, course_of=dict(zip(ids[some], places[some].tolist(), strict=True)))
+    made = table(rows, lines, paths, alerts=run.folder.has_alerts)
+    if len(rows) < len(run.texts):
+        made |= {"of": len(run.texts), "map": map_of(run)}
     return made, details(planned, shapes(_patches(run, rows)), rows)
 
 

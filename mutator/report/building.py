@@ -9,8 +9,8 @@ from pathlib import Path
 
 from mutator._common.files import write_atomic
 from mutator._common.tables import Table
+from mutator.outcomes.counting import outcome_counts
 from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import outcome_counts
 from mutator.report.browse import browse_data
 from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
 from mutator.report.panel import FOLDER, Panel
@@ -43,7 +43,7 @@ def ensure(run: Path, workspace: Workspace | None) -> Report:
     folder, out = RunFolder.open(run), run / FOLDER
     if is_current(out, made_from(folder, workspace)):
         text, hypertext = _files(out)
-        return Report(markdown=text, page=hypertext, rows=len(list(Results.of_run(run).lines())))
+        return Report(markdown=text, page=hypertext, rows=Results.of_run(run).count())
     return write(run, workspace)
 
 
@@ -66,7 +66,7 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     write_atomic(hypertext, page_html(content).encode())
     write_stamp(out, sources)
     summaries = tuple(panel.summary for panel in (*content.panels, *study) if panel.summary)
-    return Report(markdown=text, page=hypertext, rows=len(reported.rows), summaries=summaries)
+    return Report(markdown=text, page=hypertext, rows=len(reported.texts), summaries=summaries)
 
 
 def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:
@@ -89,7 +89,7 @@ def _content(run: ReportedRun) -> Content:
     return Content(
         name=str(run.folder.head["campaign"]),
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
-        outcomes=outcome_counts(run.rows),
+        outcomes=outcome_counts(run.texts),
         planned=_planned(run.folder),
         words=words_of(run),
         study=run.study.about if run.study and run.compared else "",

@@ -43,6 +43,15 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
     )
 
 
+def worst_of(frame: pd.DataFrame) -> list[str]:
+    """The experiments that `dangerous` may list, by their `place`."""
+    hazards = frame[frame["outcome"] == "hazard"]
+    groups = [hazards]
+    if SEVERITY in frame:
+        groups = [hazards[hazards[SEVERITY] != ""], hazards[hazards[SEVERITY] == ""]]
+    return [str(name) for group in groups for name in group.nsmallest(WORST, "place")["experiment_id"]]
+
+
 def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
     """To all hazards, and to those with and without contact where both came."""
     if ranked.empty:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mutator._common.tables import Table
 from mutator.engines.jobs import RunMode
@@ -11,6 +12,9 @@ from mutator.errors import CheckFailed
 from mutator.model import Record
 from mutator.store.run_folder import RunFolder
 from mutator.verification import equivalence
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
 _WORDS = {
@@ -35,10 +39,12 @@ class EngineSummary:
     failed: bool
 
 
-def engine_summary(folder: RunFolder, records: Mapping[str, Record]) -> EngineSummary | None:
-    """What the timings and `proof/` of a run folder with these records say; None if neither names an
-    engine."""
-    ways = _ways(folder)
+def engine_summary(
+    folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
+) -> EngineSummary | None:
+    """What the `timings` (as `Seen` has them) and `proof/` of a run folder with these records say; None if
+    neither names an engine."""
+    ways = _ways(timings)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder, records)
@@ -46,10 +52,11 @@ def engine_summary(folder: RunFolder, records: Mapping[str, Record]) -> EngineSu
     return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
 
 
-def _ways(folder: RunFolder) -> Counter[tuple[str | None, str]]:
-    """RunMode many experiments were run how, and why not as was asked; the newest line of each counts."""
-    told = (line for line in folder.timings().values() if "engine" in line)  # not where there was but one
-    return Counter((line["engine"], line.get("why", "")) for line in told)
+def _ways(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
+    """How many experiments were run how, and why not as was asked."""
+    told = timings[timings["engine"].astype(object) != ""]  # not where there was but one
+    engines = (None if name is None or name != name else str(name) for name in told["engine"])
+    return Counter(zip(engines, map(str, told["why"]), strict=True))
 
 
 def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:

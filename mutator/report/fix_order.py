@@ -5,18 +5,16 @@ of the next class, and so on down to hazards without contact; then the shortest 
 Without alerts all hazards count, without severity all are of one class.
 """
 
-import math
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
 
-from mutator.outcomes.paths import Crossing, Passage, Path
+from mutator.outcomes.paths import Course
 from mutator.report.answer_parts import Answer, Cell, Link, Listing, kind_link, share, to_list
 from mutator.report.dangers import NO_CONTACT, SEVERITY
 from mutator.report.paths import FoundPaths, link_text
 from mutator.report.warnings import FIRST, SILENT
-from mutator.targets.channels import Role
 
 LISTED = 5  # fault types
 
@@ -112,23 +110,20 @@ def _line(
         Link(f"{after.min():.2f} s", f"e={fastest}&{to_list(facets, 'rank')}"),
     ]
     if paths:
-        active = all_of_kind[all_of_kind["is_activated"]]["experiment_id"]
-        line += [
-            _let_through(kind, set(counted["experiment_id"]), only, paths),
-            _stopped(kind, active, paths),
-        ]
+        active = all_of_kind[all_of_kind["is_activated"]]
+        line += [_let_through(kind, counted, only, paths), _stopped(kind, active, paths)]
     return tuple(line)
 
 
 def _let_through(
-    kind: str, hazards: Collection[str], only: Mapping[str, Sequence[str]], paths: FoundPaths
+    kind: str, hazards: pd.DataFrame, only: Mapping[str, Sequence[str]], paths: FoundPaths
 ) -> Cell:
     """The component that most often let such a fault through to the actuator that changed first."""
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
-    for name in sorted(hazards & paths.by_id.keys()):
-        if crossing := _to_actuator(paths.by_id[name], paths):
-            passed[crossing.tail] += 1
+    for course, count in _courses(hazards, paths):
+        if crossing := course.entered:
+            passed[crossing.tail] += count
             links.setdefault(crossing.tail, set()).add(link_text(crossing.tail, crossing.tip))
     if not passed:
         return "-"
@@ -137,20 +132,19 @@ def _let_through(
     return Link(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", to)
 
 
-def _to_actuator(path: Path, paths: FoundPaths) -> Crossing | None:
-    """The link that a fault came to the first actuator by; None where it came to none."""
-    actuators = {component for _, _, role, component, _ in paths.channels if role == Role.ACTUATOR.value}
-    first = {stage.component: stage.t_first for stage in path.stages}
-    through = [c for c in path.crossings if c.tip in actuators and c.passage is Passage.THROUGH]
-    return min(through, key=lambda c: math.inf if (t := first[c.tip]) is None else t, default=None)
+def _courses(frame: pd.DataFrame, paths: FoundPaths) -> Iterator[tuple[Course, int]]:
+    """The courses of the faults of a frame, and how many have each."""
+    for code, count in frame["course"].value_counts(sort=False).items():
+        if (place := int(str(code))) >= 0:
+            yield paths.courses[place], int(count)
 
 
-def _stopped(kind: str, active: pd.Series, paths: FoundPaths) -> Cell:
+def _stopped(kind: str, active: pd.DataFrame, paths: FoundPaths) -> Cell:
     """Where faults of the type were stopped, most first: there the others might be, too."""
     stopped: Counter[str] = Counter()
-    for name in active:
-        if path := paths.by_id.get(name):
-            stopped.update(path.stopped_at)
+    for course, count in _courses(active, paths):
+        for name in course.stopped_at:
+            stopped[name] += count
     if not stopped:
         return f"none of {len(active):,}"
     component = min(stopped, key=lambda name: (-stopped[name], name))

@@ -67,6 +67,7 @@ def markdown(content: Content) -> str:
     """The report as Markdown."""
     total = sum(content.outcomes.values())
     endings = ", ".join(f"{n} {name}" for name, n in content.outcomes.items())
+    which = "the worst of them" if content.browse.listed else "them"
     parts = [
         f"# {content.name}",
         f"**{content.alarm}**" if content.alarm else "",
@@ -76,7 +77,7 @@ def markdown(content: Content) -> str:
         f"Compared with the published numbers: [STUDY.md](STUDY.md) ({content.study})."
         if content.study
         else "",
-        "The table of all experiments is `results.csv`; `index.html` lists them with their diffs.",
+        f"The table of all experiments is `results.csv`; `index.html` lists {which} with their diffs.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
 

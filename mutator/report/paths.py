@@ -2,45 +2,77 @@
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mutator.model import Experiment, Record
-from mutator.outcomes.paths import Passage, Path, State, Ways, ways_of
-from mutator.outcomes.rows import Row, by_fault_type
+from mutator.outcomes.paths import Course, Passage, Path, Ways
 from mutator.store.run_folder import RunFolder
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
 
 SCHEMA = "report-paths/1"
 ALL = "all fault types"
 
 
+class _PathsById(Mapping[str, Path]):
+    """The paths of experiments, each made when it is asked for."""
+
+    def __init__(self, ways: Ways, planned: Mapping[str, Experiment], records: Mapping[str, Record]) -> None:
+        self._ways, self._planned, self._records = ways, planned, records
+        self._last: tuple[str, Path | None] | None = None  # the one that was made last
+
+    def __getitem__(self, name: str) -> Path:
+        if self._last is None or self._last[0] != name:
+            self._last = name, self._ways.path(self._planned[name], self._records[name])
+        path = self._last[1]
+        if path is None:
+            raise KeyError(name)
+        return path
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._planned if name in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
 @dataclass(frozen=True, kw_only=True)
 class FoundPaths:
-    """The paths of a run by experiment, those that there are; `records` has what left golden."""
+    """The paths of a run by experiment, those that there are; `records` has what left golden. `courses` are
+    those that some experiment has."""
 
     ways: Ways
     channels: Sequence[Sequence[str]]  # as run.json has them
     by_id: Mapping[str, Path]
     records: Mapping[str, Record]
+    courses: Sequence[Course] = ()
+    course_of: Mapping[str, int] = field(default_factory=dict)  # places in it, of some experiments
 
     @classmethod
     def of(
-        cls, folder: RunFolder, experiments: Mapping[str, Experiment], records: Mapping[str, Record]
-    ) -> "FoundPaths | None":
-        """Those of a run folder with these plan and records; None where no path can be known."""
-        ways = ways_of(folder.head)
-        if ways is None:
-            return None
-        found = ((name, ways.path(e, records[name])) for name, e in experiments.items() if name in records)
-        by_id = {name: path for name, path in found if path is not None}
-        return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records)
+        cls,
+        folder: RunFolder,
+        ways: Ways,
+        planned: Mapping[str, Experiment],
+        records: Mapping[str, Record],
+        courses: Sequence[Course],
+    ) -> "FoundPaths":
+        """Those of a run folder with this plan and these records."""
+        by_id = _PathsById(ways, planned, records)
+        return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records, courses=courses)
 
     def through(self, experiment_id: str) -> str:
         """The links that a fault got through, joined by `;`: what the page filters by."""
-        path = self.by_id.get(experiment_id)
-        crossings = path.crossings if path else ()
+        if experiment_id in self.course_of:
+            crossings = self.courses[self.course_of[experiment_id]].crossings
+        else:
+            path = self.by_id.get(experiment_id)
+            crossings = path.crossings if path else ()
         return ";".join(link_text(c.tail, c.tip) for c in crossings if c.passage is Passage.THROUGH)
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
@@ -49,29 +81,36 @@ class FoundPaths:
         their channels show it, with the times by which they had."""
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
-        codes = []
-        for name in ids:
+        codes, by, names = [], {}, [name for name, *_ in self.channels]
+        first: list[list[float | None]] = [[] for _ in names]
+        largest: list[list[float | str | None]] = [[] for _ in names]
+        for row, name in enumerate(ids):
             path = self.by_id.get(name)
             stages = [[s.component, s.state.value, column] for s, column in _placed(path)] if path else []
             key = repr(stages)
             codes.append(shapes.setdefault(key, len(shapes)) if stages else -1)
             columns.setdefault(key, stages)
-        known = [self.records[one].left if one in self.records else () for one in ids]
-        left = [{name: rest for name, *rest in departures} for departures in known]
-        names = [name for name, *_ in self.channels]
+            if late := self._late(path):
+                by[row] = late
+            departures = self.records[name].left if name in self.records else ()
+            left = {channel: (time, most) for channel, time, most in departures}
+            for place, channel in enumerate(names):
+                time, most = left.get(channel, (None, None))
+                first[place].append(None if time is None else round(time, 4))
+                largest[place].append(None if most is None else _short(most))
         return {
             "schema": SCHEMA,
             "components": self.components,
             "channels": [[name, unit, component, about] for name, unit, _, component, about in self.channels],
-            "by": {row: late for row, name in enumerate(ids) if (late := self._late(name))},
+            "by": by,
             "shapes": [columns[key] for key in shapes],
             "shape": codes,
-            "first": [[round(one[name][0], 4) if name in one else None for one in left] for name in names],
-            "largest": [[_short(one[name][1]) if name in one else None for one in left] for name in names],
+            "first": first,
+            "largest": largest,
         }
 
-    def _late(self, experiment_id: str) -> dict[str, float]:
-        path = self.by_id.get(experiment_id)
+    @staticmethod
+    def _late(path: Path | None) -> dict[str, float]:
         return {s.component: round(s.t_by, 4) for s in (path.stages if path else ()) if s.t_by is not None}
 
     def label(self, component: str) -> str:
@@ -120,16 +159,22 @@ class PathCounts:
     masked: Counter[str] = field(default_factory=Counter)
     ends: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
-    def add(self, path: Path) -> None:
-        """Count one more path."""
-        self.active += 1
-        self.came.update(c.link for c in path.crossings if c.passage in (Passage.THROUGH, Passage.STOPPED))
-        self.through.update(c.link for c in path.crossings if c.passage is Passage.THROUGH)
-        self.injected.update(s.component for s in path.stages if s.state is State.INJECTED)
-        stopped = {c.tip for c in path.crossings if c.passage is Passage.STOPPED}
-        self.stopped.update(stopped.union(path.stopped_at))
-        self.masked.update(path.stopped_at)
-        self.ends.update([path.stopped_at] if path.stopped_at else ())
+    def add(self, path: Path | Course, count: int = 1) -> None:
+        """Count so many more of a path."""
+        self.active += count
+        passages = [(c.link, c.tip, c.passage) for c in path.crossings]
+        stopped = {tip for _, tip, passage in passages if passage is Passage.STOPPED}
+        for counter, names in (
+            (self.came, [n for n, _, passage in passages if passage in (Passage.THROUGH, Passage.STOPPED)]),
+            (self.through, [name for name, _, passage in passages if passage is Passage.THROUGH]),
+            (self.injected, path.injected),
+            (self.stopped, stopped.union(path.stopped_at)),
+            (self.masked, path.stopped_at),
+        ):
+            for name in names:
+                counter[name] += count
+        if path.stopped_at:
+            self.ends[path.stopped_at] += count
 
     def plain(self) -> dict[str, Any]:
         """For the page."""
@@ -139,11 +184,17 @@ class PathCounts:
         return {"active": self.active, "links": links, "components": components}
 
 
-def counts_by_fault_type(rows: Iterable[Row], paths: FoundPaths) -> dict[str, PathCounts]:
-    """The counts of all faults, then those of each fault type by its name."""
+def counts_by_fault_type(
+    kinds: "pd.Series[str]", codes: "np.ndarray", paths: FoundPaths
+) -> Mapping[str, PathCounts]:
+    """The counts of all faults, then those of each fault type by its name; `codes` has the place of each
+    row's course (-1: none)."""
+    import pandas as pd
+
     found: dict[str, PathCounts] = defaultdict(PathCounts)
-    for row in sorted(rows, key=by_fault_type):
-        if (path := paths.by_id.get(row.experiment_id)) is not None:
-            found[ALL].add(path)
-            found[by_fault_type(row)].add(path)
+    rows = pd.DataFrame({"kind": kinds.to_numpy(), "course": codes})
+    for kind, group in rows[rows["course"] >= 0].groupby("kind"):
+        for code, count in group["course"].value_counts(sort=False).items():
+            for name in (ALL, str(kind)):
+                found[name].add(paths.courses[int(str(code))], int(count))
     return dict(found)

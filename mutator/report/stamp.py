@@ -29,7 +29,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     references = _files(workspace.library / "references", "*.yaml") if workspace else None
     sources = Path(__file__).parents[1]
     own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
-    results = [digest((run / HEAD).read_bytes()), digest(Results.of_run(run).csv())]
+    results = [digests.sha256(run / HEAD), digests.sha256(Results.of_run(run).path)]
     # The records, too: what the proof compares is more of them than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
     sealed = [_files(run, name) for name in (gate.FILE, digests.FILE)]
@@ -66,4 +66,4 @@ def remove_stamp(out: Path) -> None:
 
 
 def _files(folder: Path, pattern: str) -> list[tuple[str, str]]:
-    return sorted((p.relative_to(folder).as_posix(), digest(p.read_bytes())) for p in folder.glob(pattern))
+    return sorted((p.relative_to(folder).as_posix(), digests.sha256(p)) for p in folder.glob(pattern))

@@ -11,14 +11,15 @@ from mutator.figures.figures import Drawing
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
 from mutator.outcomes.golden import load_trace
+from mutator.outcomes.paths import ways_of
 from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row
 from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import FOLDER, Panel
 from mutator.report.paths import FoundPaths
-from mutator.statistics.frame import load
+from mutator.report.seen import COURSE, PLACE, Seen
+from mutator.statistics.frame import prepare
 from mutator.statistics.published import Published
-from mutator.store import plan_file
+from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 class ReportedRun:
     """What a report is made from.
 
-    Plan and records are read once. `rows` are all experiments of results.csv, `frame` the usable ones.
+    `texts` are all experiments of results.csv, `frame` the usable ones. Plan and records are read when they
+    are asked for, by experiment id; what a report needs of all of them is in `seen`.
     Without a workspace nothing can be driven again, and no study can be asked. `study` is None if the
     campaign asks for none or if it is not installed here. `compared`: the study has something to say of these
     results, on a page of its own.
@@ -38,28 +40,31 @@ class ReportedRun:
 
     folder: RunFolder
     workspace: Workspace | None
-    rows: tuple[Row, ...]
+    texts: "DataFrame"
     frame: "DataFrame"
-    engines: EngineSummary | None
     study: "Study | None"
+    seen: Seen
+    engines: EngineSummary | None = None
     compared: bool = False
     paths: FoundPaths | None = None
-    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all that are planned, by id
-    records: Mapping[str, Record] = field(default_factory=dict)  # by experiment id
+    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all that are planned
+    records: Mapping[str, Record] = field(default_factory=dict)
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
         """A run folder whose results.csv is up to date."""
-        experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
-        records = folder.records()
+        experiments, records = Planned(folder.path), folder.records()
+        texts, ways = Results.of_run(folder.path).texts(), ways_of(folder.head)
+        seen = Seen.of(folder, texts, records, ways)
         return cls(
             folder=folder,
             workspace=workspace,
-            rows=Results.of_run(folder.path).rows(),
-            frame=load(folder.path / "results.csv"),
-            engines=engine_summary(folder, records),
+            texts=texts,
+            frame=prepare(texts.assign(**{PLACE: seen.places, COURSE: seen.courses_of})),
+            engines=engine_summary(folder, records, seen.timings),
             study=_study(folder) if workspace else None,
-            paths=FoundPaths.of(folder, experiments, records),
+            seen=seen,
+            paths=FoundPaths.of(folder, ways, experiments, records, seen.courses) if ways else None,
             experiments=experiments,
             records=records,
         )
@@ -72,7 +77,7 @@ class ReportedRun:
     @property
     def done(self) -> int:
         """Experiments of the plan that ran."""
-        return sum(row.status is not Status.HARNESS_ERROR for row in self.rows)
+        return int((self.texts["status"] != Status.HARNESS_ERROR.value).sum())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """What the golden runs do by themselves; nothing where they cannot be read."""

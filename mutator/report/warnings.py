@@ -1,6 +1,13 @@
 """Whether a hazard came with a warning: the one meaning of *silent* in reports."""
 
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from mutator.outcomes.rows import Row
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FIRST = "alert before the hazard"
 NO_ALERT, LATE = "no alert at all", "alert only after the hazard"
@@ -14,3 +21,10 @@ def warning(row: Row) -> str:
     if not row.alerts:
         return NO_ALERT
     return LATE if row.reaction_time is None else FIRST
+
+
+def warnings_of(frame: "pd.DataFrame") -> "np.ndarray":
+    """The same of each row of a frame of results, as `statistics.frame` makes it."""
+    late = np.where(frame["reaction_time"] == "", LATE, FIRST)
+    hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
+    return np.where(frame["is_hazard"], hazard, "")

@@ -66,7 +66,7 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
     """What the files of the scenarios say they are, where they say it."""
-    names = sorted({row.scenario for row in run.rows})
+    names = sorted(run.texts["scenario"].unique())
     return {name: about for name in names if (about := _title(run, name))}
 
 
@@ -84,7 +84,7 @@ def _title(run: ReportedRun, name: str) -> str:
 
 def _triggers(run: ReportedRun) -> dict[str, str]:
     """The methods, then what each guided trigger waits for."""
-    methods = {row.method for row in run.rows}
+    methods = set(run.texts["method"].unique())
     told = {name: about for name, about in _METHODS.items() if name in methods}
     abouts = _contexts(run)
     guided = run.frame[run.frame["method"] == Method.GUIDED.value] if "condition" in run.frame else None

@@ -15,7 +15,8 @@ from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 999
 _SEED = 1
-_CELLS = 500_000  # of one batch of draws, runs times draws: bounds the memory
+_CELLS = 500_000  # of one batch of draws: bounds the memory
+_BLOCK = 256  # values
 
 
 def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
@@ -43,10 +44,10 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
     alike = np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
     if len(names) < 2 or alike:
         return math.nan, math.nan
-    orders = [np.argsort(sample, kind="stable") for sample in samples]
+    sorted_ = [_Sorted(sample, codes, len(names)) for sample in samples]
     found = []
     for counts in _draws(len(names), codes.size):
-        medians = [_medians(s[o], counts[:, codes[o]]) for s, o in zip(samples, orders, strict=True)]
+        medians = [sample.medians(counts) for sample in sorted_]
         found.append(medians[0] - medians[1] if len(medians) > 1 else medians[0])
     tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(np.concatenate(found), (tail, 1 - tail))
@@ -56,16 +57,37 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
 def _draws(clusters: int, runs: int) -> Iterator[np.ndarray]:
     """How often each cluster is drawn: (draws, clusters), in batches."""
     rng = np.random.default_rng(_SEED)
-    batch = max(1, _CELLS // runs)
+    batch = max(1, _CELLS // max(clusters, runs // _BLOCK + 1, _BLOCK))
     for begin in range(0, RESAMPLES, batch):
         size = min(batch, RESAMPLES - begin)
-        yield rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=size).astype(np.int32)
+        yield rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=size)
 
 
-def _medians(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The median of each draw of sorted values, of which it has each so many times: (draws, values)."""
-    until = np.cumsum(counts, axis=1, dtype=np.int32)
-    whole = until[:, -1:]
-    lower, upper = ((until <= place).sum(axis=1) for place in ((whole - 1) // 2, whole // 2))
-    medians: np.ndarray = (values[lower] + values[upper]) / 2
-    return medians
+class _Sorted:
+    """Values in their order, with the number of each cluster's in every block of them: a median of a draw is
+    looked for block by block, then in a block."""
+
+    def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int) -> None:
+        order = np.argsort(values, kind="stable")
+        self._values, self._codes = values[order], codes[order]
+        blocks = -(-values.size // _BLOCK)
+        cells = np.arange(values.size) // _BLOCK * clusters + self._codes
+        self._of = np.bincount(cells, minlength=blocks * clusters).reshape(blocks, clusters).astype(float)
+
+    def medians(self, counts: np.ndarray) -> np.ndarray:
+        """The median of each draw, which has each cluster so many times: (draws, clusters)."""
+        until = np.cumsum(counts @ self._of.T, axis=1)  # whole numbers, exact in floats
+        whole = until[:, -1:].astype(np.int64)
+        lower, upper = (self._at(place, until, counts) for place in ((whole - 1) // 2, whole // 2))
+        medians: np.ndarray = (lower + upper) / 2
+        return medians
+
+    def _at(self, place: np.ndarray, until: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        """The value at a place of each draw's values."""
+        block = (until <= place).sum(axis=1)
+        before = np.take_along_axis(until, np.maximum(block - 1, 0)[:, None], axis=1)[:, 0]
+        at = np.minimum(block[:, None] * _BLOCK + np.arange(_BLOCK), self._values.size - 1)
+        inside = np.cumsum(np.take_along_axis(counts, self._codes[at], axis=1), axis=1)
+        within = (inside + np.where(block > 0, before, 0)[:, None] <= place).sum(axis=1)
+        found: np.ndarray = self._values[block * _BLOCK + within]
+        return found

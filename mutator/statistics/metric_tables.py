@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
+from mutator.statistics.frame import slim
 from mutator.statistics.medians import median_interval
 from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, Sheet
@@ -21,7 +22,7 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
     """Of each metric (name, unit, meaning, which way is worse) the spread over the activated faults, by fault
     type; without lines where no run has a value."""
     lines: list[tuple[Cell, ...]] = []
-    activated = frame[frame["is_activated"]]
+    activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
     for name, unit, _, worse in metrics:
         for kind, values, faults in _groups(activated, pd.to_numeric(activated[name])):
             is_higher = worse == HIGHER
@@ -45,7 +46,8 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
     """How many of the activated faults of each type ended in a contact of which class; without lines where
     results have no classes."""
     lines: list[tuple[Cell, ...]] = []
-    activated = frame[frame["is_activated"]]
+    known = [name for name in ("kind", "severity") if name in frame]
+    activated = frame.loc[frame["is_activated"], known]
     for kind, group in _by_kind(activated) if "severity" in frame else ():
         counts = [int((group["severity"] == name).sum()) for name in CLASSES]
         shares = [share(count, len(group)) for count in (sum(counts), *counts)]
@@ -62,7 +64,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
 
 def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
     """How long it took to the first hazard, by fault type; `alerts` if the target has some."""
-    came = frame[frame["is_hazard"]]
+    came = slim(frame)[frame["is_hazard"]]
     starts = {"activation": "t_activation", "manifestation": "t_manifest"}
     starts |= {"alert": "t_alert"} if alerts else {}
     lines: list[tuple[Cell, ...]] = []
@@ -89,7 +91,7 @@ def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 def _groups(frame: pd.DataFrame, values: pd.Series) -> Iterator[tuple[str, pd.Series, pd.Series]]:
     """Fault type, values and whose they are, of the runs that have one."""
     known = values.dropna()
-    for kind, group in _by_kind(frame.loc[known.index]):
+    for kind, group in _by_kind(frame.loc[known.index, ["kind", "fault_id"]]):
         yield kind, known[group.index], group["fault_id"]
 
 

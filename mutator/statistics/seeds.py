@@ -95,7 +95,7 @@ def _lines(
     seeds = seeds_of(frame)
     if len(seeds) < 2:
         return
-    codes, flags = pd.Categorical(frame["seed"].astype(str), categories=seeds).codes, _flags(frame)
+    codes, flags = pd.Index(seeds).get_indexer(pd.Index(frame["seed"].astype(str))), _flags(frame)
     for group, chosen in groups.items():
         for part, whole in shares:
             of = chosen & flags[whole] & (codes >= 0)

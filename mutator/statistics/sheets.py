@@ -6,6 +6,7 @@ import pandas as pd
 
 from mutator.statistics import compare_tables, summary_tables, time_tables
 from mutator.statistics.contrasts import GUIDED, RANDOM
+from mutator.statistics.frame import slim
 from mutator.statistics.published import Published
 from mutator.statistics.sheet import Sheet
 from mutator.statistics.tallies import by_kind, by_scenario
@@ -22,10 +23,11 @@ def run_sheets(
 ) -> tuple[Sheet, ...]:
     """The tables of a frame; none if they would say no more than counts: one method, nothing published.
 
-    `alerts` of each run (None: the target has none) are needed to say which came before a hazard, `ends` (s
-    of simulation at which a run of each scenario ends) for censored times; tables that lack what they need
-    are left out.
+    `alerts` of each run with a hazard (None: the target has none) are needed to say which came before it,
+    `ends` (s of simulation at which a run of each scenario ends) for censored times; tables that lack what
+    they need are left out.
     """
+    frame = slim(frame)
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):
         return ()
     scenarios, kinds = by_scenario(frame), by_kind(frame)
@@ -45,7 +47,7 @@ def run_sheets(
     if ends is not None and has_alerts:
         driver_s = published.driver_s if published else _DRIVER_S
         made.append(time_tables.reaction_sheet(frame, ends, driver_s))
-    if alerts is not None and alerts.keys() >= set(frame["experiment_id"]):
+    if alerts is not None and alerts.keys() >= set(frame.loc[frame["is_hazard"], "experiment_id"]):
         made.append(time_tables.alerts_sheet(frame, alerts))
     made.append(time_tables.orders_sheet(frame))
     return tuple(sheet for sheet in made if sheet.lines)

@@ -141,12 +141,14 @@ def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], 
     """By (hazard, alert): in how many of the runs with this hazard the alert came before it; `any` and
     `none` of all alerts.
 
-    `alerts`: by experiment id, the name and first time of each alert of a run, s. A run may have several.
+    `alerts`: by experiment id, the name and first time of each alert of a run with a hazard, s. A run may
+    have several.
     """
     shares: dict[tuple[str, str], Share] = {}
     for hazard in hazard_names(frame):
-        times = frame.set_index("experiment_id")[f"t_{hazard.lower()}"].dropna()
-        before = [{name for name, t in alerts[str(run)] if t < end} for run, end in times.items()]
+        ends = frame[f"t_{hazard.lower()}"].dropna()
+        runs = frame.loc[ends.index, "experiment_id"]
+        before = [{name for name, t in alerts[run] if t < end} for run, end in zip(runs, ends, strict=True)]
         counts = Counter(name for names in before for name in names)
         warned = sum(bool(names) for names in before)
         if before:
@@ -157,11 +159,11 @@ def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], 
 
 def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
     """How many runs had which hazards, in the order in which they came: `A`, `A then B`, `A with B`."""
-    times = {hazard: frame[f"t_{hazard.lower()}"] for hazard in hazard_names(frame)}
-    orders = [
-        _order({hazard: float(column.iloc[i]) for hazard, column in times.items()}) for i in range(len(frame))
-    ]
-    return {str(k): int(v) for k, v in pd.Series(orders).value_counts().sort_index().items() if k}
+    names = hazard_names(frame)
+    rows = frame[frame["is_hazard"]]
+    times = zip(*(rows[f"t_{name.lower()}"].tolist() for name in names), strict=True)
+    orders = Counter(_order(dict(zip(names, row, strict=True))) for row in times)
+    return dict(sorted((order, count) for order, count in orders.items() if order))
 
 
 def _order(times: Mapping[str, float]) -> str:

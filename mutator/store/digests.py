@@ -78,6 +78,12 @@ class DigestingFile:
         return Digest(size=self._size, sha256=self._hash.hexdigest())
 
 
+def sha256(path: Path) -> str:
+    """The digest of a file, which may be larger than memory; '' where there is none."""
+    found = Digest.of_file(path)
+    return found.sha256 if found else ""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ledger:
     """What `digests.json` says: files by their names in the run folder; those that are being rewritten, and

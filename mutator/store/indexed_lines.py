@@ -39,6 +39,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         self._made, self._checksums = made, checksums
         self._files = Files(list(paths))
         self._index: dict[str, int] = {}
+        self._last: tuple[str, T] | None = None  # the object that was made last: some ask for one twice
         self._file, self._number, self._offset, self._length = (array(code) for code in "HLQL")
         for file, path in enumerate(self._files.paths):
             self._read(file, path, schema, replaces)
@@ -65,6 +66,11 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return Line(self._files.paths[file], self._number[at], data)
 
     def __getitem__(self, name: str) -> T:
+        if self._last is None or self._last[0] != name:
+            self._last = name, self._read_one(name)
+        return self._last[1]
+
+    def _read_one(self, name: str) -> T:
         line = self.line(name)
         try:
             return self._made(line.content())

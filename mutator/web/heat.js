@@ -13,8 +13,8 @@ class HeatMap {
     this.table = table;
     this.state = state;
     const find = (name) => table.facets.find((f) => f.name === name);
-    this.rows = find(HeatMap.ROW);
-    this.columns = find(HeatMap.COLUMN);
+    this.rows = table.map ? { values: table.map.kinds } : find(HeatMap.ROW);
+    this.columns = table.map ? { values: table.map.scenarios } : find(HeatMap.COLUMN);
     const groups = [["Shares", HeatMap.shares(table)], ["Severity", HeatMap.severities(table)], ["Metrics of activated faults", HeatMap.values(table, metrics)]];
     this.measures = groups.flatMap(([, measures]) => measures);
     picker.append(...groups.filter(([, measures]) => measures.length).map(([label, measures]) =>
@@ -70,6 +70,11 @@ class HeatMap {
     this.picker.value = measure.name;
     if (!this.rows || !this.columns) return;
     const width = this.columns.values.length + 1, height = this.rows.values.length + 1;
+    if (this.table.map) {
+      const told = this.table.map.cells[measure.name];
+      this.#draw(measure, measure.value ? HeatMap.#coloured(measure, told) : told.map(([n, all]) => HeatMap.#shareOf(n, all)), width, height);
+      return;
+    }
     const cells = Array.from({ length: width * height }, () => []);
     for (const row of rows) {
       if (!this.table.usable(row) || !measure.of(row)) continue;
@@ -84,20 +89,28 @@ class HeatMap {
 
   /** Text, words and colour (0 to 1) of a cell that counts. */
   static #share(told) {
-    const all = told.length, n = told.filter(Boolean).length;
+    return HeatMap.#shareOf(told.filter(Boolean).length, told.length);
+  }
+
+  static #shareOf(n, all) {
     return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "", rate: all ? n / all : 0 };
   }
 
   /** The same of cells that sum up a metric: the worst of them has the full colour. */
   static #summaries({ which, turn }, cells) {
-    const values = cells.map((told) => {
+    return HeatMap.#coloured({ turn }, cells.map((told) => {
       const sorted = told.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
-      if (!sorted.length) return NaN;
-      return which === "worst" ? sorted.at(-1) : (sorted[Math.floor(middle)] + sorted[Math.ceil(middle)]) / 2;
-    });
+      if (!sorted.length) return [NaN, 0];
+      return [which === "worst" ? sorted.at(-1) : (sorted[Math.floor(middle)] + sorted[Math.ceil(middle)]) / 2, sorted.length];
+    }));
+  }
+
+  /** The same of values (null: none), each with how many it is of. */
+  static #coloured({ turn }, told) {
+    const values = told.map(([value]) => value ?? NaN);
     const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
     const rate = (value) => (high > low && Number.isFinite(value) ? (turn > 0 ? value - low : high - value) / (high - low) : 0);
-    return values.map((value, at) => ({ all: cells[at].length, text: Grid.number(value), what: `${Grid.number(value)}, over ${cells[at].length}`, rate: rate(value) }));
+    return values.map((value, at) => ({ all: told[at][1], text: Grid.number(value), what: `${Grid.number(value)}, over ${told[at][1]}`, rate: rate(value) }));
   }
 
   #draw(measure, cells, width, height) {

@@ -48,7 +48,14 @@ const Report = (() => {
   function foundText(table, state, count) {
     const all = table.count.toLocaleString("en");
     const found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} experiments` : `${all} experiment${table.count === 1 ? "" : "s"}`;
-    return [found, ...table.unknown(state)].join(". ");
+    const listed = table.of > table.count ? ` listed, the worst of ${table.of.toLocaleString("en")}` : "";
+    return [found + listed, ...missing(table, state), ...table.unknown(state)].join(". ");
+  }
+
+  /** What is said of an opened experiment that is not among those listed. */
+  function missing(table, { experiment }) {
+    if (table.of === table.count || !experiment || table.find(experiment) >= 0) return [];
+    return [`Experiment ${experiment} is not among the listed ones: mutator show ${experiment} --run ${runFolder()}`];
   }
 
   /** What shows the state in all parts. */

@@ -52,6 +52,8 @@ const Rows = (() => {
       this.count = data.count;
       this.checked = data.checked; // hazards that were looked for
       this.labels = data.labels; // of components
+      this.of = data.of || data.count; // experiments of the run: of a large one the worst are here
+      this.map = data.map || null; // of all experiments, where not all are here (report/whole_map.py)
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
       this.byId = null;

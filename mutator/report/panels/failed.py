@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 
+from pandas import DataFrame
+
 from mutator._common.tables import Table
 from mutator.model import Status
-from mutator.outcomes.rows import Row
+from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
@@ -22,23 +24,25 @@ _HTML = """\
 
 def failed_panel(run: ReportedRun) -> Panel | None:
     """What each of them said; None where all ended well."""
-    failed = [row for row in run.rows if row.status is not Status.OK]
-    if not failed:
+    texts = run.texts[run.texts["status"] != Status.OK.value]
+    if texts.empty:
         return None
-    failed.sort(key=lambda r: (r.status is not Status.HARNESS_ERROR, r.status, r.experiment_id))
+    by = {"other": texts["status"] != Status.HARNESS_ERROR.value, **texts[["status", "experiment_id"]]}
+    order = DataFrame(by).sort_values([*by]).index[: max(LISTED, PAGE_LISTED)]
+    failed, count = [row_from(line) for line in lines_of(texts.loc[order])], len(texts)
     failings = [status.value for status in Status if status is not Status.OK]
     return Panel(
         anchor="failed",
         link="Failed runs",
-        markdown=f"## Runs that did not end well\n\n{_markdown(failed)}",
-        html=rendered(_HTML, table=_linked(failed), more=len(failed) - PAGE_LISTED, failings=failings),
+        markdown=f"## Runs that did not end well\n\n{_markdown(failed, count)}",
+        html=rendered(_HTML, table=_linked(failed), more=count - PAGE_LISTED, failings=failings),
     )
 
 
-def _markdown(failed: Sequence[Row]) -> str:
+def _markdown(failed: Sequence[Row], count: int) -> str:
     rows = [(r.status.value, r.experiment_id, r.fault, r.scenario, r.detail) for r in failed[:LISTED]]
     table = Table(heads=_HEADS, rows=rows).as_markdown()
-    more = len(failed) - LISTED
+    more = count - LISTED
     return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
 
 

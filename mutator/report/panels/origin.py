@@ -36,7 +36,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     reviewed = gate.approval_summary(folder.path)
     head, packages = folder.head, package_versions(folder.stretches)
     facts = {
-        "experiments": f"{len(run.rows)} of {folder.planned} planned",
+        "experiments": f"{len(run.texts)} of {folder.planned} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         "seal": seal_or_why_not(folder),

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from mutator._common.tables import Table
+from mutator.outcomes.counting import kinds
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_ways, share_text
 from mutator.report.paths import ALL, FoundPaths, PathCounts, counts_by_fault_type
@@ -56,7 +57,7 @@ there.</p>
 def paths_panel(run: ReportedRun) -> Panel | None:
     """Links and components with their counts; None where no path is known."""
     paths = run.paths
-    counts = counts_by_fault_type(run.rows, paths) if paths else {}
+    counts = counts_by_fault_type(kinds(run.texts), run.seen.courses_of, paths) if paths else {}
     if paths is None or not counts:
         return None
     links = _links(paths)
@@ -86,7 +87,7 @@ Links = Mapping[str, tuple[str, str, str]]  # tail, tip, what it carries
 
 def _links(paths: FoundPaths) -> Links:
     """The links that some path has, in the order of the structure."""
-    crossings = {c.link: c for path in paths.by_id.values() for c in path.crossings}
+    crossings = {c.link: c for course in paths.courses for c in course.crossings}
     structure = paths.ways.structure
     known = structure.links if structure else {}
     order = [

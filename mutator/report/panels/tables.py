@@ -2,19 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 
 from mutator._common.files import write_atomic
 from mutator._common.tables import Table
+from mutator.outcomes.counting import counts_by, hazard_names, kinds
 from mutator.outcomes.fault_free import fault_free_table, own_alerts
-from mutator.outcomes.rows import (
-    by_fault_type,
-    by_method,
-    by_scenario,
-    count_table,
-    counts_by,
-    hazard_names,
-)
+from mutator.outcomes.rows import count_table
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
@@ -32,9 +27,9 @@ NOTES = (
 NO_ALERT = " *Hazard, no alert*: no counted alert at all, before or after the hazard."
 FAULT_FREE = "The golden runs: first times of alerts and hazards, and how far each plotted channel goes."
 _GROUPS = (
-    ("By fault type", "fault type", by_fault_type),
-    ("By scenario", "scenario", by_scenario),
-    ("By method", "method", by_method),
+    ("By fault type", "fault type", kinds),
+    ("By scenario", "scenario", itemgetter("scenario")),
+    ("By method", "method", itemgetter("method")),
 )
 _HTML = """\
 <h2>{{ title }}</h2>
@@ -112,18 +107,19 @@ def published_panel(run: ReportedRun) -> Panel | None:
 
 
 def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
-    hazards = hazard_names(run.rows)
+    hazards = hazard_names(run.texts)
     made = []
-    for title, head, key in _GROUPS:
-        heads, lines = count_table(counts_by(run.rows, key), head, hazards, alerts=run.folder.has_alerts)
+    for title, head, groups in _GROUPS:
+        counts = counts_by(run.texts, groups(run.texts))
+        heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
         made.append((title, Table(heads=heads, rows=lines, right=range(1, len(heads)))))
     return made
 
 
 def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
     """What can be compared by method and scenario, beside published counts if there are some."""
-    alerts = {name: record.alerts for name, record in run.records.items()}
-    return run_sheets(run.frame, published, alerts if run.folder.has_alerts else None, run.ends())
+    alerts = run.seen.alerts if run.folder.has_alerts else None
+    return run_sheets(run.frame, published, alerts, run.ends())
 
 
 def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:

@@ -5,7 +5,7 @@ import random
 from pathlib import Path
 
 from mutator.outcomes.columns import SEVERITY, result_columns
-from mutator.outcomes.ranking import worst
+from mutator.outcomes.ranking import places, worst
 from mutator.outcomes.reader import Results
 
 METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
@@ -58,3 +58,24 @@ def test_the_worst_come_first(tmp_path: Path) -> None:
     rows = list(Results(path).rows())
     random.Random(1).shuffle(rows)
     assert [row.experiment_id for row in worst(rows)] == list(WORST_FIRST)
+
+
+def test_places_are_those_of_the_worst(tmp_path: Path) -> None:
+    """A column at a time comes to the same order as row by row, for made-up results with many ties."""
+    draw = random.Random(3)
+    choices = list(WORST_FIRST.values())
+    lines = [dict(draw.choice(choices)) for _ in range(400)]
+    for i, line in enumerate(lines):
+        line["experiment_id"] = f"{draw.randrange(10**6):06}-{i}"
+        for name in ("margin_h1", "margin_h2", "margin_h3"):
+            if draw.random() < 0.3:
+                line[name] = str(draw.randint(-3, 3))
+    path = tmp_path / "results.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, COLUMNS, restval="")
+        table.writeheader()
+        table.writerows(lines)
+    found = Results(path)
+    texts = found.texts()
+    order = texts["experiment_id"].to_numpy()[places(texts).argsort()]
+    assert list(order) == [row.experiment_id for row in worst(found.rows())]

@@ -7,14 +7,9 @@ import pytest
 
 from mutator.model import Outcome, Status
 from mutator.outcomes.columns import result_columns
+from mutator.outcomes.counting import counts_by, hazard_names, kinds, outcome_counts
 from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import (
-    by_fault_type,
-    count_table,
-    counts_by,
-    hazard_names,
-    outcome_counts,
-)
+from mutator.outcomes.rows import count_table
 
 COLUMNS = [column.name for column in result_columns(("H1", "H2", "H3"), ("gas",))]
 SEEN = {
@@ -47,9 +42,9 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
     warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
     masked = SEEN | {"outcome": "masked", "t_manifest": ""}
-    rows = Results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked)).rows()
+    rows = Results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked)).texts()
 
-    [chaff, total] = counts_by(rows, by_fault_type)
+    [chaff, total] = counts_by(rows, kinds(rows))
 
     assert (chaff.injected, chaff.activated, chaff.manifested) == (5, 4, 3)
     assert chaff.hazards == (2, 0, 1)
@@ -62,9 +57,9 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Path, status: Status) -> None:
     """A harness error or an invalid mutant is counted as unusable and nowhere else."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
-    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).rows()
+    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
-    [count, _] = counts_by(rows, by_fault_type)
+    [count, _] = counts_by(rows, kinds(rows))
 
     assert (count.injected, count.activated, count.any_hazard, count.alerts) == (1, 1, 0, 0)
     assert count.unusable == 1
@@ -75,9 +70,9 @@ def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Pa
 def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
     """A crashed or hanging controller stays among the injected and has a column of its own."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
-    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).rows()
+    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
-    heads, lines = count_table(counts_by(rows, by_fault_type), "fault type", hazard_names(rows))
+    heads, lines = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
 
     assert heads[-1] == status.value
     assert lines[-1][heads.index("injected")] == "2"
@@ -86,15 +81,15 @@ def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
 
 def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
     """A clean campaign's table has no columns of zeros for crashes, timeouts, unusable runs."""
-    rows = Results(write_table(tmp_path / "results.csv", SEEN)).rows()
-    heads, _ = count_table(counts_by(rows, by_fault_type), "fault type", hazard_names(rows))
+    rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
+    heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 
 def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
     """A hazard that was looked for is named though it never came; one that nobody looked for is not."""
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
-    assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).rows()) == ("H2",)
+    assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
 
 
 def test_rows_are_typed(tmp_path: Path) -> None:

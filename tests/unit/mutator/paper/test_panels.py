@@ -2,14 +2,13 @@
 
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
+import pandas as pd
 import pytest
 
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Choices, make_plan
-from mutator.model import Status
 from mutator.paper.panels import observations_panel
 from mutator.paper.published import load_paper
 from mutator.report.studies import ReportedRun
@@ -18,6 +17,7 @@ from mutator.workspace import Workspace
 
 from ..statistics.results_frame import results
 
+SEEN: Any = None  # nothing of it is asked for
 REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 
 
@@ -48,8 +48,8 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
     of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
     assert of_all
     for done in (folder.planned - 1, folder.planned):
-        rows: Any = (SimpleNamespace(status=Status.OK),) * done
-        run = ReportedRun(folder=folder, workspace=toycar, rows=rows, frame=frame, engines=None, study=None)
+        texts = pd.DataFrame({"status": ["ok"] * done})
+        run = ReportedRun(folder=folder, workspace=toycar, texts=texts, frame=frame, study=None, seen=SEEN)
         assert observations_panel(run) is not None
         text = (folder.path / "report" / "observations.md").read_text()
         why = f"cannot be told: only {done} of the 12 experiments of the plan have been run"
@@ -62,6 +62,6 @@ def test_results_that_decide_nothing_say_nothing_of_the_study(toycar: Workspace,
     freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
     frame = results({"module": "radar", "fault_type": "chaff"})
-    run = ReportedRun(folder=folder, workspace=toycar, rows=(), frame=frame, engines=None, study=None)
+    run = ReportedRun(folder=folder, workspace=toycar, texts=frame, frame=frame, study=None, seen=SEEN)
     assert observations_panel(run) is None
     assert not (folder.path / "report").exists()

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from mutator.outcomes.columns import result_columns
-from mutator.outcomes.paths import Crossing, Passage, Stage, State
-from mutator.outcomes.paths import Path as FaultPath
+from mutator.outcomes.paths import Course, Crossing, Passage
+from mutator.outcomes.rows import lines_of
 from mutator.report.answer_parts import Answer, Link, Part, to_list
 from mutator.report.answers import answers_of
 from mutator.report.dangers import dangerous
@@ -162,39 +162,27 @@ def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() 
     assert "and 1 of 3 of severity S3, the highest that came" in answer.says
 
 
-CHANNELS = [
-    ["seen", "m", "internal", "eyes", ""],
-    ["gas", "-", "actuator", "pedals", ""],
-    ["turn", "-", "actuator", "wheel", ""],
-]
+def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
+    """One that came to its first actuator by a component, or was stopped."""
+    entered = Crossing(link=by, tail=by, tip="pedals", passage=Passage.THROUGH) if by else None
+    return Course(states={}, late={}, crossings=(), reached="", stopped_at=stopped_at, entered=entered)
 
 
-def through(pedals_at: float, wheel_at: float) -> FaultPath:
-    """From the eyes by the feet to the pedals, and by the hands to the wheel."""
-    times = {"pedals": ("gas", pedals_at), "wheel": ("turn", wheel_at)}
-    stages = [
-        Stage(component=name, state=State.REACHED, channels=((*left, 1.0),)) for name, left in times.items()
-    ]
-    links = [("feet", "pedals"), ("hands", "wheel")]
-    crossings = [Crossing(link=a, tail=a, tip=b, passage=Passage.THROUGH) for a, b in links]
-    return FaultPath(stages=tuple(stages), crossings=tuple(crossings), reached="", stopped_at=())
-
-
-def test_a_fault_was_let_through_to_the_actuator_that_changed_first() -> None:
-    """What changed later is an after-effect; most of the faults decide; stops of the type are counted."""
-    by_id = {"e0": through(2.1, 2.5), "e1": through(2.1, 2.5), "e2": through(2.9, 2.5)}
-    by_id["masked"] = FaultPath(stages=(), crossings=(), reached="", stopped_at=("eyes",))
-    structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "channels": CHANNELS, "by_id": by_id}
-    frame = hazards(*[("a/b", "S1", 1.0)] * 3)
-    masked = frame[:1].assign(experiment_id="masked", outcome="masked")
+def test_the_component_that_let_most_faults_through_is_named() -> None:
+    """The link by which a fault came to the first actuator decides, that of most of them; stops of the type
+    are counted, and faults without a path are in neither number."""
+    courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
+    structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
+    frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
+    masked = frame[:1].assign(experiment_id="masked", outcome="masked", course=2)
     answer = first_to_fix(
         pd.concat([frame, masked]), cast(FoundPaths, SimpleNamespace(**structure)), has_alerts=True
     )
     [line] = answer.listings[0].lines
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
     assert line[3:] == (
-        Link("Feet: 2 of 3", f"kind=a%2Fb&{silent}&through=feet%E2%86%92pedals&sort=rank"),
-        Link("Eyes: 1 of 4", "kind=a%2Fb&stopped_at=eyes"),
+        Link("Feet: 2 of 4", f"kind=a%2Fb&{silent}&through=feet%E2%86%92pedals&sort=rank"),
+        Link("Eyes: 1 of 5", "kind=a%2Fb&stopped_at=eyes"),
     )
 
 
@@ -238,14 +226,19 @@ def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
     """The same run with these experiments alone."""
     return replace(
         run,
-        rows=tuple(row for row in run.rows if row.experiment_id in names),
+        texts=run.texts[run.texts["experiment_id"].isin(names)].reset_index(drop=True),
         frame=run.frame[run.frame["experiment_id"].isin(names)].reset_index(drop=True),
     )
 
 
+def names_of(run: ReportedRun, empty: str) -> set[str]:
+    """The experiments in which something did not happen."""
+    return {row["experiment_id"] for row in lines_of(run.texts) if not row[empty]}
+
+
 def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
     """No empty table, and no share of nothing."""
-    panel = answers_panel(part_of(run, {row.experiment_id for row in run.rows if not row.hazards}))
+    panel = answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
     assert "## What came without a warning\n\nNo hazard came." in panel.markdown
     assert "the worst" not in panel.markdown
@@ -254,7 +247,7 @@ def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
 
 def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None:
     """Nothing was dangerous, and nothing survived; no link leads to an empty list."""
-    idle = part_of(run, {row.experiment_id for row in run.rows if row.t_activation is None})
+    idle = part_of(run, names_of(run, "t_activation"))
     found = {answer.name: answer for answer in answers_of(idle)}
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."
     assert not any(answer.links for answer in found.values())

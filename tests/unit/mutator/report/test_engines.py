@@ -12,6 +12,7 @@ from mutator.campaigns.plans import Choices, make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes.results import build
 from mutator.report import building, engines, stamp
+from mutator.report.seen import timings_of
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -82,7 +83,7 @@ def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
 
 def summary(run: Path) -> engines.EngineSummary | None:
     folder = RunFolder.open(run)
-    return engines.engine_summary(folder, folder.records())
+    return engines.engine_summary(folder, folder.records(), timings_of(folder))
 
 
 def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:

@@ -1,0 +1,64 @@
+"""The page of a run with more experiments than it lists: the worst are there, the counts are of all."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from mutator.report import browse, building
+from mutator.report.panels import figures
+
+if TYPE_CHECKING:
+    from conftest import Page
+
+LISTED = 10
+
+
+@pytest.fixture
+def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The run of the other tests, of whose 24 experiments a page lists ten."""
+    shutil.copytree(run, tmp_path / "run")
+    monkeypatch.setattr(browse, "LISTED", LISTED)
+    monkeypatch.setattr(figures, "drawings", lambda frame: ())
+    building.write(tmp_path / "run", None)
+    return tmp_path / "run"
+
+
+def test_the_worst_are_listed_and_the_map_counts_all(
+    run: Path, large: Path, open_report: "Callable[[Path], Page]"
+) -> None:
+    """The page says how many it lists and how to see others; its list is the beginning of the whole one, its
+    map and tiles are the whole one's in every measure."""
+    whole, page = open_report(run), open_report(large)
+    assert page.found == "10 experiments listed, the worst of 24"
+    told = page.page.inner_text(".listed")
+    assert "the 10 worst of 24 experiments" in told and "mutator show ID --run run" in told
+    assert page.column("kind") == whole.column("kind")[:LISTED]
+    assert page.texts(".tiles b") == whole.texts(".tiles b")
+    measures = page.texts("#measure option")
+    assert measures == whole.texts("#measure option") and len(measures) > 5
+    for value in page.page.eval_on_selector_all("#measure option", "all => all.map((o) => o.value)"):
+        for one in (page, whole):
+            one.page.select_option("#measure", value)
+        assert page.texts("#heat th") == whole.texts("#heat th")
+        assert page.texts("#heat .cell") == whole.texts("#heat .cell")
+    page.open("q=zz")
+    assert page.found == "0 of 10 experiments listed, the worst of 24"
+
+
+def test_an_experiment_that_is_not_listed_is_told(
+    run: Path, large: Path, open_report: "Callable[[Path], Page]"
+) -> None:
+    """A link to an experiment that has no room says which command shows it."""
+    ids = open_report(run).page.evaluate(
+        "Packed.read('table').then((t) => t.columns.find((c) => c.name === 'experiment_id').texts)"
+    )
+    page = open_report(large)
+    listed = page.page.evaluate(
+        "Packed.read('table').then((t) => t.columns.find((c) => c.name === 'experiment_id').texts)"
+    )
+    other = next(name for name in ids if name not in listed)
+    page.open(f"e={other}")
+    assert f"Experiment {other} is not among the listed ones: mutator show {other} --run" in page.found
