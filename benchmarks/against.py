@@ -31,20 +31,21 @@ def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
     """Run a campaign with the version of `clone` and nothing kept; what each part of it takes."""
     python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
-        env = os.environ | {"XDG_CACHE_HOME": f"{place}/cache"}
+        # older versions keep pictures, detections and helpers in ~/.cache, whatever XDG_CACHE_HOME says
+        env = os.environ | {"HOME": place, "XDG_CACHE_HOME": f"{place}/.cache"}
         if clone != ROOT:
-            compile_helpers(python, clone, env, f"{place}/cache/mutator/targets/openpilot")
+            compile_helpers(python, clone, env)
         command = [python, "-m", "mutator", "run", campaign, "--out", f"{place}/run"]
         command += ["-n", str(workers), *more]
         return followed(command, clone, env)
 
 
-def compile_helpers(python: str, clone: Path, env: dict[str, str], cache: str) -> None:
-    """Compile what an older version compiles by a command."""
+def compile_helpers(python: str, clone: Path, env: dict[str, str]) -> None:
+    """Compile what an older version compiles by a command, into the cache that its runs look into."""
     command, env = [python, *HELPERS], env | {"PYTHONPATH": str(clone / "target")}
     said = subprocess.run([*command, "--help"], env=env, capture_output=True, text=True)
     if "--cache" in said.stdout:
-        subprocess.run([*command, "--cache", cache], env=env, check=True, stdout=sys.stderr)
+        subprocess.run(command, env=env, check=True, stdout=sys.stderr)
 
 
 def followed(command: list[str], folder: Path, env: dict[str, str]) -> Parts:

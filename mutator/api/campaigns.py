@@ -7,6 +7,7 @@ from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.plans import Choices
+from mutator.execution.distribution import distributor
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary
 from mutator.store.run_folder import RunFolder
@@ -25,6 +26,8 @@ def run(
     engine: str | None = None,
     reviewed: bool = False,
     accept_versions: bool = False,
+    cluster: str | None = None,
+    insecure_network: bool = False,
     progress: Notify | None = None,
     workspace: WorkspaceLike = None,
 ) -> Run:
@@ -34,7 +37,10 @@ def run(
     given are the frozen ones. `workers` is the number of processes (0: this one alone), `engine` a name of
     `mutator.engines.kinds` (None: the fastest that is worth it). With `reviewed` nothing runs that has no
     approval. With `accept_versions` a run goes on with another Python or other packages than before, which it
-    notes. `progress` is called about twice a second, from another thread.
+    notes. With `cluster` (the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file)
+    the workers of that cluster do the work, and `workers` only drive the checks before it. A scheduler that
+    others on the network can reach is refused, unless `insecure_network`. `progress` is called about twice a
+    second, from another thread.
 
     `Run.summary` says what this call came to. Harness errors, a full disk or an interruption end in an
     IncompleteRun warning; the same call then goes on. MutatorError for wrong input; CheckFailed when
@@ -53,6 +59,7 @@ def run(
         engine=engine,
         reviewed=reviewed,
         accept_versions=accept_versions,
+        distributor=distributor(cluster, insecure=insecure_network),
         notify=progress,
     )
     if summary.exit_code:

@@ -114,7 +114,17 @@ def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, acce
 
 def add_stretch(folder: RunFolder, stretch: Stretch) -> None:
     """Append a stretch of work to run.json of a folder that the caller owns."""
-    head = folder.head
-    stretches = [*head.get("stretches", ()), plain(stretch)]
-    digests.rewrite(folder.path, HEAD, json_bytes(head | {"stretches": stretches}))
-    head["stretches"] = stretches
+    _write_stretches(folder, [*folder.head.get("stretches", ()), plain(stretch)])
+
+
+def add_machine(folder: RunFolder, machine: Mapping[str, Any]) -> None:
+    """Add a machine to the last stretch of work in run.json of a folder that the caller owns."""
+    *before, last = folder.head["stretches"]
+    _write_stretches(
+        folder, [*before, last | {"machines": [*last.get("machines", ()), plain(dict(machine))]}]
+    )
+
+
+def _write_stretches(folder: RunFolder, stretches: list[dict[str, Any]]) -> None:
+    digests.rewrite(folder.path, HEAD, json_bytes(folder.head | {"stretches": stretches}))
+    folder.head["stretches"] = stretches

@@ -16,8 +16,10 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
     AcceptVersions,
+    Cluster,
     Engine,
     Exclude,
+    InsecureNetwork,
     Json,
     Limit,
     Only,
@@ -150,6 +152,7 @@ Examples:
   mutator run quickstart --out runs/first
   mutator run my_campaign.yaml --out runs/mine --limit 20
   mutator run quickstart --out runs/part1 --shard 1/3 -n 4
+  mutator run paper --out runs/paper --cluster tls://10.0.0.5:8786
   mutator run quickstart --out runs/s1 --only 'scenario == "S1" and method == "guided"'
 
 Interrupted or killed, the same command goes on where it stopped.
@@ -179,6 +182,8 @@ def run(
         typer.Option("--require-reviewed", help="Run nothing that `mutator review` has no approval of."),
     ] = False,
     accept_versions: AcceptVersions = False,
+    cluster: Cluster = None,
+    insecure_network: InsecureNetwork = False,
     stills: Annotated[
         bool,
         typer.Option(
@@ -209,6 +214,8 @@ def run(
                 engine=engine,
                 reviewed=reviewed,
                 accept_versions=accept_versions,
+                cluster=cluster,
+                insecure_network=insecure_network,
                 progress=notify,
                 workspace=workspace,
             )

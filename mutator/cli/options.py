@@ -87,6 +87,21 @@ AcceptVersions = Annotated[
     bool,
     typer.Option("--accept-versions", help="Other versions of Python or packages will do; they are noted."),
 ]
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WHERE",
+        help="Have the workers of a Dask cluster do the work: a scheduler's address (tls://HOST:PORT), its "
+        "scheduler file (FILE.json), local:N, or a cluster file (FILE.yaml).",
+    ),
+]
+InsecureNetwork = Annotated[
+    bool,
+    typer.Option(
+        "--insecure-network",
+        help="Use a scheduler that others on the network can reach: they can run code on its workers.",
+    ),
+]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 
 

@@ -46,7 +46,7 @@ def _live(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
                 total=progress.total or 1,  # a stage without a count has an empty bar
                 count=count(progress),
                 rate=rate(progress),
-                outcomes=endings(progress.outcomes) or progress.detail,
+                outcomes=", ".join(filter(None, (endings(progress.outcomes), progress.detail))),
                 remaining=remaining(progress),
             )
 

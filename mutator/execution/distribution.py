@@ -2,14 +2,36 @@
 
 from typing import Protocol
 
+from mutator.errors import MutatorError
+from mutator.execution.cluster.where import parse
+from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Session
 
 
 class Distributor(Protocol):
     """Deals out the pieces of a prepared session until none is left, or the session must stop.
 
-    Workers append records to the run folder themselves. What ends the session early goes to
-    `session.problem` and `session.interrupted`; nothing that finished is lost.
+    What finished is in the run folder by then: its workers appended it, or it did so itself. What ends the
+    session early goes to `session.problem` and `session.interrupted`; nothing that finished is lost.
     """
 
     def run(self, session: Session) -> None: ...
+
+
+def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
+    """The way to deal out work to a cluster, or without one to this machine; MutatorError for a cluster that
+    cannot be, or whose packages are not installed. Nothing is started or connected."""
+    if cluster is None:
+        if insecure:
+            raise MutatorError(
+                "no cluster", argument="insecure_network", remedy="leave it out: all stays on this machine"
+            )
+        return LocalWorkers()
+    where = parse(cluster)
+    try:
+        from mutator.execution.cluster.dask_workers import ClusterWorkers
+    except ModuleNotFoundError as err:
+        raise MutatorError(
+            f"no package {err.name}", argument="cluster", remedy="pip install 'mutator[cluster]'"
+        ) from None
+    return ClusterWorkers(where, insecure=insecure)

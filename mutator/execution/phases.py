@@ -36,7 +36,7 @@ class Lines:
             return
         self._stage, self._next_s = progress.stage, now + LINE_EVERY_S
         parts = [f"{title(progress)} {count(progress)}".rstrip()]
-        known = (rate(progress), endings(progress.outcomes), remaining(progress))
+        known = (rate(progress), endings(progress.outcomes), remaining(progress), progress.detail)
         self._write(", ".join([*parts, *(part for part in known if part)]))
 
 

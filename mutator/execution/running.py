@@ -6,6 +6,7 @@
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from mutator.campaigns.plans import Choices
@@ -68,7 +69,7 @@ def _followed(session: Session) -> Iterator[None]:
 
     def follow() -> None:
         while not stop.wait(_NOTIFY_S):
-            session.notify(next(stages))
+            session.notify(replace(next(stages), detail=session.working))
 
     thread = threading.Thread(target=follow, daemon=True)
     thread.start()

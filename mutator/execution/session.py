@@ -22,7 +22,7 @@ from mutator._common.locks import owned, wait_for_workers
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.plans import Choices
-from mutator.campaigns.provenance import begin_stretch, check_versions
+from mutator.campaigns.provenance import add_machine, begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base
 from mutator.engines.registry import choose_engine, not_worth_forking
@@ -96,17 +96,18 @@ class Session:
         self.workspace = workspace
         self.folder = folder
         self.workers = workers
-        self._accept_versions = accept_versions
+        self.accept_versions = accept_versions
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
-        self._manifest = workspace.manifest(folder.head["target"])
+        self.manifest = workspace.manifest(folder.head["target"])
         # of the whole plan, so that all shards of it, and the run of one machine, have a proof, or none has
         experiments = folder.head["experiments"]
-        self.engine = choose_engine(engine, self._manifest, experiments)
-        self._not_forked = "" if engine else not_worth_forking(self._manifest, experiments)
+        self.engine = choose_engine(engine, self.manifest, experiments)
+        self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
         self.problem = ""
         self.interrupted = False
+        self.working = ""  # who is at work, where that is told
         self._began = time.monotonic()
         self._done_before = 0
         self._records: Mapping[str, Record] | None = None
@@ -121,20 +122,24 @@ class Session:
             equivalence.begin(self.folder.path)
         self.proof = equivalence.left(self.folder)
         if left or self.proof or not are_there(self.folder):
-            check_requirements(self._manifest)
-            check_versions(self.folder, accept=self._accept_versions)
+            check_requirements(self.manifest)
+            check_versions(self.folder, accept=self.accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             for remark in unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
-            prepare_base(self._manifest, self.folder.base)
+            prepare_base(self.manifest, self.folder.base)
             begin_stretch(
                 self.folder,
                 self.workspace,
                 records=self.worker_name("*"),
-                accept=self._accept_versions,
+                accept=self.accept_versions,
             )
         self.pending = left
         self._records = None if left else records
+
+    def note_machine(self, machine: Mapping[str, Any]) -> None:
+        """Note in run.json, with the stretch of work, another machine that takes part in it."""
+        add_machine(self.folder, machine)
 
     def worker_name(self, name: str) -> str:
         """Name of a worker's files, used by no session before this one."""

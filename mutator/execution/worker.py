@@ -5,6 +5,7 @@ import socket
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
@@ -140,17 +141,7 @@ class Worker:
             self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
         if self._series is not None and finished.series is not None:
             self._series.append(finished.experiment.id, finished.series)
-        self._timings.append(
-            {
-                "experiment_id": finished.experiment.id,
-                "cpu_s": finished.cpu_s,
-                "wall_s": finished.wall_s,
-                "host": socket.gethostname(),
-                "worker": self._name,
-                "engine": finished.mode,
-                "why": finished.why,
-            }
-        )
+        self._timings.append(timing_of(finished, self._name))
         self._records.append(line_of(finished.record))
 
     def _sync_blocks(self) -> None:
@@ -161,6 +152,19 @@ class Worker:
 
     def _file(self, kind: str) -> Path:
         return self.folder.path / kind / f"{self._name}.jsonl"
+
+
+def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
+    """The line in `timings/` of an experiment that `worker` ran on this machine."""
+    return {
+        "experiment_id": finished.experiment.id,
+        "cpu_s": finished.cpu_s,
+        "wall_s": finished.wall_s,
+        "host": socket.gethostname(),
+        "worker": worker,
+        "engine": finished.mode,
+        "why": finished.why,
+    }
 
 
 def dying_python(parent: int) -> list[str]:

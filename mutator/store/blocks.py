@@ -55,18 +55,23 @@ class BlockWriter:
 
     def append(self, kind: int, key: str, data: bytes) -> None:
         """Append one block."""
-        block = as_block(kind, key, data)
+        self.extend(as_block(kind, key, data))
+        if self._unsynced >= _BATCH:
+            self.sync()
+
+    def extend(self, blocks: bytes) -> None:
+        """Append whole blocks that were made elsewhere; they are synced by time alone."""
         with raising_disk_full(self.path):
             try:
                 written = 0
-                while written < len(block):
-                    written += os.write(self._fd, block[written:])
+                while written < len(blocks):
+                    written += os.write(self._fd, blocks[written:])
             except OSError:
                 os.ftruncate(self._fd, self._end)
                 raise
-        self._end += len(block)
+        self._end += len(blocks)
         self._unsynced += 1
-        if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _BATCH_S:
+        if time.monotonic() - self._synced_at > _BATCH_S:
             self.sync()
 
     def sync(self) -> None:

@@ -47,7 +47,17 @@ class LineWriter:
 
     def append(self, value: Mapping[str, Any]) -> None:
         """Append one line; it is on the disk after the next `sync` at the latest."""
-        data = _line(self._last, canonical(value).encode()[1:])
+        self.extend([canonical(value).encode()])
+        if self._unsynced >= _BATCH:
+            self.sync()
+
+    def extend(self, values: Iterable[bytes]) -> None:
+        """Append lines, given as the canonical text of their values; they are synced by time alone."""
+        lines, last = [], self._last
+        for value in values:
+            lines.append(_line(last, value[1:]))
+            last = lines[-1][_SUM]
+        data = b"".join(lines)
         with raising_disk_full(self.path):
             try:
                 written = 0
@@ -57,9 +67,9 @@ class LineWriter:
                 os.ftruncate(self._fd, self._end)
                 raise
         self._end += len(data)
-        self._last = data[_SUM]
-        self._unsynced += 1
-        if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _BATCH_S:
+        self._last = last
+        self._unsynced += len(lines)
+        if time.monotonic() - self._synced_at > _BATCH_S:
             self.sync()
 
     def sync(self) -> None:

@@ -52,6 +52,12 @@ class PatchWriter:
         kind, content = self._packer.block(data)
         self._blocks.append(kind, experiment_id, content)
 
+    def extend(self, blocks: bytes) -> None:
+        """Append the blocks that `packed_patches` made elsewhere."""
+        if self._blocks is None:
+            self._blocks = BlockWriter(self._path)
+        self._blocks.extend(blocks)
+
     def sync(self) -> None:
         """Make sure that what was appended survives a power cut."""
         if self._blocks is not None:
@@ -142,8 +148,13 @@ class Patches:
 
 def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
     """Write a file of blocks anew, with these patches alone."""
+    write_atomic(path, packed_patches(patches))
+
+
+def packed_patches(patches: Iterable[tuple[str, bytes]]) -> bytes:
+    """The blocks of patches that need no others before them: a file, or a part of one."""
     packer, blocks = _Packer(), []
     for experiment_id, data in patches:
         kind, content = packer.block(data)
         blocks.append(as_block(kind, experiment_id, content))
-    write_atomic(path, b"".join(blocks))
+    return b"".join(blocks)

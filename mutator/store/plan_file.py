@@ -2,9 +2,10 @@
 
 import json
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property, lru_cache, partial
+from hashlib import sha256
 from itertools import accumulate, islice
 from operator import itemgetter
 from pathlib import Path
@@ -113,14 +114,30 @@ def read_faults(run: Path) -> dict[str, Fault]:
     return {fault.id: fault for fault in _read(path, _lines(path), fault_from)}
 
 
+def fault_lines(run: Path) -> dict[str, bytes]:
+    """The lines of the plan's faults by id, which is the digest of the line: the faults unread."""
+    lines = (line for _, line in _lines(run / FAULTS))
+    return {sha256(line).hexdigest()[:16]: line for line in lines}
+
+
+def lines_of(run: Path, names: Container[str]) -> Iterator[bytes]:
+    """The lines of these experiments, in the plan's order."""
+    path = run / EXPERIMENTS
+    return (line for name, (_, line) in zip(ids(run), _lines(path), strict=True) if name in names)
+
+
+def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
+    """The lines of one chunk."""
+    offset, length, _ = chunk
+    with (run / EXPERIMENTS).open("rb") as file:
+        file.seek(offset)
+        return file.read(length).splitlines()
+
+
 def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
     """The experiments of one chunk."""
-    offset, length, count = chunk
-    path = run / EXPERIMENTS
-    with path.open("rb") as file:
-        file.seek(offset)
-        data = file.read(length)
-    lines = ((None, line) for line in data.splitlines())
+    path, count = run / EXPERIMENTS, chunk[2]
+    lines = ((None, line) for line in chunk_lines(run, chunk))
     found = tuple(_read(path, lines, partial(experiment_from, faults=faults)))
     if len(found) != count:
         raise MutatorError(f"{len(found)} experiments in a chunk of {count}", where=path, remedy=_REMEDY)

@@ -27,7 +27,9 @@ _STRETCH = {
     "git": ({str: {"commit": str, "changed": bool}}, NoneType),
     "records": str,
     "accepted": [str],
+    "machines": [{"worker": str, "host": str, "python": str, "platform": str}],
 }
+_LATER = {"machines"}  # keys that older folders lack
 _SHAPES: dict[str, Any] = {
     "plan": str,
     "campaign": str,
@@ -104,5 +106,6 @@ def _fits(value: object, shape: Any) -> bool:
             return False
         if str in shape:
             return all(_fits(item, shape[str]) for item in value.values())
-        return all(key in value and _fits(value[key], wanted) for key, wanted in shape.items())
+        wanted = {key: shape[key] for key in shape if key in value or key not in _LATER}
+        return all(key in value and _fits(value[key], wanted[key]) for key in wanted)
     return isinstance(value, shape)

@@ -39,12 +39,18 @@ class SeriesWriter:
         self._known: set[str] = set()
 
     def append(self, experiment_id: str, one: EncodedSeries) -> None:
-        if self._blocks is None:
-            self._blocks = BlockWriter(self._path)
-        if one.key not in self._known:
-            self._blocks.append(GOLDEN, one.key, one.golden)
-            self._known.add(one.key)
-        self._blocks.append(EXPERIMENT, f"{experiment_id} {one.key}", one.faulty)
+        self.add_golden(one.key, lambda: one.golden)
+        self._writer().append(*series_block(experiment_id, one))
+
+    def add_golden(self, key: str, golden: Callable[[], bytes]) -> None:
+        """Append the series of a golden run, which `golden` makes, unless it is there."""
+        if key not in self._known:
+            self._writer().append(GOLDEN, key, golden())
+            self._known.add(key)
+
+    def extend(self, blocks: bytes) -> None:
+        """Append blocks of `series_block` that were made elsewhere; their golden runs were added."""
+        self._writer().extend(blocks)
 
     def sync(self) -> None:
         """Make sure that what was appended survives a power cut."""
@@ -54,6 +60,16 @@ class SeriesWriter:
     def close(self) -> None:
         if self._blocks is not None:
             self._blocks.close()
+
+    def _writer(self) -> BlockWriter:
+        if self._blocks is None:
+            self._blocks = BlockWriter(self._path)
+        return self._blocks
+
+
+def series_block(experiment_id: str, one: EncodedSeries) -> tuple[int, str, bytes]:
+    """Kind, key and content of the block of an experiment's series."""
+    return EXPERIMENT, f"{experiment_id} {one.key}", one.faulty
 
 
 Read = Callable[[], bytes]

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from mutator._common.hashing import added
 from mutator.errors import MutatorError
 
 
@@ -25,6 +26,8 @@ class Stretch:
     git: Mapping[str, Mapping[str, Any]] | None = None
     records: str = "*"  # names of its files in records/, timings/ and proof/, without suffix, as a glob
     accepted: Sequence[str] = ()  # how Python and packages differ from those of the stretch before
+    # workers on other machines: `worker`, `host`, `mutator`, `python`, `platform`, `cpu`, `blas`, `packages`
+    machines: Sequence[Mapping[str, Any]] = added(())
 
     def __str__(self) -> str:
         """`CPython 3.11.7, Linux-6.1-x86_64, Intel(R) Xeon(R) Gold 6226R`."""

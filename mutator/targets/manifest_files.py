@@ -115,8 +115,8 @@ def upgrade_manifest(path: Path) -> Upgrade | None:
     return upgraded_text(source)
 
 
-def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
-    """Read `fault_library/targets/<name>.yaml`; `root` overrides the one it names."""
+def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
+    """Read `fault_library/targets/<name>.yaml`; `root` and `overlay` override those that it names."""
     model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
     requires = read_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
@@ -148,7 +148,7 @@ def load_manifest(path: Path, root: Path | None = None) -> TargetManifest:
         root=folder,
         packages=packages,
         files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**" for p in packages)),
-        overlay=find_overlay(model.overlay, source),
+        overlay=overlay or find_overlay(model.overlay, source),
         forbid=tuple(model.forbid),
         env=model.env,
         requires=requires,

@@ -1,5 +1,8 @@
-"""Runs on many machines, by Dask: where the cluster is, what its workers are sent, how work is dealt out.
+"""Campaigns on many machines, which share nothing but the network.
 
-Needs the extra `cluster`, and imports Dask only once a cluster is to be used. Nothing here decides what an
-experiment's result is, and nothing but the command writes the run folder.
+The command deals out pieces of work (`board`), each with the lines of the plan that it needs, and writes what
+comes back into the run folder (`intake`). A worker has the target and the golden runs from a bundle
+(`bundle`), and runs its pieces in a process of their own (`child`), which its `host` watches over. All of
+these know nothing of what carries the bytes: that is `dask_workers`, and `dask_side` on the workers, who need
+the extra `cluster`; `where` says which cluster it is.
 """

@@ -1,0 +1,166 @@
+"""The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD SITE NAME`.
+
+It talks to its host over the connection FD: pieces come in; the ids of experiments as they finish, and at the
+end the result, go out. It is another process than the host, so that no run can take down the worker.
+"""
+
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from mutator._common.files import DiskFull
+from mutator._common.hashing import canonical
+from mutator._common.shortages import Shortage, shortage
+from mutator.engines.jobs import FAST, Job, Setting
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.registry import make_engine
+from mutator.errors import MutatorError
+from mutator.execution.cluster.bundle import Site
+from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
+from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.execution.worker import timing_of
+from mutator.store.blocks import as_block
+from mutator.store.patches import packed_patches
+from mutator.store.records import line_of
+from mutator.store.run_folder import golden_key
+from mutator.store.series_packing import series_block
+from mutator.targets.requirements import check_requirements
+from mutator.verification.preflight_rules import look
+
+
+class Unlike(Exception):
+    """A golden run came out otherwise than the campaign's."""
+
+
+class PieceRunner:
+    """Runs pieces on the site of a bundle, and makes of each what travels back."""
+
+    def __init__(self, site: Site, name: str, parent: int) -> None:
+        self._site, self._name, self._parent = site, name, parent
+        check_requirements(site.manifest)
+        self._work = site.place / f"work-{os.getpid()}"
+        self._work.mkdir()
+        self._base = prepare_base(site.manifest, self._work / "base")
+        self._alike: set[str] = set()
+        self._runners: dict[Kind, Runner] = {}
+
+    def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
+        """Run a piece; `tell` is called with each experiment that is finished. Unlike where this machine
+        drives another golden run."""
+        began = time.monotonic()
+        if piece.golden not in self._alike:
+            self._drive_golden(piece.golden)
+        runner = self._runner(piece.kind)
+        finished: list[Finished] = []
+        for one in runner.run(piece.experiments()):
+            finished.append(one)
+            tell(one.experiment.id)
+        made = _made(finished, self._name, proof=piece.kind is Kind.PROVE)
+        return replace(made, number=piece.number, seconds=time.monotonic() - began)
+
+    def close(self) -> None:
+        """End what engines keep running."""
+        for runner in self._runners.values():
+            runner.engine.close()
+
+    def _runner(self, kind: Kind) -> Runner:
+        if kind not in self._runners:
+            site = self._site
+            if kind is Kind.PROVE:
+                engine = ReferenceEngine(
+                    site.manifest, self._base, self._work, site.limits, self._parent, independent=True
+                )
+            else:
+                setting = Setting(
+                    manifest=site.manifest,
+                    models=site.models,
+                    base=self._base,
+                    work=self._work,
+                    limits=site.limits,
+                    parent=self._parent,
+                )
+                engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
+            goldens = Goldens(site.manifest, site.golden)
+            with_series = kind is Kind.RUN and site.meta["series"]
+            self._runners[kind] = Runner(
+                site.manifest, site.models, engine, goldens, site.scenario, with_series=with_series
+            )
+        return self._runners[kind]
+
+    def _drive_golden(self, key: str) -> None:
+        """Drive a golden run; Unlike when it is not the campaign's to the byte."""
+        site = self._site
+        scenario, changes, known = next(
+            one for one in site.meta["goldens"] if golden_key(one[0], one[1]) == key
+        )
+        engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
+        job = Job(
+            name=f"golden-{len(self._alike)}",
+            scenario=site.scenario(scenario),
+            seed=site.meta["seed"],
+            changes=tuple(changes),
+        )
+        for _, execution in engine.run([job]):
+            found = look(site.manifest, execution)
+            if found.problem or found.digest != known:
+                came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
+                raise Unlike(f"golden run {key} {came}")
+        self._alike.add(key)
+
+
+def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
+    """What the run folder is to have of experiments."""
+    records = tuple(canonical(line_of(one.record)).encode() for one in finished)
+    if proof:
+        return Result(number=0, ending=Ending.DONE, records=records)
+    patches = [(one.experiment.id, one.mutant.patch_bytes) for one in finished if one.mutant is not None]
+    series = [(one.experiment.id, one.series) for one in finished if one.series is not None]
+    return Result(
+        number=0,
+        ending=Ending.DONE,
+        forked=any(one.mode in FAST for one in finished),
+        records=records,
+        timings=tuple(canonical(timing_of(one, name)).encode() for one in finished),
+        patches=packed_patches(patches),
+        series=b"".join(as_block(*series_block(experiment, one)) for experiment, one in series),
+        series_of=tuple(sorted({one.key for _, one in series})),
+    )
+
+
+def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> Result:
+    """What comes of a piece, however it ends."""
+    try:
+        return runner.run(piece, tell)
+    except Unlike as err:
+        return Result(number=piece.number, ending=Ending.UNLIKE, text=str(err))
+    except Exception as err:
+        known = err if isinstance(err, MutatorError) else shortage(err)
+        short = isinstance(known, DiskFull | Shortage)
+        text = str(known) if known else "".join(traceback.format_exception(err)).rstrip()
+        return Result(number=piece.number, ending=Ending.SHORT if short else Ending.FAILED, text=text)
+
+
+def main() -> int:
+    """Run pieces until the host closes the connection."""
+    connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host's to answer
+    runner = PieceRunner(site, name, os.getppid())
+    try:
+        with suppress(EOFError):
+            while True:
+                piece = Piece.of(connection.recv_bytes())
+                connection.send(_result(runner, piece, connection.send).packed())
+    finally:
+        runner.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

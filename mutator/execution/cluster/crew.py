@@ -1,0 +1,92 @@
+"""The workers of a run: who was let in, who was not and why, how fast each is."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mutator._common.text import counted
+from mutator._common.version import VERSION
+from mutator.store.stretches import Stretch, differences
+
+_RECENT = 20  # pieces that a worker's rate is taken of
+
+
+@dataclass
+class _Member:
+    """A worker that was let in: its machine, and when it finished how many experiments."""
+
+    host: str
+    finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
+
+
+class Crew:
+    """Everybody who was there. `stretch` is the one that the run is in, `now` a clock, in seconds."""
+
+    def __init__(self, stretch: Stretch, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:
+        self._stretch, self._accept, self._now = stretch, accept, now
+        self._present: dict[str, _Member] = {}
+        self.refused: dict[str, str] = {}
+
+    @property
+    def packages(self) -> list[str]:
+        """The packages whose versions must be those of the stretch."""
+        return sorted(self._stretch.packages)
+
+    def let_in(self, name: str, facts: Mapping[str, Any]) -> None:
+        """A worker takes part; `facts` as of `dask_side.facts`."""
+        self._present[name] = _Member(str(facts["host"]))
+
+    def leave(self, name: str) -> None:
+        """A worker takes no part any more."""
+        self._present.pop(name, None)
+
+    def refuse(self, name: str, why: str) -> None:
+        """A worker may not take part."""
+        self.refused[name] = why
+
+    def objection(self, facts: Mapping[str, Any]) -> str:
+        """Why a worker may not take part: what would keep its machine from resuming the run; empty if it
+        may."""
+        if facts["mutator"] != VERSION:
+            return f"mutator {facts['mutator']}, here {VERSION}"
+        found = differences(self._stretch, facts["python"], facts["packages"])
+        return "" if self._accept else "; ".join(text.replace(", here", ", there") for text in found)
+
+    def finished(self, name: str, count: int) -> None:
+        """A worker has finished so many experiments."""
+        if name in self._present:
+            self._present[name].finished.append((self._now(), count))
+
+    def told(self) -> str:
+        """`3 workers on alpha 2.4 a second, beta 0.9 a second`."""
+        hosts: dict[str, list[float | None]] = {}
+        for member in self._present.values():
+            hosts.setdefault(member.host, []).append(self._per_s(member))
+        text = counted(len(self._present), "worker")
+        if hosts:
+            text += f" on {', '.join(_told(host, rates) for host, rates in sorted(hosts.items()))}"
+        return f"{text}; {len(self.refused)} refused" if self.refused else text
+
+    def _per_s(self, member: _Member) -> float | None:
+        """Experiments a second that a worker has done lately; None before that is known."""
+        if len(member.finished) < 2:
+            return None
+        (began, first), *_ = member.finished
+        elapsed = self._now() - began
+        return (sum(count for _, count in member.finished) - first) / elapsed if elapsed > 0 else None
+
+
+def describe(name: str, facts: Mapping[str, Any]) -> str:
+    """A worker, for people: its name and, as far as they are known, its machine, processor and versions."""
+    if not facts:
+        return name
+    parts = (facts["host"], facts["cpu"] or facts["platform"], facts["python"], f"mutator {facts['mutator']}")
+    blas = (f"{one['library']} {one['version']} ({one['kernel']})" for one in facts["blas"])
+    return f"{name} ({', '.join((*parts, *blas))})"
+
+
+def _told(host: str, rates: Iterable[float | None]) -> str:
+    known = [rate for rate in rates if rate is not None]
+    return f"{host} {sum(known):.1f} a second" if known else host

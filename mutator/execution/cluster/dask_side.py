@@ -1,0 +1,91 @@
+"""What a Dask worker is asked to do: functions that the command submits by reference.
+
+A worker takes part in a run by a task that lasts as long as the run does, without a place in the pool of
+threads (`attend`); its end, whatever ends it, is the end of all that the run has on the worker. Each piece is
+a task of its own.
+"""
+
+import platform
+import socket
+import threading
+import time
+from collections.abc import Iterable
+from hashlib import sha256
+from typing import Any
+
+from distributed import Worker, get_worker, secede
+from distributed.core import Status
+
+from mutator._common.version import VERSION
+from mutator.campaigns import machine
+from mutator.errors import MutatorError
+from mutator.execution.cluster.host import Host, Wanted
+
+_PATIENCE_S = 60.0  # for the run to be there when its first piece comes
+
+_hosts: dict[str, Host] = {}  # what this process has, by run
+_arrived = threading.Condition()
+
+
+def facts(packages: Iterable[str]) -> dict[str, Any]:
+    """What this worker computes with: as a stretch of work notes it, with versions of these packages."""
+    return {
+        "mutator": VERSION,
+        "host": socket.gethostname(),
+        "python": machine.python(),
+        "platform": platform.platform(),
+        "cpu": machine.cpu(),
+        "blas": list(machine.blas()),
+        "packages": machine.versions(packages),
+    }
+
+
+def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
+    """Lay out the bundle of a run; MutatorError for one that is damaged."""
+    if sha256(bundle).hexdigest() != digest:
+        raise MutatorError("another bundle arrived than was sent", remedy="check the network")
+    host = Host.lay_out(bundle, get_worker().local_directory, name)
+    with _arrived:
+        _hosts[run] = host
+        _arrived.notify_all()
+
+
+def attend(run: str) -> None:
+    """Take part in a run until the command releases this task, or is gone."""
+    host, wanted = _hosts[run], _wanted()
+    secede()
+    try:
+        host.attend(wanted)
+    finally:
+        with _arrived:
+            _hosts.pop(run, None)
+
+
+def leave(run: str) -> None:
+    """Have no part in a run any more; all that it had here is gone by then."""
+    if (host := _hosts.get(run)) is not None:
+        host.end()
+
+
+def work(run: str, piece: bytes) -> bytes:
+    """Run a piece; what came of it."""
+    deadline = time.monotonic() + _PATIENCE_S
+    with _arrived:
+        while run not in _hosts:
+            if not _arrived.wait(deadline - time.monotonic()):
+                raise MutatorError("the bundle of the run did not arrive", remedy="check the network")
+        host = _hosts[run]
+    return host.run(piece, _wanted()).packed()
+
+
+def _wanted() -> Wanted:
+    """Whether the task of this thread is still wanted: nobody released it, and the worker does not close."""
+    worker: Worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:
+        task = worker.state.tasks.get(key)
+        alive = worker.status in (Status.running, Status.paused)
+        return alive and task is not None and task.state in ("executing", "long-running")
+
+    return is_wanted

@@ -1,0 +1,186 @@
+"""A worker's side of a run: its bundle on the disk, and the processes that run its pieces.
+
+A host is attended by one thread from its beginning to its end. That thread starts the processes, and the
+kernel kills them when it ends, however it ends; then the host's folder goes. Other threads hand it pieces.
+"""
+
+import os
+import queue
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from mutator._common.files import is_disk_full, raising_disk_full, remove_folder
+from mutator.execution.cluster import bundle
+from mutator.execution.cluster.bundle import Site
+from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.worker import dying_python
+
+_LOOK_S = 0.25  # how often it is looked whether the work is still wanted
+_END_S = 5.0
+_START_S = 60.0  # for a process to begin with its first piece
+_CHILD = "mutator.execution.cluster.child"
+
+Wanted = Callable[[], bool]
+
+
+class NotWanted(Exception):
+    """Nobody waits for this piece any more."""
+
+
+@dataclass
+class _Child:
+    """A process that runs pieces, one after the other."""
+
+    process: subprocess.Popen[bytes]
+    connection: Connection
+
+    def run(self, data: bytes, piece: Piece, patience_s: float, wanted: Wanted) -> Result:
+        """Have it run a piece. NotWanted as soon as nobody waits for it; the process is then of no use."""
+        finished: set[str] = set()
+        try:
+            self.connection.send_bytes(data)
+            since = time.monotonic()
+            while time.monotonic() - since < patience_s:
+                if not wanted():
+                    raise NotWanted
+                if self.connection.poll(_LOOK_S):
+                    said = self.connection.recv()
+                    if isinstance(said, bytes):
+                        return Result.of(said)
+                    finished.add(said)
+                    since = time.monotonic()
+            text = f"a worker's process gave no sign of life for {patience_s:.0f} s"
+        except (EOFError, OSError):
+            text = f"a worker's process {self._end()}"
+        at = next((name for name in piece.ids if name not in finished), "")
+        return Result(number=piece.number, ending=Ending.DIED, text=text, at=at)
+
+    def end(self) -> None:
+        """Kill it; what it started dies with it."""
+        self.connection.close()
+        self.process.kill()
+        self.process.wait()
+
+    def _end(self) -> str:
+        with suppress(subprocess.TimeoutExpired):
+            code = self.process.wait(5.0)
+            return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"left with status {code}"
+        return "closed its connection"
+
+
+@dataclass
+class Host:
+    """What a worker has of one run. `name` is the worker's, in the timings of its experiments."""
+
+    folder: Path
+    name: str
+    patience_s: float
+    _idle: list[_Child] = field(default_factory=list)
+    _orders: "queue.Queue[queue.Queue[_Child | Exception]]" = field(default_factory=queue.Queue)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _ended: bool = False  # nothing is lent any more
+    _leaving: bool = False
+    _gone: threading.Event = field(default_factory=threading.Event)
+
+    @classmethod
+    def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
+        """A host for the bundle `data` in a new folder of `place`; MutatorError for a damaged bundle."""
+        with raising_disk_full(Path(place)):
+            Path(place).mkdir(parents=True, exist_ok=True)
+            folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()
+        try:
+            bundle.lay_out(data, folder)
+            patience_s = 2.0 * Site(folder).limits.wall_s + _START_S
+        except BaseException:
+            remove_folder(folder)
+            raise
+        return cls(folder, name, patience_s)
+
+    def attend(self, wanted: Wanted) -> None:
+        """Start processes as they are asked for, until the host is not wanted any more; then end all."""
+        try:
+            while wanted() and not self._leaving:
+                with suppress(queue.Empty):
+                    answer = self._orders.get(timeout=_LOOK_S)
+                    try:
+                        answer.put(self._started())
+                    except Exception as err:
+                        answer.put(err)
+        finally:
+            with self._lock:
+                self._ended = True
+                idle, self._idle = self._idle, []
+            for child in idle:
+                child.end()
+            shutil.rmtree(self.folder, ignore_errors=True)
+            remove_folder(self.folder)
+            self._gone.set()
+
+    def end(self) -> None:
+        """Have the attending thread end, and wait until all is gone."""
+        self._leaving = True
+        self._gone.wait(_END_S)
+
+    def run(self, data: bytes, wanted: Wanted) -> Result:
+        """Run a piece. NotWanted when nobody waits for it any more; MutatorError for a damaged one."""
+        piece = Piece.of(data)
+        try:
+            child = self._borrowed(wanted)
+        except OSError as err:
+            ending = Ending.SHORT if is_disk_full(err) else Ending.FAILED
+            return Result(number=piece.number, ending=ending, text=str(err))
+        keep = False
+        try:
+            result = child.run(data, piece, self.patience_s, wanted)
+            keep = result.ending in (Ending.DONE, Ending.UNLIKE)
+            return result
+        finally:
+            with self._lock:
+                keep = keep and not self._ended
+                if keep:
+                    self._idle.append(child)
+            if not keep:
+                child.end()
+
+    def _borrowed(self, wanted: Wanted) -> _Child:
+        """A process that has nothing to do, or a new one."""
+        with self._lock:
+            if self._idle:
+                return self._idle.pop()
+        answer: queue.Queue[_Child | Exception] = queue.Queue()
+        self._orders.put(answer)
+        while wanted():
+            with suppress(queue.Empty):
+                got = answer.get(timeout=_LOOK_S)
+                if isinstance(got, Exception):
+                    raise got
+                return got
+        raise NotWanted
+
+    def _started(self) -> _Child:
+        """A new process, which dies with this thread."""
+        ours, its = socket.socketpair()
+        try:
+            words = ["-m", _CHILD, str(its.fileno()), str(self.folder), self.name]
+            process = subprocess.Popen(
+                [*dying_python(os.getpid()), *words],
+                pass_fds=[its.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,  # a signal to the worker's terminal is the worker's to answer
+            )
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            its.close()
+        return _Child(process, Connection(ours.detach()))

@@ -1,0 +1,101 @@
+"""What comes back from workers, on its way into the run folder."""
+
+import json
+from typing import Any
+
+from mutator._common.hashing import canonical
+from mutator.errors import MutatorError
+from mutator.execution.cluster.pieces import Kind, Piece, Result
+from mutator.model import Record, Status
+from mutator.outcomes.judging import load_channels
+from mutator.outcomes.sampling import Sampler
+from mutator.store.lines import LineWriter
+from mutator.store.patches import PatchWriter
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
+from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.series_packing import SeriesWriter
+from mutator.targets.manifest import TargetManifest
+from mutator.verification import equivalence
+
+
+class Intake:
+    """Appends results to the run folder, as a worker of this machine would. `name` makes its files its own.
+
+    Results are believed: who may not be had no work.
+    """
+
+    def __init__(self, folder: RunFolder, manifest: TargetManifest, name: str) -> None:
+        self._folder, self._manifest, self._name = folder, manifest, name
+        plan = folder.head["plan"]
+        self._head = {"schema": SCHEMA, "plan": plan}
+        self._patches = PatchWriter(folder.path, name)
+        self._series = SeriesWriter(folder.path, name) if folder.series_mb else None
+        self._records = LineWriter(self._file("records"), self._head, self._sync_blocks)
+        self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
+        self._proofs: LineWriter | None = None
+
+    def take(self, piece: Piece, result: Result) -> None:
+        """Append what came of a piece. MutatorError where it is of other experiments."""
+        names = [json.loads(line)["experiment_id"] for line in result.records]
+        if sorted(names) != sorted(piece.lines):
+            raise MutatorError(
+                f"a worker sent {len(names)} records for a piece of {len(piece.lines)} experiments",
+                where=self._folder.path,
+                expected="one record of each",
+                remedy="this is a defect of the harness; please report it",
+            )
+        if piece.kind is Kind.PROVE:
+            self._proof_writer().extend(result.records)
+            return
+        if result.patches:
+            self._patches.extend(result.patches)
+        if self._series is not None and result.series:
+            for key in result.series_of:
+                self._series.add_golden(key, lambda key=key: self._golden_series(key))  # type: ignore[misc]
+            self._series.extend(result.series)
+        self._timings.extend(result.timings)
+        self._records.extend(result.records)
+
+    def give_up(self, piece: Piece, why: str) -> None:
+        """Note that the one experiment of a piece has no result, and why."""
+        writer = self._records if piece.kind is Kind.RUN else self._proof_writer()
+        for name in piece.lines:
+            record = Record(
+                experiment_id=name,
+                status=Status.HARNESS_ERROR,
+                outcome=None,
+                detail=why,
+                tree="",
+                activation=None,
+                t_manifest=None,
+                max_dev=(),
+                hazards=(),
+                alerts=(),
+                trace_digest="",
+            )
+            writer.extend([canonical(line_of(record)).encode()])
+
+    def close(self) -> None:
+        """Sync and close the files."""
+        for writer in (self._patches, self._series, self._records, self._timings, self._proofs):
+            if writer is not None:
+                writer.close()
+
+    def _golden_series(self, key: str) -> bytes:
+        scenario, changes = next(one for one in self._folder.head["goldens"] if golden_key(*one) == key)
+        trace = load_channels(self._manifest, self._folder.golden(scenario, tuple(changes)))
+        return Sampler(self._manifest, trace).encoded
+
+    def _proof_writer(self) -> LineWriter:
+        if self._proofs is None:
+            self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)
+        return self._proofs
+
+    def _sync_blocks(self) -> None:
+        """Before records: a record that survives a power cut names a patch that does."""
+        self._patches.sync()
+        if self._series is not None:
+            self._series.sync()
+
+    def _file(self, kind: str) -> Any:
+        return self._folder.path / kind / f"{self._name}.jsonl"

@@ -1,0 +1,34 @@
+"""Parcels: named bytes as one piece of bytes, which is verified when it is opened."""
+
+import json
+from collections.abc import Mapping
+from hashlib import sha256
+
+from mutator.errors import MutatorError
+
+_MARK, _DIGEST, _LENGTH = b"FIP1", 32, 4
+
+
+def pack(parts: Mapping[str, bytes]) -> bytes:
+    """The parcel of these parts: the same bytes for the same parts in the same order."""
+    head = json.dumps([[name, len(data)] for name, data in parts.items()]).encode()
+    body = b"".join((len(head).to_bytes(_LENGTH, "little"), head, *parts.values()))
+    return b"".join((_MARK, sha256(body).digest(), body))
+
+
+def unpack(data: bytes) -> dict[str, bytes]:
+    """The parts of a parcel; MutatorError for one that is not as it was packed."""
+    begin = len(_MARK) + _DIGEST
+    view = memoryview(data)
+    if data[: len(_MARK)] != _MARK or sha256(view[begin:]).digest() != data[len(_MARK) : begin]:
+        raise MutatorError(
+            f"a damaged parcel of {len(data)} bytes",
+            expected="the bytes that were sent",
+            remedy="check the network; the same command goes on",
+        )
+    end = begin + _LENGTH + int.from_bytes(data[begin : begin + _LENGTH], "little")
+    parts = {}
+    for name, length in json.loads(data[begin + _LENGTH : end]):
+        parts[name] = bytes(view[end : end + length])
+        end += length
+    return parts
