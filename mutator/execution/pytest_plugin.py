@@ -32,6 +32,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="go on with another Python or other packages than the run folder was driven with",
     )
+    group.addoption(
+        "--campaign-cluster",
+        metavar="WHERE",
+        help="have the workers of a Dask cluster do the work, as `mutator run --cluster`",
+    )
+    group.addoption(
+        "--insecure-network",
+        action="store_true",
+        help="use a scheduler that others on the network can reach",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -39,13 +49,23 @@ def pytest_configure(config: pytest.Config) -> None:
     if campaign is None:
         if out is not None:
             raise pytest.UsageError("--campaign-out without --campaign")
-        for option in ("require_reviewed", "accept_versions"):
+        for option in ("require_reviewed", "accept_versions", "campaign_cluster", "insecure_network"):
             if config.getoption(option):
                 raise pytest.UsageError(f"--{option.replace('_', '-')} without --campaign")
         return
     if out is None:
         raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
+    from mutator.errors import MutatorError
+    from mutator.execution.distribution import distributor
     from mutator.execution.pytest_session import configure
+
+    cluster = config.getoption("campaign_cluster")
+    if cluster and getattr(config.option, "numprocesses", None):
+        raise pytest.UsageError("--campaign-cluster with -n: its workers are those of the cluster")
+    try:
+        deals = distributor(cluster, insecure=config.getoption("insecure_network")) if cluster else None
+    except MutatorError as err:
+        raise pytest.UsageError(str(err)) from None
 
     configure(
         config,
@@ -53,4 +73,5 @@ def pytest_configure(config: pytest.Config) -> None:
         out,
         reviewed=config.getoption("require_reviewed"),
         accept_versions=config.getoption("accept_versions"),
+        distributor=deals,
     )

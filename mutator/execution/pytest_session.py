@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import pytest
 
@@ -18,6 +18,7 @@ from mutator._common.shortages import Shortage, shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
+from mutator.execution.following import followed
 from mutator.execution.phases import Lines
 from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
@@ -26,6 +27,12 @@ from mutator.workspace import Workspace
 
 _INPUT = "mutator_campaign"
 _PROBLEM = "mutator_problem"
+
+
+class Deals(Protocol):
+    """What deals out the work of a session (`mutator.execution.distribution`)."""
+
+    def run(self, session: Session) -> None: ...
 
 
 class HarnessErrors(Exception):
@@ -65,6 +72,30 @@ class WorkItem(pytest.Item):
         return self.config.rootpath, None, self.name
 
 
+class DealItem(pytest.Item):
+    """All of a session's work, which a cluster does."""
+
+    def __init__(self, *, begun: Session, distributor: Deals, **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self._begun, self._distributor = begun, distributor
+
+    def runtest(self) -> None:
+        with followed(self._begun):
+            self._distributor.run(self._begun)
+        if self._begun.interrupted:
+            raise KeyboardInterrupt
+        if self._begun.problem:
+            raise HarnessErrors(self._begun.problem)
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, HarnessErrors | MutatorError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        return self.config.rootpath, None, self.name
+
+
 def _defect(err: Exception, chunk: str) -> str:
     lines = "".join(traceback.format_exception(err))
     return (
@@ -92,10 +123,16 @@ class LazyWorker:
 
 
 def configure(
-    config: pytest.Config, campaign: str, out: Path, *, reviewed: bool, accept_versions: bool
+    config: pytest.Config,
+    campaign: str,
+    out: Path,
+    *,
+    reviewed: bool,
+    accept_versions: bool,
+    distributor: "Deals | None" = None,
 ) -> None:
     """Put the plugin of this process's role in place. Whatever the user's configuration says of files, each
-    worker takes the next piece of work."""
+    worker takes the next piece of work. With a `distributor` no work is dealt out by pytest."""
     if getattr(config.option, "dist", "no") != "no":
         config.option.dist = "load"
     given = getattr(config, "workerinput", {}).get(_INPUT)
@@ -103,7 +140,9 @@ def configure(
         config.pluginmanager.register(WorkerSide(config, given, config.workerinput["workerid"]))  # type: ignore[attr-defined]
     elif not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
         config.pluginmanager.register(
-            PlainController(campaign, out, reviewed=reviewed, accept_versions=accept_versions)
+            PlainController(
+                campaign, out, reviewed=reviewed, accept_versions=accept_versions, distributor=distributor
+            )
         )
 
 
@@ -218,8 +257,17 @@ class Controller:
 class PlainController(Controller):
     """As Controller, for pytest called directly: also plans, checks, and tells the end."""
 
-    def __init__(self, campaign: str, out: Path, *, reviewed: bool, accept_versions: bool) -> None:
+    def __init__(
+        self,
+        campaign: str,
+        out: Path,
+        *,
+        reviewed: bool,
+        accept_versions: bool,
+        distributor: "Deals | None" = None,
+    ) -> None:
         super().__init__()
+        self._distributor = distributor
         self._campaign = campaign
         self._reviewed = reviewed
         self._accept_versions = accept_versions
@@ -248,6 +296,23 @@ class PlainController(Controller):
             self.begun = None
             print(err, file=sys.stderr)  # pytest tells the reason of an exit twice
             pytest.exit("no campaign was run", returncode=err.exit_code)
+
+    def pytest_collection(self, session: pytest.Session) -> bool | None:
+        if self._distributor is None or self.begun is None:
+            return super().pytest_collection(session)
+        session.items = []
+        if self.begun.pending or self.begun.proof:
+            item = DealItem.from_parent(
+                session,
+                name="cluster",
+                nodeid="campaign::cluster",
+                begun=self.begun,
+                distributor=self._distributor,
+            )
+            session.items.append(item)
+        session.testscollected = len(session.items)
+        session.config.hook.pytest_collection_finish(session=session)
+        return True
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:

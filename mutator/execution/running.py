@@ -3,22 +3,16 @@
 `mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` share all of it but who starts pytest.
 """
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from mutator.campaigns.plans import Choices
 from mutator.execution.distribution import Distributor
+from mutator.execution.following import followed
 from mutator.execution.local import LocalWorkers
-from mutator.execution.session import Notify, Session, Summary, open_session
-from mutator.store.progress import Progress, Tail
-from mutator.verification import equivalence
+from mutator.execution.session import Notify, Summary, open_session
 from mutator.workspace import Workspace
 
 LOCAL = LocalWorkers()
-_NOTIFY_S = 0.5
 
 
 def run_campaign(
@@ -56,40 +50,6 @@ def run_campaign(
     ) as session:
         session.prepare()
         if session.pending or session.proof:
-            with _followed(session):
+            with followed(session):
                 distributor.run(session)
         return session.finish()
-
-
-@contextmanager
-def _followed(session: Session) -> Iterator[None]:
-    """Report progress while the session runs."""
-    stages = _stages(session)
-    stop = threading.Event()
-
-    def follow() -> None:
-        while not stop.wait(_NOTIFY_S):
-            session.notify(replace(next(stages), detail=session.working))
-
-    thread = threading.Thread(target=follow, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()
-        session.notify(next(stages))
-
-
-def _stages(session: Session) -> Iterator[Progress]:
-    """Where the run is now, each time one asks: the experiments, and when all have a record, the proof."""
-    folder = session.folder
-    experiments = Tail("experiments", folder.path / "records", folder.planned)
-    while (progress := experiments.poll()).done < progress.total:
-        yield progress
-    yield progress
-    proof = Tail("proof", folder.path / equivalence.FOLDER, len(equivalence.sampled(folder)))
-    while session.proof:
-        yield proof.poll()
-    while True:
-        yield experiments.poll()

@@ -119,13 +119,14 @@ class _Deal:
         self._tended: dict[str, _Tended] = {}
         self._changed = asyncio.Event()  # somebody who found nothing to do may find something now
         self._writing = asyncio.Lock()
+        self._writes: set[asyncio.Task[None]] = set()
         self._forked = False
         self._alone_since = time.monotonic()
 
     async def run(self) -> None:
         """Until all is done, or nobody is left to do it."""
         try:
-            while not self._board.is_empty and not self._session.problem:
+            while not (self._board.is_empty and not self._writes) and not self._session.problem:
                 await self._meet()
                 self._drop_needless_proof()
                 self._session.working = self._told()
@@ -146,6 +147,7 @@ class _Deal:
             await asyncio.gather(*tasks, return_exceptions=True)
             await self._part()
             self._session.working = ""
+            await asyncio.gather(*self._writes, return_exceptions=True)
             self._intake.close()
 
     async def _part(self) -> None:
@@ -280,10 +282,11 @@ class _Deal:
             if self._board.done(piece, one.name, result.seconds):
                 self._forked |= result.forked
                 self._crew.finished(one.name, len(piece.lines))
-                async with self._writing:
-                    await asyncio.to_thread(self._intake.take, piece, result)
-            if self._board.is_empty:
-                self._changed.set()
+                write = asyncio.create_task(self._write(piece, result))
+                self._writes.add(write)
+                write.add_done_callback(self._writes.discard)
+                await asyncio.shield(write)  # what is being written when all ends is written
+            self._changed.set()
             return
         if result.ending is Ending.DIED:
             self._died(piece, one, result.at, result.text)
@@ -292,6 +295,10 @@ class _Deal:
         one.failures += 1
         if result.ending is Ending.UNLIKE or one.failures >= _FAILURES:
             raise _Refused(result.text)
+
+    async def _write(self, piece: Piece, result: Result) -> None:
+        async with self._writing:
+            await asyncio.to_thread(self._intake.take, piece, result)
 
     def _died(self, piece: Piece, one: _Tended, at: str, why: str) -> None:
         """A worker, or its process, died of a piece: it is tried again, or given up."""

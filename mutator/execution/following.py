@@ -1,0 +1,46 @@
+"""A session's progress, told while it is at work."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from mutator.execution.session import Session
+from mutator.store.progress import Progress, Tail
+from mutator.verification import equivalence
+
+_NOTIFY_S = 0.5
+
+
+@contextmanager
+def followed(session: Session) -> Iterator[None]:
+    """Report progress while the session runs."""
+    stages = _stages(session)
+    stop = threading.Event()
+
+    def follow() -> None:
+        while not stop.wait(_NOTIFY_S):
+            session.notify(replace(next(stages), detail=session.working))
+
+    thread = threading.Thread(target=follow, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+        session.notify(next(stages))
+
+
+def _stages(session: Session) -> Iterator[Progress]:
+    """Where the run is now, each time one asks: the experiments, and when all have a record, the proof."""
+    folder = session.folder
+    experiments = Tail("experiments", folder.path / "records", folder.planned)
+    while (progress := experiments.poll()).done < progress.total:
+        yield progress
+    yield progress
+    proof = Tail("proof", folder.path / equivalence.FOLDER, len(equivalence.sampled(folder)))
+    while session.proof:
+        yield proof.poll()
+    while True:
+        yield experiments.poll()

@@ -1,0 +1,153 @@
+"""A campaign on a Dask cluster gives the bytes that this machine gives, whoever dies meanwhile."""
+
+import os
+import random
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.errors import MutatorWarning
+from mutator.execution.distribution import distributor
+from mutator.execution.running import run_campaign
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from .command import Bytes, Command, pytest_words, results
+from .machines import Machines
+
+CopyToycar = Callable[[Path], Workspace]
+INT, TERM, KILL, STOP = signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGSTOP
+
+
+@pytest.fixture
+def toy(toy: Workspace, kept_checks: None) -> Workspace:
+    """The toy, whose checks are known."""
+    return toy
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
+    """What the small campaign gives with the fork engine and two workers of this machine, and its seal."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    summary = run_campaign(copy_toycar(folder), "small", folder / "run", workers=2, engine="fork")
+    assert (summary.exit_code, summary.done) == (0, 12)
+    assert summary.seal is not None
+    return results(folder / "run"), summary.seal
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
+    """A scheduler with two workers, which no test may harm."""
+    machines = Machines(tmp_path_factory.mktemp("two") / "machines", nanny=False)
+    machines.add("alpha")
+    machines.add("beta")
+    yield machines
+    machines.end()
+
+
+@pytest.fixture
+def machines(tmp_path: Path) -> Iterator[Machines]:
+    """A scheduler without workers."""
+    found = Machines(tmp_path / "machines")
+    yield found
+    found.end()
+
+
+def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> "mutator.execution.session.Summary":
+    """Run the small campaign there."""
+    deals = distributor(str(machines.file))
+    return run_campaign(toy, "small", out, engine="fork", distributor=deals, **more)  # type: ignore[arg-type]
+
+
+def test_two_workers_give_the_same_bytes(
+    toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
+) -> None:
+    """Two workers with folders of their own give tables, series and seal of a local run; each experiment has
+    one record, the proof is whole, the machines are noted, and nothing is left on the workers."""
+    out = tmp_path / "run"
+    summary = on(two, toy, out)
+    assert (summary.exit_code, summary.problem, summary.done) == (0, "", 12)
+    assert (results(out), summary.seal) == undisturbed
+    assert summary.proof is not None and summary.proof.whole
+    folder = RunFolder.open(out)
+    assert len(folder.stretches[-1].machines) == 2
+    assert two.children() == []
+    assert not [*two.folder.glob("*/dask/**/mutator-*")]
+
+
+def test_pytest_deals_out_to_a_cluster(
+    toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
+) -> None:
+    """`pytest --campaign ... --campaign-cluster WHERE` gives the same tables."""
+    words = [*pytest_words(tmp_path / "run", workers=0), "--campaign-cluster", str(two.file)]
+    words = [word for word in words if word not in ("-n", "0")]
+    command = Command(toy, tmp_path / "run", *words)
+    said = command.process.communicate(timeout=120)[0]
+    assert command.process.returncode == 0, said
+    tables = results(tmp_path / "run")
+    assert tables["results.csv"] == undisturbed[0]["results.csv"]
+
+
+def test_a_worker_that_computes_otherwise_is_refused(
+    toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where no worker drives the campaign's golden run, each is named with its versions and the campaign ends
+    with the reason, and goes on elsewhere."""
+    from mutator.execution.cluster import bundle
+
+    real = bundle.read_json
+    monkeypatch.setattr(
+        bundle,
+        "read_json",
+        lambda *given: real(*given) | {"goldens": dict.fromkeys(real(*given)["goldens"], "0" * 64)},
+    )
+    with pytest.warns(MutatorWarning, match=r"worker alpha.*CPython.*gets no work: golden run"):
+        summary = on(two, toy, tmp_path / "run")
+    assert summary.exit_code == 3
+    assert summary.done == 0
+    assert "no worker is left that may do the work: golden run" in summary.problem
+    monkeypatch.undo()
+    again = on(two, toy, tmp_path / "run")
+    print(again)
+    assert (again.exit_code, again.done) == (0, 12)
+
+
+def test_a_worker_with_another_version_is_refused(
+    toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker whose packages would not be allowed to resume the run is refused by name, with the
+    difference."""
+    from mutator.campaigns import machine
+
+    real = machine.versions
+    monkeypatch.setattr(machine, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
+    with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
+        summary = on(two, toy, tmp_path / "run")
+    assert "no worker is left" in summary.problem
+
+
+def test_a_dead_command_leaves_nothing_at_work(
+    toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
+) -> None:
+    """When the command is killed, the work of the workers stops within 10 s, children included; the same
+    command then comes to the same results."""
+    out = tmp_path / "run"
+    words = ["-m", "mutator", "run", "toy", "--out", str(out), "--engine", "fork", "--cluster", str(two.file)]
+    command = Command(toy, out, *words)
+    command.wait_for_records(1)
+    assert two.children()
+    os.kill(command.process.pid, KILL)
+    command.process.wait()
+    deadline = time.monotonic() + 10.0
+    while two.children():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    done = Command(toy, out, *words)
+    said = done.process.communicate(timeout=180)[0]
+    assert done.process.returncode == 0, said
