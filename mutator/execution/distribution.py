@@ -1,11 +1,15 @@
 """How the pending work of a session is dealt out to processes: one interface, one module for each way."""
 
+from pkgutil import resolve_name
 from typing import Protocol
 
 from mutator.errors import MutatorError
+from mutator.execution.cluster.connecting import importing
 from mutator.execution.cluster.where import parse
 from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Session
+
+_DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
 
 
 class Distributor(Protocol):
@@ -28,10 +32,6 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
             )
         return LocalWorkers()
     where = parse(cluster)
-    try:
-        from mutator.execution.cluster.dask_workers import ClusterWorkers
-    except ModuleNotFoundError as err:
-        raise MutatorError(
-            f"no package {err.name}", argument="cluster", remedy="pip install 'mutator[cluster]'"
-        ) from None
-    return ClusterWorkers(where, insecure=insecure)
+    with importing("cluster"):  # an extra, so that nobody imports it who does not ask for it
+        deals: Distributor = resolve_name(_DASK)(where, insecure=insecure)
+    return deals

@@ -116,14 +116,14 @@ def read_faults(run: Path) -> dict[str, Fault]:
 
 def fault_lines(run: Path) -> dict[str, bytes]:
     """The lines of the plan's faults by id, which is the digest of the line: the faults unread."""
-    lines = (line for _, line in _lines(run / FAULTS))
+    lines = (line.rstrip(b"\n") for line in lines_of(run / FAULTS))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
 
-def lines_of(run: Path, names: Container[str]) -> Iterator[bytes]:
+def lines_named(run: Path, names: Container[str]) -> Iterator[bytes]:
     """The lines of these experiments, in the plan's order."""
-    path = run / EXPERIMENTS
-    return (line for name, (_, line) in zip(ids(run), _lines(path), strict=True) if name in names)
+    lines = lines_of(run / EXPERIMENTS)
+    return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in names)
 
 
 def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:

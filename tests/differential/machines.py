@@ -1,4 +1,4 @@
-"""A Dask scheduler and its workers as processes of their own, each with folders and caches that no other has."""
+"""A Dask scheduler and workers as processes of their own, each with folders and caches that no other has."""
 
 import os
 import shutil

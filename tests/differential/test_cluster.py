@@ -3,7 +3,6 @@
 import os
 import random
 import signal
-import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -11,16 +10,19 @@ from pathlib import Path
 
 import pytest
 
-import mutator
+from mutator.campaigns import machine
 from mutator.errors import MutatorWarning
+from mutator.execution.cluster import bundle
 from mutator.execution.distribution import distributor
 from mutator.execution.running import run_campaign
+from mutator.execution.session import Summary
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 from .command import Bytes, Command, pytest_words, results
 from .machines import Machines
 
+CLONE = Path(__file__).parents[2]
 CopyToycar = Callable[[Path], Workspace]
 INT, TERM, KILL, STOP = signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGSTOP
 
@@ -59,7 +61,7 @@ def machines(tmp_path: Path) -> Iterator[Machines]:
     found.end()
 
 
-def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> "mutator.execution.session.Summary":
+def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary:
     """Run the small campaign there."""
     deals = distributor(str(machines.file))
     return run_campaign(toy, "small", out, engine="fork", distributor=deals, **more)  # type: ignore[arg-type]
@@ -99,8 +101,6 @@ def test_a_worker_that_computes_otherwise_is_refused(
 ) -> None:
     """Where no worker drives the campaign's golden run, each is named with its versions and the campaign ends
     with the reason, and goes on elsewhere."""
-    from mutator.execution.cluster import bundle
-
     real = bundle.read_json
     monkeypatch.setattr(
         bundle,
@@ -114,7 +114,6 @@ def test_a_worker_that_computes_otherwise_is_refused(
     assert "no worker is left that may do the work: golden run" in summary.problem
     monkeypatch.undo()
     again = on(two, toy, tmp_path / "run")
-    print(again)
     assert (again.exit_code, again.done) == (0, 12)
 
 
@@ -123,8 +122,6 @@ def test_a_worker_with_another_version_is_refused(
 ) -> None:
     """A worker whose packages would not be allowed to resume the run is refused by name, with the
     difference."""
-    from mutator.campaigns import machine
-
     real = machine.versions
     monkeypatch.setattr(machine, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
     with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
@@ -151,3 +148,95 @@ def test_a_dead_command_leaves_nothing_at_work(
     done = Command(toy, out, *words)
     said = done.process.communicate(timeout=180)[0]
     assert done.process.returncode == 0, said
+
+
+KILLS = [(number, seed) for seed in range(5) for number in (INT, TERM, KILL, STOP)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "seed"), KILLS, ids=[f"{n.name}-{s}" for n, s in KILLS])
+def test_workers_struck_at_random(
+    toy: Workspace,
+    tmp_path: Path,
+    machines: Machines,
+    number: signal.Signals,
+    seed: int,
+    whole_toy: tuple[Bytes, str],
+) -> None:
+    """While workers are struck at random, and one joins late, a campaign comes to the same bytes."""
+    draw = random.Random(f"{number} {seed}")
+    for name in ("alpha", "beta"):
+        machines.add(name)
+    ended = threading.Event()
+
+    def strike() -> None:
+        time.sleep(draw.uniform(2.0, 6.0))
+        machines.add("gamma")
+        for _ in range(3):
+            machines.strike(draw.choice(("alpha", "beta")), number)
+            if ended.wait(draw.uniform(1.0, 5.0)):
+                return
+
+    thread = threading.Thread(target=strike)
+    thread.start()
+    try:
+        deals = distributor(str(machines.file))
+        summary = run_campaign(toy, "toy", tmp_path / "run", engine="fork", distributor=deals)
+    finally:
+        ended.set()
+        thread.join()
+    assert (summary.exit_code, summary.problem) == (0, "")
+    assert (results(tmp_path / "run"), summary.seal) == whole_toy
+
+
+@pytest.fixture(scope="module")
+def whole_toy(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
+    """What the campaign `toy` gives with two workers of this machine."""
+    folder = tmp_path_factory.mktemp("whole")
+    summary = run_campaign(copy_toycar(folder), "toy", folder / "run", workers=2, engine="fork")
+    assert summary.exit_code == 0
+    assert summary.seal is not None
+    return results(folder / "run"), summary.seal
+
+
+@pytest.mark.slow
+def test_the_scheduler_dies(
+    toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str]
+) -> None:
+    """When the scheduler dies, the command ends with what to do; the same command, once there is another one,
+    repeats nothing and comes to the same bytes."""
+    machines.add("alpha")
+    out = tmp_path / "run"
+
+    def kill() -> None:
+        while not any(path.read_bytes().count(b"\n") > 1 for path in (out / "records").glob("*.jsonl")):
+            time.sleep(0.1)
+        os.killpg(machines.scheduler.pid, KILL)
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    summary = run_campaign(toy, "toy", out, engine="fork", distributor=distributor(str(machines.file)))
+    thread.join()
+    assert summary.exit_code == 3
+    assert "does not answer any more" in summary.problem
+    assert 0 < summary.done < summary.planned
+    machines.start_scheduler()
+    machines.add("beta")
+    again = run_campaign(toy, "toy", out, engine="fork", distributor=distributor(str(machines.file)))
+    assert (again.exit_code, again.done, again.ran) == (0, summary.planned, summary.planned - summary.done)
+    assert (results(out), again.seal) == whole_toy
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("campaign", ["quickstart", "paper_smoke"])
+def test_shipped_campaigns_on_three_workers(tmp_path: Path, machines: Machines, campaign: str) -> None:
+    """Shipped campaigns give on three workers, byte for byte, what two of this machine give."""
+    shipped = Workspace.find(CLONE)
+    here = run_campaign(shipped, campaign, tmp_path / "here", workers=2)
+    assert here.exit_code == 0
+    for name in ("alpha", "beta", "gamma"):
+        machines.add(name)
+    there = run_campaign(shipped, campaign, tmp_path / "there", distributor=distributor(str(machines.file)))
+    assert (there.exit_code, there.problem) == (0, "")
+    assert results(tmp_path / "there") == results(tmp_path / "here")
+    assert there.seal == here.seal

@@ -73,7 +73,7 @@ class Board:
         self._faults = plan_file.fault_lines(folder.path)
         self._groups = _groups(folder, pending, self._faults)
         self._sampled = {sample.id for sample in proof}
-        self._proof = [self._proof_piece(line) for line in plan_file.lines_of(folder.path, self._sampled)]
+        self._proof = [self._proof_piece(line) for line in plan_file.lines_named(folder.path, self._sampled)]
         self._out: dict[int, _Out] = {}
         self._maker: dict[str, str] = {}  # of the sample's experiments that were run now: by which worker
         self._at: dict[str, str] = {}  # the golden run that each worker has

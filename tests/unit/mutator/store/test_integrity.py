@@ -253,6 +253,8 @@ def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
         (run / "run.json").write_text(json.dumps(data))
         with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
             RunFolder.unverified(run)
+    if key == "machines":  # nothing is said where there were no others
+        return
     data["stretches"] = [{name: value for name, value in stretch.items() if name != key}]
     (run / "run.json").write_text(json.dumps(data))
     with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
