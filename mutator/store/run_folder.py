@@ -25,7 +25,7 @@ DIR/
   work/                                          scratch of running experiments
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -88,6 +88,12 @@ class GoldenRun(NamedTuple):
         """Its name: `S1`, `S1+alone`, `S1+alone@7` with seed 7."""
         name = "+".join((self.scenario, *self.changes))
         return name if self.seed is None else f"{name}@{self.seed}"
+
+    @classmethod
+    def from_plain(cls, told: Sequence[Any]) -> "GoldenRun":
+        """One that run.json has."""
+        scenario, changes, *seed = told
+        return cls(scenario, tuple(changes), *seed)
 
     def plain(self) -> list[Any]:
         """As run.json has it."""
@@ -239,8 +245,7 @@ class RunFolder:
     @cached_property
     def goldens(self) -> tuple[GoldenRun, ...]:
         """Every fault-free run that is needed."""
-        told = self.head["goldens"]
-        return tuple(GoldenRun(scenario, tuple(changes), *seed) for scenario, changes, *seed in told)
+        return tuple(map(GoldenRun.from_plain, self.head["goldens"]))
 
     @property
     def scenarios(self) -> set[str]:

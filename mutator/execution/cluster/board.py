@@ -16,7 +16,7 @@ from typing import Any
 from mutator.campaigns.chunks import Pending
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.store import plan_file
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import RunFolder
 from mutator.verification.equivalence import Sample
 
 LEAST_S, MOST_S = 0.5, 15.0  # of a piece
@@ -68,7 +68,7 @@ class Board:
         proof: Sequence[Sample],
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._now = now
+        self._now, self._folder = now, folder
         self._number = 0
         self._faults = plan_file.fault_lines(folder.path)
         self._groups = _groups(folder, pending, self._faults)
@@ -255,7 +255,7 @@ class Board:
 
     def _proof_piece(self, line: bytes) -> Piece:
         lines = {_read(line)["id"]: line}
-        return self._piece(Kind.PROVE, _golden_of(line, self._faults), lines)
+        return self._piece(Kind.PROVE, _golden_of(self._folder, line, self._faults), lines)
 
     def _part(self, piece: Piece, lines: Run, deaths: int) -> Piece:
         return self._piece(piece.kind, piece.golden, lines, deaths)
@@ -275,7 +275,7 @@ def _groups(folder: RunFolder, pending: Sequence[Pending], faults: _Faults) -> d
     chunks: dict[str, list[Pending]] = {}
     for one in pending:
         first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
-        chunks.setdefault(_golden_of(first, faults), []).append(one)
+        chunks.setdefault(_golden_of(folder, first, faults), []).append(one)
     return {
         golden: _Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
         for golden, ours in chunks.items()
@@ -291,11 +291,11 @@ def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
             yield {data["id"]: line for data, line in same}
 
 
-def _golden_of(line: bytes, faults: _Faults) -> str:
+def _golden_of(folder: RunFolder, line: bytes, faults: _Faults) -> str:
     data = _read(line)
     fault = plan_file.fault_from(json.loads(faults[data["fault"]]))
     experiment = plan_file.experiment_from(data, {fault.id: fault})
-    return golden_key(experiment.scenario, experiment.changes)
+    return folder.golden_of(experiment).key
 
 
 def _faults_of(lines: Run, faults: _Faults) -> tuple[bytes, ...]:

@@ -1,11 +1,12 @@
 """The bundle: all that a worker needs of a campaign but its plan, named by its digest.
 
-meta.json           engine, limits, golden runs and their digests, version of mutator
+meta.json           engine, limits, digests of the golden runs, version of mutator
 manifest/NAME       the target's manifest
 target/, overlay/   its tree, and what else its runs read in its root (`{root}/...` in their arguments)
 templates/          the fault models
 scenarios/          the scenario files of the golden runs
-golden/             the golden runs
+
+Golden runs do not travel: a worker has to drive them, so that their digests show whether it computes alike.
 """
 
 import json
@@ -24,7 +25,7 @@ from mutator.model import Limits
 from mutator.outcomes.columns import check_names
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.workspace import Workspace
@@ -58,7 +59,8 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "limits": head["limits"],
         "seed": head["seed"],
         "series": bool(folder.series_mb),
-        "goldens": [[*key, digests[golden_key(*key)]] for key in head["goldens"]],
+        "several_seeds": len(folder.seeds) > 1,
+        "goldens": [{"golden": one.plain(), "digest": digests[one.key]} for one in folder.goldens],
         "manifest": manifest.path.name,
     }
     yield "meta.json", json.dumps(meta).encode()
@@ -71,9 +73,8 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         if name not in tree.files:
             yield f"target/{name}", file.read_bytes()
     yield from _below(workspace.templates, "templates")
-    for name in sorted({scenario for scenario, _ in head["goldens"]}):
+    for name in sorted(folder.scenarios):
         yield f"scenarios/{name}.yaml", workspace.scenario(name).read_bytes()
-    yield from _below(folder.path / "golden", "golden")
 
 
 def _read_in_root(manifest: TargetManifest) -> list[Path]:
@@ -132,6 +133,8 @@ class Site:
         """The file of a scenario."""
         return self.place / "scenarios" / f"{name}.yaml"
 
-    def golden(self, scenario: str, changes: tuple[str, ...]) -> Path:
-        """Where the files of a golden run are."""
-        return self.place / "golden" / golden_key(scenario, changes)
+    @cached_property
+    def goldens(self) -> dict[str, tuple[GoldenRun, str]]:
+        """The golden runs with their digests, by name."""
+        told = [(GoldenRun.from_plain(one["golden"]), one["digest"]) for one in self.meta["goldens"]]
+        return {golden.key: (golden, digest) for golden, digest in told}

@@ -26,10 +26,11 @@ from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
+from mutator.model import Experiment
 from mutator.store.blocks import as_block
 from mutator.store.patches import packed_patches
 from mutator.store.records import line_of
-from mutator.store.run_folder import golden_key
+from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
 from mutator.targets.requirements import check_requirements
 from mutator.verification.preflight_rules import look
@@ -48,7 +49,8 @@ class PieceRunner:
         self._work = site.place / f"work-{os.getpid()}"
         self._work.mkdir()
         self._base = prepare_base(site.manifest, self._work / "base")
-        self._alike: set[str] = set()
+        self._goldens = self._work / "golden"
+        self._alike: set[str] = set()  # golden runs that were driven here
         self._runners: dict[Kind, Runner] = {}
 
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
@@ -87,7 +89,8 @@ class PieceRunner:
                     parent=self._parent,
                 )
                 engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
-            goldens = Goldens(site.manifest, site.golden)
+            several = site.meta["several_seeds"]
+            goldens = Goldens(site.manifest, self._golden_folder, several_seeds=several)
             with_series = kind is Kind.RUN and site.meta["series"]
             self._runners[kind] = Runner(
                 site.manifest, site.models, engine, goldens, site.scenario, with_series=with_series
@@ -95,24 +98,28 @@ class PieceRunner:
         return self._runners[kind]
 
     def _drive_golden(self, key: str) -> None:
-        """Drive a golden run; Unlike when it is not the campaign's to the byte."""
+        """Drive a golden run, and keep it; Unlike when it is not the campaign's to the byte."""
         site = self._site
-        scenario, changes, known = next(
-            one for one in site.meta["goldens"] if golden_key(one[0], one[1]) == key
-        )
+        golden, known = site.goldens[key]
         engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
         job = Job(
             name=f"golden-{len(self._alike)}",
-            scenario=site.scenario(scenario),
-            seed=site.meta["seed"],
-            changes=tuple(changes),
+            scenario=site.scenario(golden.scenario),
+            seed=site.meta["seed"] if golden.seed is None else golden.seed,
+            changes=golden.changes,
         )
         for _, execution in engine.run([job]):
             found = look(site.manifest, execution)
             if found.problem or found.digest != known:
                 came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
                 raise Unlike(f"golden run {key} {came}")
+            self._goldens.mkdir(exist_ok=True)
+            execution.out.rename(self._goldens / key)
         self._alike.add(key)
+
+    def _golden_folder(self, experiment: Experiment) -> Path:
+        several = self._site.meta["several_seeds"]
+        return self._goldens / GoldenRun.of(experiment, several_seeds=several).key
 
 
 def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:

@@ -12,7 +12,7 @@ from mutator.outcomes.sampling import Sampler
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
-from mutator.store.run_folder import RunFolder, golden_key
+from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import SeriesWriter
 from mutator.targets.manifest import TargetManifest
 from mutator.verification import equivalence
@@ -82,8 +82,8 @@ class Intake:
                 writer.close()
 
     def _golden_series(self, key: str) -> bytes:
-        scenario, changes = next(one for one in self._folder.head["goldens"] if golden_key(*one) == key)
-        trace = load_channels(self._manifest, self._folder.golden(scenario, tuple(changes)))
+        golden = next(one for one in self._folder.goldens if one.key == key)
+        trace = load_channels(self._manifest, self._folder.golden(*golden))
         return Sampler(self._manifest, trace).encoded
 
     def _proof_writer(self) -> LineWriter:
