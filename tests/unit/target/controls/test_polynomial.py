@@ -9,7 +9,7 @@ from selfdrive.common import compiled
 from selfdrive.controls.lib.compiled_fit import CompiledFit, build_fit
 from selfdrive.controls.lib.cubic_fit import CubicFit
 from selfdrive.controls.lib.polynomial import ZERO, blend, shifted, slope, value
-from selfdrive.sim.compile_helpers import compile_helpers, compiler
+from selfdrive.sim.compile_helpers import compiler
 
 CURVE = (1e-5, -2e-3, 0.05, 1.85)
 
@@ -30,10 +30,9 @@ def test_fit_is_least_squares() -> None:
 
 
 @pytest.mark.skipif(not compiler(), reason="there is no C compiler")
-def test_a_compiled_fit_has_the_same_bits(tmp_path: Path) -> None:
+def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
     """Of any points, also where there are too few or too many of them, or infinite ones, or whole numbers."""
-    list(compile_helpers(tmp_path))
-    compiled.use(tmp_path)
+    compiled.use(all_compiled)
     fast = build_fit()
     compiled.use(None)
     assert isinstance(fast, CompiledFit) and type(build_fit()) is CubicFit

@@ -20,7 +20,7 @@ from selfdrive.controls.lib.lateral_ocp import lateral_ocp
 from selfdrive.controls.lib.long_ocp import long_ocp
 from selfdrive.controls.lib.mpc_iteration import Iteration, Solver
 from selfdrive.controls.lib.mpc_solver import build_solver
-from selfdrive.sim.compile_helpers import compile_helpers, compiler
+from selfdrive.sim.compile_helpers import compiler
 
 RATE_COST = 0.5
 REFERENCES = {
@@ -33,18 +33,10 @@ NO_NUMBERS = (math.nan, math.inf, -math.inf, 1e300, -1e9)
 pytestmark = pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with all compiled helpers."""
-    folder = tmp_path_factory.mktemp("compiled")
-    list(compile_helpers(folder))
-    return folder
-
-
 @pytest.fixture
-def use(made: Path) -> Iterator[None]:
+def use(all_compiled: Path) -> Iterator[None]:
     """While a test runs, compiled code is to be used."""
-    compiled.use(made)
+    compiled.use(all_compiled)
     yield
     compiled.use(None)
 
@@ -167,7 +159,9 @@ def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize("edited", ["mpc.c", "mpc_solver.py", "long_ocp.py", "lateral_ocp.py", "horizon.py"])
-def test_an_edited_problem_is_solved_as_it_is_written(made: Path, tmp_path: Path, edited: str) -> None:
+def test_an_edited_problem_is_solved_as_it_is_written(
+    all_compiled: Path, tmp_path: Path, edited: str
+) -> None:
     """Where one of the files that the C code stands for is another, CasADi's solver is built."""
     target = tmp_path / "target"
     shutil.copytree(
@@ -183,12 +177,16 @@ def test_an_edited_problem_is_solved_as_it_is_written(made: Path, tmp_path: Path
         "print(type(build_lateral(0.5)).__name__, type(build_longitudinal()).__name__)"
     )
     ran = subprocess.run(
-        [sys.executable, "-c", code % str(made)], cwd=target, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code % str(all_compiled)],
+        cwd=target,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert ran.stdout.split() == ["Function", "Function"]
 
 
-def test_a_run_without_pictures_needs_no_casadi(made: Path) -> None:
+def test_a_run_without_pictures_needs_no_casadi(all_compiled: Path) -> None:
     """What takes long to import is not imported where compiled code stands for it."""
     code = (
         "import sys; from selfdrive.sim.run import open_run; "
@@ -197,6 +195,6 @@ def test_a_run_without_pictures_needs_no_casadi(made: Path) -> None:
     )
     root = mpc_parts.C_FILE.parents[3]
     scenario = root.parent / "fault_library/scenarios/S1.yaml"
-    command = [sys.executable, "-c", code % (str(scenario), str(made))]
+    command = [sys.executable, "-c", code % (str(scenario), str(all_compiled))]
     ran = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
     assert ran.stdout == "[]\n"

@@ -30,18 +30,10 @@ def _none_afterwards():
     compiled.use(None)
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """A folder with all helpers."""
-    folder = tmp_path_factory.mktemp("compiled")
-    list(compile_helpers.compile_helpers(folder))
-    return folder
-
-
 @pytest.fixture
-def helpers(made, tmp_path):
-    """The same, a copy of the test's own."""
-    return shutil.copytree(made, tmp_path / "own")
+def helpers(all_compiled, tmp_path):
+    """A folder with all helpers, a copy of the test's own."""
+    return shutil.copytree(all_compiled, tmp_path / "own")
 
 
 def test_every_c_file_says_what_it_stands_for():
@@ -98,13 +90,13 @@ def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
 
 
 @needs_compiler
-def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(made, tmp_path):
+def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(all_compiled, tmp_path):
     """A library is named by what it stands for; one of something else is deleted."""
     old = tmp_path / f"warp-0{compiled.SUFFIX}"
     old.touch()
     list(compile_helpers.compile_helpers(tmp_path))
     assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == {
-        f.name: f.read_bytes() for f in made.iterdir()
+        f.name: f.read_bytes() for f in all_compiled.iterdir()
     }
 
 
@@ -130,7 +122,7 @@ def test_a_machine_without_a_compiler_takes_that_of_a_package(monkeypatch, there
 
 @needs_compiler
 @pytest.mark.slow
-def test_runs_have_the_same_bytes_and_the_proof_takes_no_helper(made, tmp_path, monkeypatch):
+def test_runs_have_the_same_bytes_and_the_proof_takes_no_helper(all_compiled, tmp_path, monkeypatch):
     """Record and trace of a run with pictures are the same with and without helpers; with `--forget` none is
     found."""
     found = []
@@ -149,8 +141,8 @@ def test_runs_have_the_same_bytes_and_the_proof_takes_no_helper(made, tmp_path, 
         assert main([*words, *more]) == 0
         return [(out / file).read_bytes() for file in ("record.json", "trace.npz")]
 
-    with_helpers = drive("with", "--compiled", str(made))
+    with_helpers = drive("with", "--compiled", str(all_compiled))
     used = len(found)
     assert used
-    assert drive("forget", "--forget", "--compiled", str(made)) == with_helpers and len(found) == used
+    assert drive("forget", "--forget", "--compiled", str(all_compiled)) == with_helpers and len(found) == used
     assert drive("without") == with_helpers and len(found) == used

@@ -21,11 +21,9 @@ SHAPE = 308, 640
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
+def library(all_compiled):
     """The compiled warp."""
-    folder = tmp_path_factory.mktemp("compiled")
-    list(compile_helpers.compile_helpers(folder))
-    compiled.use(folder)
+    compiled.use(all_compiled)
     yield compiled.library(compiled_warp.C_SOURCE)
     compiled.use(None)
 
