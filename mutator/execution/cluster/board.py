@@ -19,8 +19,8 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.verification.equivalence import Sample
 
-LEAST_S, MOST_S = 0.5, 15.0  # of a piece
-_SHARE = 3  # of what is left, a worker gets one part in so many times the workers
+LEAST_S, MOST_S = 0.5, 8.0  # of a piece
+_SHARE = 4  # of what is left, a worker gets one part in so many times the workers
 _FIRST = 4  # runs in a piece before anything was measured
 _GUESS_S = 0.5  # a run takes, before anything was measured
 _LATE = 3.0  # times the expected time after which a piece is repeated elsewhere
@@ -121,7 +121,7 @@ class Board:
         if piece.number in self._out:
             self._out[piece.number].others.add(worker)
             return piece
-        expected_s = len(piece.lines) * self._mean_s(piece.kind)
+        expected_s = piece.runs * self._mean_s(piece.kind)
         self._out[piece.number] = _Out(piece, worker, self._now(), expected_s)
         return piece
 
@@ -130,7 +130,7 @@ class Board:
         if self._out.pop(piece.number, None) is None:
             return False
         self._seconds[piece.kind] += seconds
-        self._done[piece.kind] += len(piece.lines)
+        self._done[piece.kind] += piece.runs
         if piece.kind is Kind.RUN:
             self._maker.update((name, worker) for name in piece.lines if name in self._sampled)
         return True
@@ -185,7 +185,7 @@ class Board:
         return sum(group.waiting for group in self._groups.values())
 
     def _mean_s(self, kind: Kind) -> float:
-        """What an experiment takes."""
+        """What a run takes."""
         return self._seconds[kind] / self._done[kind] if self._done[kind] else _GUESS_S
 
     def _cut(self, worker: str) -> Piece | None:
@@ -195,11 +195,10 @@ class Board:
         self._at[worker] = group.golden
         if group.again:
             return group.again.popleft()
-        lines: Run = {}
-        for run in islice(group.runs, self._runs()):
-            lines |= run
+        runs = list(islice(group.runs, self._runs()))
+        lines = {name: line for run in runs for name, line in run.items()}
         group.left -= len(lines)
-        return self._piece(Kind.RUN, group.golden, lines)
+        return self._piece(Kind.RUN, group.golden, lines, runs=len(runs))
 
     def _runs(self) -> int:
         """How many runs the next piece has."""
@@ -242,7 +241,7 @@ class Board:
         ]
         return max(late, key=lambda one: one[0])[1] if late else None
 
-    def _piece(self, kind: Kind, golden: str, lines: Run, deaths: int = 0) -> Piece:
+    def _piece(self, kind: Kind, golden: str, lines: Run, *, runs: int = 1, deaths: int = 0) -> Piece:
         self._number += 1
         return Piece(
             number=self._number,
@@ -250,6 +249,7 @@ class Board:
             golden=golden,
             lines=lines,
             faults=_faults_of(lines, self._faults),
+            runs=runs,
             deaths=deaths,
         )
 
@@ -258,7 +258,7 @@ class Board:
         return self._piece(Kind.PROVE, _golden_of(self._folder, line, self._faults), lines)
 
     def _part(self, piece: Piece, lines: Run, deaths: int) -> Piece:
-        return self._piece(piece.kind, piece.golden, lines, deaths)
+        return self._piece(piece.kind, piece.golden, lines, runs=len(lines), deaths=deaths)
 
     def _again(self, piece: Piece) -> None:
         if piece.kind is Kind.PROVE:

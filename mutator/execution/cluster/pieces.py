@@ -41,6 +41,7 @@ class Piece:
     golden: str
     lines: Mapping[str, bytes]
     faults: tuple[bytes, ...]
+    runs: int = 1  # that its experiments are: several may share one
     deaths: int = 0  # of workers, while they ran it
 
     @property

@@ -1,0 +1,243 @@
+"""Work dealt out to a cluster: `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`.
+
+`overhead`: CPU time of a campaign on two Dask workers of this machine and on two local ones, with warm
+caches, in turn; that of all processes. `intake`: results a second that the command takes in from two
+workers, with patches and series of usual size, from an engine that costs nothing. `ends`: when 64 made-up
+workers come to the end of 10,000 experiments that take as long as those of a campaign: the last one beside
+their mean.
+Without a name all three.
+"""
+
+import argparse
+import heapq
+import json
+import os
+import random
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import mean, median
+from types import SimpleNamespace
+from typing import Any
+
+from mutator.campaigns.chunks import Pending, pending
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.execution.cluster import crew, dask_side, dask_workers
+from mutator.execution.cluster import intake as intakes
+from mutator.execution.cluster.board import Board
+from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.cluster.where import parse
+from mutator.store.blocks import as_block
+from mutator.store.patches import packed_patches
+from mutator.store.run_folder import RunFolder
+from mutator.store.series_packing import EXPERIMENT
+from mutator.workspace import Workspace
+
+ROOT = Path(__file__).resolve().parents[1]
+WORKERS, EXPERIMENTS = 64, 10_000
+GOLDEN_S = 1.2  # a worker takes that much to drive a golden run
+RECORD = {  # one as a campaign has most of
+    "activation": {"count": 1200, "first": 4.11, "last": 16.1},
+    "alerts": [["fcw", 9.81]],
+    "detail": "",
+    "hazards": [["H1", 12.3]],
+    "max_dev": [["brake", 0.31], ["gas", 0.22], ["steer_torque", 0.0021]],
+    "outcome": "hazard",
+    "status": "ok",
+    "t_manifest": 4.12,
+    "trace_digest": "0" * 64,
+    "tree": "0" * 64,
+    "metrics": [[f"metric_{i}", 1.2345678] for i in range(12)],
+    "left": [[f"channel_{i}", 4.12 + i, 0.5] for i in range(12)],
+}
+PATCH_BYTES, SERIES_BYTES = 1_900, 5_900
+
+
+def overhead(campaign: str, rounds: int) -> None:
+    """CPU time on a cluster of this machine's beside that of local workers."""
+    took: dict[str, list[float]] = {"local": [], "cluster": []}
+    options = {"local": ["-n", "2"], "cluster": ["-n", "2", "--cluster", "local:2"]}
+    with tempfile.TemporaryDirectory() as place:
+        env = os.environ | {"XDG_CACHE_HOME": f"{place}/cache"}
+        for number in range(rounds + 1):  # the first fills the caches
+            for name in options if number % 2 == 0 else reversed(options):
+                command = [sys.executable, "-m", "mutator", "run", campaign, "--out", f"{place}/run"]
+                command += ["--no-stills", *options[name]]
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+                shutil.rmtree(f"{place}/run")
+                if number:
+                    took[name].append(used)
+                    print(f"{name:8} {took[name][-1]:8.1f} s CPU", flush=True)
+    local, cluster = median(took["local"]), median(took["cluster"])
+    print(f"overhead, {campaign}: {local:.1f} s of CPU with local workers, {cluster:.1f} s with Dask's")
+    print(f"ratio {cluster / local:.3f}")
+
+
+@contextmanager
+def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[Pending, ...]]]:
+    """A frozen plan of 11,280 experiments; nothing is driven."""
+    workspace = Workspace.find(ROOT)
+    with tempfile.TemporaryDirectory() as place:
+        folder = freeze(make_plan(workspace, name), Path(place) / "run", workspace)
+        yield workspace, folder, pending(folder, {})
+
+
+# What a worker is asked to do, by an engine that costs nothing. Dask sends these functions as they are.
+
+
+def facts(packages: Any) -> dict[str, Any]:
+    return dict.fromkeys(("mutator", "python", "platform", "cpu"), "") | {"host": "here", "blas": []}
+
+
+def deliver(*given: Any) -> None:
+    return None
+
+
+def attend(run: str) -> None:
+    from distributed import secede
+
+    secede()
+    time.sleep(3600)
+
+
+def leave(run: str) -> None:
+    return None
+
+
+def work(run: str, data: bytes) -> bytes:
+    """What a piece would come to."""
+    piece = Piece.of(data)
+    line = json.dumps({"experiment_id": "@"} | RECORD, separators=(",", ":")).encode()
+    timing = b'{"cpu_s":0.3,"engine":"fork","experiment_id":"@","host":"here","wall_s":0.3,"worker":"w"}'
+    patch, series = random.Random(1).randbytes(PATCH_BYTES // 4) * 4, random.Random(2).randbytes(SERIES_BYTES)
+    return Result(
+        number=piece.number,
+        ending=Ending.DONE,
+        seconds=0.0005 * len(piece.lines),
+        forked=True,
+        records=tuple(line.replace(b"@", name.encode()) for name in piece.lines),
+        timings=tuple(timing.replace(b"@", name.encode()) for name in piece.lines),
+        patches=packed_patches((name, patch) for name in piece.lines),
+        series=b"".join(as_block(EXPERIMENT, f"{name} {piece.golden}", series) for name in piece.lines),
+    ).packed()
+
+
+def intake() -> None:
+    """Results a second that the command takes in."""
+    for fake in (facts, deliver, attend, leave, work):
+        setattr(dask_side, fake.__name__, fake)
+    with planned() as (workspace, folder, left):
+        session: Any = SimpleNamespace(
+            workspace=workspace,
+            folder=folder,
+            manifest=workspace.manifest(folder.head["target"]),
+            pending=left,
+            proof=(),
+            engine="fork",
+            accept_versions=True,
+            worker_name=lambda name: f"0001-{name}",
+            note_machine=lambda machine: None,
+            problem="",
+            interrupted=False,
+            working="",
+        )
+        folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
+        Bundle.of = classmethod(lambda cls, *given: cls(b"", ""))  # type: ignore[assignment, method-assign]
+        crew.Crew.objection = lambda self, facts: ""  # type: ignore[method-assign]
+        times: list[float] = []
+        take = intakes.Intake.take
+
+        def timed(self: Any, piece: Piece, result: Result) -> None:
+            take(self, piece, result)
+            times.append(time.monotonic())
+            counts.append(len(piece.lines))
+
+        counts: list[int] = []
+        intakes.Intake.take = timed  # type: ignore[method-assign]
+        before = time.process_time()
+        dask_workers.ClusterWorkers(parse("local:2")).run(session)
+        used = time.process_time() - before
+        if session.problem:
+            raise SystemExit(session.problem)
+        total = sum(counts)
+        per_s = sum(counts[1:]) / (times[-1] - times[0])
+        print(f"intake: {total:,} results in {len(counts)} pieces: {per_s:,.0f} a second,")
+        print(f"{1e6 * used / total:.0f} us of the command's CPU each")
+
+
+def ends(seed: int) -> None:
+    """When made-up workers come to the end."""
+    with planned() as (_, folder, left):
+        some, count = [], 0
+        for one in left:
+            if count < EXPERIMENTS:
+                some.append(one)
+                count += len(one.places)
+        ended, busy, pieces = simulated(folder, some, random.Random(seed))
+    last, middle = max(ended), mean(ended)
+    print(f"ends: {count:,} experiments, {WORKERS} workers, {pieces} pieces: the last ends at {last:.1f} s,")
+    after, at_work = 100 * (last / middle - 1), 100 * busy / (last * WORKERS)
+    print(f"{after:.1f} % after the mean of all; at work {at_work:.1f} % of the time")
+
+
+def simulated(
+    folder: RunFolder, left: Sequence[Pending], draw: random.Random
+) -> tuple[list[float], float, int]:
+    """When each worker did its last work, how long all worked, and how many pieces there were."""
+    now = [0.0]
+    board = Board(folder, left, (), now=lambda: now[0])
+    names = [f"w{number}" for number in range(WORKERS)]
+    for name in names:
+        board.join(name, 1)
+    goldens: dict[str, str] = {}
+    ended, busy, pieces = dict.fromkeys(names, 0.0), 0.0, 0
+    events: list[tuple[float, int, str, Piece | None, float]] = [
+        (0.0, number, name, None, 0.0) for number, name in enumerate(names)
+    ]
+    while not board.is_empty:
+        now[0], _, name, piece, took = heapq.heappop(events)
+        if piece is not None:
+            board.done(piece, name, took)
+            ended[name] = now[0]
+        got = board.take(name)
+        if got is None:
+            heapq.heappush(events, (now[0] + 0.1, pieces, name, None, 0.0))
+            continue
+        took = sum(draw.lognormvariate(-1.2, 0.7) for _ in range(got.runs))
+        took += GOLDEN_S if goldens.get(name) != got.golden else 0.0
+        goldens[name] = got.golden
+        busy, pieces = busy + took, pieces + 1
+        heapq.heappush(events, (now[0] + took, pieces + WORKERS, name, got, took))
+    return list(ended.values()), busy, pieces
+
+
+def main() -> int:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("what", nargs="*", default=["ends", "intake", "overhead"])
+    parser.add_argument("--campaign", default="paper_sample")
+    parser.add_argument("--rounds", type=int, default=2)
+    options = parser.parse_args()
+    for what in options.what:
+        if what == "overhead":
+            overhead(options.campaign, options.rounds)
+        elif what == "intake":
+            intake()
+        else:
+            ends(seed=1)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
