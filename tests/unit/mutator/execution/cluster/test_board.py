@@ -1,0 +1,184 @@
+"""Which worker does which piece next: nothing is done twice, nothing is lost, proof goes to others."""
+
+import random
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.chunks import pending
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.execution.cluster.board import Board
+from mutator.execution.cluster.pieces import Kind, Piece
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.verification.equivalence import Sample
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[5]
+
+
+class Clock:
+    """A clock that the test moves."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    """The plan of `paper_smoke`, some of whose experiments share a run."""
+    shipped = Workspace.find(root=CLONE)
+    return freeze(make_plan(shipped, "paper_smoke"), tmp_path_factory.mktemp("board") / "run", shipped)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def ids(folder: RunFolder) -> list[str]:
+    """All that is planned."""
+    return list(plan_file.ids(folder.path))
+
+
+def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board:
+    """All of the plan, and the proof of some of it, for two workers."""
+    samples = [Sample(number, name) for number, name in enumerate(proof)]
+    made = Board(folder, pending(folder, {}), samples, now=clock)
+    for name in ("alpha", "beta"):
+        made.join(name, 1)
+    return made
+
+
+def taken(board: Board, worker: str) -> Piece:
+    piece = board.take(worker)
+    assert piece is not None
+    return piece
+
+
+def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[tuple[str, Piece]]:
+    """Who did what, until nothing is left."""
+    done = []
+    while not board.is_empty:
+        for worker in workers:
+            if (piece := board.take(worker)) is not None:
+                done.append((worker, piece))
+                assert board.done(piece, worker, 0.4 * piece.runs)
+    return done
+
+
+def test_all_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Two workers do each planned experiment once; a piece has one golden run and its own faults."""
+    done = [piece for _, piece in drained(board(folder, clock))]
+    assert sorted(name for piece in done for name in piece.lines) == sorted(ids)
+    for piece in done:
+        experiments = Piece.of(piece.packed()).experiments()
+        assert [experiment.id for experiment in experiments] == list(piece.lines)
+        assert {folder.golden_of(experiment).key for experiment in experiments} >= {piece.golden}
+
+
+def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Who ran an experiment does not prove it, as long as there is somebody else."""
+    done = drained(board(folder, clock, tuple(ids[::7])))
+    ran = {name: worker for worker, piece in done if piece.kind is Kind.RUN for name in piece.lines}
+    proved = {name: worker for worker, piece in done if piece.kind is Kind.PROVE for name in piece.lines}
+    assert sorted(proved) == sorted(ids[::7])
+    assert all(ran[name] != worker for name, worker in proved.items())
+
+
+def test_a_worker_alone_proves_what_it_ran(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """With one worker the proof is its own work, too."""
+    alone = board(folder, clock, tuple(ids[:2]))
+    alone.leave("beta")
+    done = drained(alone, ("alpha",))
+    assert [piece.kind for _, piece in done][-2:] == [Kind.PROVE, Kind.PROVE]
+
+
+def test_a_worker_stays_with_its_golden_run(folder: RunFolder, clock: Clock) -> None:
+    """Golden runs change as seldom as two workers can make them."""
+    done = drained(board(folder, clock))
+    for worker in ("alpha", "beta"):
+        keys = [piece.golden for name, piece in done if name == worker]
+        changes = sum(one != other for one, other in pairwise(keys))
+        assert changes <= len(folder.goldens)
+
+
+def test_pieces_get_shorter_towards_the_end(folder: RunFolder, clock: Clock) -> None:
+    """The last pieces are single runs where a run takes longer than the shortest piece."""
+    there = board(folder, clock)
+    first = taken(there, "alpha")
+    there.done(first, "alpha", 2.0 * first.runs)
+    sizes = [piece.runs for _, piece in drained(there)]
+    assert max(sizes[:4]) > 1
+    assert sizes[-1] == 1
+
+
+def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Clock) -> None:
+    """Who has nothing else to do repeats a piece that is late; whoever is second counts no more."""
+    there = board(folder, clock)
+    frozen = taken(there, "alpha")
+    drained_by_beta = 0
+    while (piece := there.take("beta")) is not None:
+        there.done(piece, "beta", 0.1)
+        drained_by_beta += 1
+    assert drained_by_beta and not there.is_empty
+    clock.now += 60.0
+    again = taken(there, "beta")
+    assert again == frozen
+    assert there.done(again, "beta", 0.1)
+    assert not there.done(frozen, "alpha", 60.0)
+    assert there.is_empty
+
+
+def test_what_takes_its_worker_down_twice_is_found(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Workers die of one experiment, and nobody knows of which: it is given up, and all others are done."""
+    there, deadly, done = board(folder, clock), ids[17], Counter[str]()
+    given_up: list[str] = []
+    while not there.is_empty:
+        piece = taken(there, "alpha")
+        if deadly not in piece.lines:
+            there.done(piece, "alpha", 0.1)
+            done.update(piece.ids)
+        elif (found := there.died(piece, "alpha")) is not None:
+            given_up += found.lines
+    assert given_up == [deadly]
+    assert sorted([*done.elements(), deadly]) == sorted(ids)
+
+
+def test_who_is_known_to_have_died_of_what(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Where the experiment is known it is set apart at once, and given up at its second death."""
+    there = board(folder, clock)
+    piece = taken(there, "alpha")
+    deadly = piece.ids[-1]
+    assert there.died(piece, "alpha", deadly) is None
+    apart = next(one for one in iter(lambda: taken(there, "alpha"), None) if deadly in one.lines)
+    assert apart.ids == (deadly,)
+    assert there.died(apart, "alpha", deadly) is not None
+
+
+def test_random_losses_lose_nothing(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Whatever is given back, dies once or comes twice: each experiment is done once."""
+    draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
+    out: list[tuple[str, Piece]] = []
+    while not there.is_empty:
+        clock.now += draw.uniform(0.0, 8.0)
+        worker = draw.choice(("alpha", "beta"))
+        if (piece := there.take(worker)) is not None:
+            out.append((worker, piece))
+        if not out:
+            continue
+        who, piece = out.pop(draw.randrange(len(out)))
+        fate = draw.random()
+        if fate < 0.2:
+            there.give_back(piece, who)
+        elif fate < 0.25 and piece.deaths == 0:
+            there.died(piece, who)
+        elif there.done(piece, who, 0.3):
+            done.update(piece.ids)
+    assert done == Counter(ids)

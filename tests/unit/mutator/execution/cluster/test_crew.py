@@ -1,0 +1,65 @@
+"""Who may take part in a run, and what is told of those who do."""
+
+import pytest
+
+from mutator._common.version import VERSION
+from mutator.execution.cluster.crew import Crew, describe
+from mutator.store.stretches import Stretch
+
+FACTS = {
+    "mutator": VERSION,
+    "host": "alpha",
+    "python": "CPython 3.11.7",
+    "platform": "Linux",
+    "cpu": "AMD EPYC",
+    "blas": [{"library": "openblas", "version": "0.3.31", "kernel": "Zen", "threads": 1}],
+    "packages": {"numpy": "2.4.6"},
+}
+STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux")
+
+
+@pytest.mark.parametrize(
+    ("change", "objection"),
+    [
+        ({}, ""),
+        ({"mutator": "0.0.1"}, f"mutator 0.0.1, here {VERSION}"),
+        ({"python": "CPython 3.12.1"}, "CPython 3.11.7, there CPython 3.12.1"),
+        ({"packages": {"numpy": "1.0"}}, "numpy 2.4.6, there 1.0"),
+        ({"packages": {"numpy": None}}, "numpy 2.4.6, there none"),
+        ({"host": "beta", "cpu": "another"}, ""),
+    ],
+)
+def test_versions_decide(change: dict[str, object], objection: str) -> None:
+    """What would keep a machine from resuming the run keeps a worker out, with the difference."""
+    assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
+
+
+def test_other_versions_can_be_accepted() -> None:
+    """Of Python and packages, not of mutator."""
+    crew = Crew(STRETCH, accept=True)
+    assert crew.objection(FACTS | {"packages": {"numpy": "1.0"}}) == ""
+    assert crew.objection(FACTS | {"mutator": "0.0.1"})
+
+
+def test_rates_are_told_by_machine() -> None:
+    """Two workers of one machine are told as one rate, a refused one by number."""
+    now = [0.0]
+    crew = Crew(STRETCH, accept=False, now=lambda: now[0])
+    for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):
+        crew.let_in(name, FACTS | {"host": host})
+    for _ in range(3):
+        now[0] += 2.0
+        crew.finished("a", 4)
+        crew.finished("b", 2)
+    crew.refuse("d", "numpy 1.0")
+    assert crew.told() == "3 workers on alpha 3.0 a second, beta; 1 refused"
+    crew.leave("c")
+    assert crew.told().startswith("2 workers on alpha")
+
+
+def test_a_worker_is_described_by_machine_and_versions() -> None:
+    """Name, host, processor, versions and the kernel of its BLAS."""
+    assert describe("w", FACTS) == (
+        f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
+    )
+    assert describe("w", {}) == "w"

@@ -1,0 +1,43 @@
+"""What travels between command and workers arrives as it was sent, or is refused."""
+
+import random
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.execution.cluster.parcel import pack, unpack
+from mutator.execution.cluster.pieces import Ending, Result
+
+
+def test_parts_come_back() -> None:
+    """Names and bytes, empty ones and binary ones, in their order."""
+    parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
+    assert unpack(pack(parts)) == parts
+    assert list(unpack(pack(parts))) == list(parts)
+
+
+def test_damage_is_found() -> None:
+    """Any changed, missing or additional byte is told."""
+    data, draw = pack({"a": b"some bytes", "b": b"more"}), random.Random(1)
+    for _ in range(100):
+        at = draw.randrange(len(data))
+        changed = data[:at] + bytes([data[at] ^ 1 << draw.randrange(8)]) + data[at + 1 :]
+        for wrong in (changed, data[:at], data + b"x"):
+            with pytest.raises(MutatorError, match="damaged parcel"):
+                unpack(wrong)
+
+
+def test_a_result_comes_back() -> None:
+    """Lines, blocks and how it ended."""
+    result = Result(
+        number=7,
+        ending=Ending.DONE,
+        seconds=1.5,
+        forked=True,
+        records=(b'{"a":1}', b'{"b":"\xc3\xa4"}'),
+        timings=(b"{}", b"{}"),
+        patches=b"\x00\n\x01",
+        series=b"\n\n",
+        series_of=("S1", "S1+alone@2"),
+    )
+    assert Result.of(result.packed()) == result
