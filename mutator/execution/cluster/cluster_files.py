@@ -6,6 +6,7 @@ The kinds are a fixed list of classes of dask-jobqueue and dask-kubernetes; a fi
 import difflib
 import importlib
 import inspect
+import signal
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
@@ -80,9 +81,7 @@ class ClusterFile:
         """As of `Where`: starts the cluster, and ends it with all its jobs or pods."""
         if not insecure:
             self._check_closed()
-        module, name = _CLASSES[self.model.kind]
-        with importing(KUBERNETES if self.model.kind == KUBERNETES else "cluster"):
-            cluster_class = getattr(importlib.import_module(module), name)
+        cluster_class = _class(self.model.kind)
         self._check_options(cluster_class)
         problems: list[Exception] = []
         with self._blamed():
@@ -213,6 +212,19 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
                 self.status = Status.running
 
     return Noting
+
+
+def _class(kind: str) -> Any:
+    """The class that starts clusters of a kind; MutatorError when its extra is not installed."""
+    module, name = _CLASSES[kind]
+    original = signal.signal
+    try:
+        # importing dask_jobqueue sets a handler of Ctrl-C, and fails where that is not allowed: in a thread
+        signal.signal = lambda *_: None
+        with importing(KUBERNETES if kind == KUBERNETES else "cluster"):
+            return getattr(importlib.import_module(module), name)
+    finally:
+        signal.signal = original
 
 
 def _parameters(cluster_class: type) -> Iterator[str]:

@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,19 @@ def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path)
         MutatorError, match=r"some.yaml:4: the network .* neither on the loopback nor encrypted"
     ):
         asyncio.run(opened(tmp_path, text))
+
+
+def test_ctrl_c_stays_what_it_is() -> None:
+    """dask_jobqueue would set a handler of its own, and could not be imported outside of the main thread."""
+    code = (
+        "import signal, threading\n"
+        "from mutator.execution.cluster.cluster_files import _class\n"
+        "thread = threading.Thread(target=lambda: print(_class('slurm').__name__))\n"
+        "thread.start(); thread.join()\n"
+        "assert signal.getsignal(signal.SIGINT) is signal.default_int_handler\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "SLURMCluster\n"
 
 
 def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
