@@ -41,7 +41,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess
     root = tmp_path_factory.mktemp("finished") / "toy"
     shutil.copytree(TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates", "hostile"))
     shutil.copytree(TESTS.parent / "templates", root / "templates")
-    said = mutator(root, "run", "toy", "--out", "runs/first", "-n", "2", *CHOSEN)
+    said = mutator(root, "run", "toy", "--out", "runs/first", "-n", "1", *CHOSEN)
     assert said.returncode == 0, said.stderr
     return root, said
 

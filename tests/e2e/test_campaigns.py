@@ -75,7 +75,7 @@ def finished(finished_once: Finished, tmp_path: Path) -> Path:
 
 def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
     """Loops, crashes, exits, greed and mutants that do not compile have a status; none is the harness's."""
-    summary = run_campaign(toy, "hostile", tmp_path / "run", workers=2)
+    summary = run_campaign(toy, "hostile", tmp_path / "run")
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
     found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}
     assert found == {

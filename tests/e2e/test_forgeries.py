@@ -49,7 +49,7 @@ def genuine(
     is_toy = request.param == "toy"
     workspace = copy_toycar(place) if is_toy else Workspace.find(root=CLONE)
     campaign = "small" if is_toy else request.param
-    summary = run_campaign(workspace, campaign, place / "run", workers=2, engine="fork")
+    summary = run_campaign(workspace, campaign, place / "run", workers=0 if is_toy else 2, engine="fork")
     assert summary.exit_code == 0 and summary.proof is not None
     return workspace, place / "run"
 
