@@ -113,28 +113,44 @@ def test_derived_files_can_be_made_again(
     assert results(out) == undisturbed
 
 
-# with less warning than both comes SIGKILL; that Ctrl-C ends well is tried on the command line
-GENTLE = [pytest.param(number, marks=pytest.mark.slow) for number in (signal.SIGTERM, signal.SIGINT)]
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, *GENTLE], ids=lambda s: s.name)
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda s: s.name)
 def test_killed_and_resumed(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
 ) -> None:
-    """A command killed half-way leaves no process behind; given again, it completes to the same bytes, and
-    leaves no registrations, also not those of killed workers."""
+    """A command killed half-way leaves no process behind; given again, it completes to the same bytes."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(4)
-    assert len(command.workers()) == 2
     if number is signal.SIGINT:  # as a terminal does it: everyone in the foreground gets it
         os.killpg(command.process.pid, number)
     else:
         command.process.send_signal(number)
     command.end()
-    if number is signal.SIGKILL:
-        assert len(list((out / "workers").iterdir())) == 2
     again = Command(toy, out, *pytest_words(out))
+    printed = again.end()
+    assert again.process.returncode == 0, printed
+    assert "12 of 12 experiments done" in printed
+    assert "12 now" not in printed
+    assert results(out) == undisturbed
+
+
+def test_killed_and_resumed_by_either_command(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """`mutator run` and pytest's campaign are the same thing: each resumes what the other was killed at, of
+    which no process lives on, and they come to the same bytes. The killed workers' registrations go, too."""
+    out = tmp_path / "run"
+    by_pytest = pytest_words(out)
+    for count, words in (
+        (4, by_pytest),
+        (8, ["-m", "mutator", "run", "small", "--out", str(out), "-n", "2"]),
+    ):
+        command = Command(toy, out, *words)
+        command.wait_for_records(count)
+        assert len(command.workers()) == 2
+        command.process.kill()
+        command.end()
+        assert len(list((out / "workers").iterdir())) == 2
+    again = Command(toy, out, *by_pytest)
     printed = again.end()
     assert again.process.returncode == 0, printed
     assert "12 of 12 experiments done" in printed
@@ -192,18 +208,6 @@ def test_a_worker_dies_with_its_command_from_its_first_moment(
         with suppress(ProcessLookupError):
             os.kill(started[0], signal.SIGKILL)
         command.end()
-
-
-def test_the_command_line_is_the_same_thing(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """`mutator run` gives the bytes of pytest's campaign, and each resumes what the other began."""
-    out = tmp_path / "run"
-    command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
-    command.wait_for_records(3)
-    command.process.kill()
-    command.end()
-    again = Command(toy, out, *pytest_words(out))
-    assert "12 of 12" in again.end()
-    assert results(out) == undisturbed
 
 
 def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
