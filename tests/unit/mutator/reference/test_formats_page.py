@@ -8,7 +8,6 @@ from mutator._common import caches
 
 CLONE = Path(__file__).parents[4]
 PAGE = (CLONE / "docs" / "reference" / "formats.md").read_text(encoding="utf-8")
-BEFORE, RESERVED = PAGE.split("\n## Reserved\n")
 SCHEMA = re.compile(r"([a-z][a-z_-]*/[1-9]\d*)")
 IN_CODE = re.compile(rf"""["']{SCHEMA.pattern}["']""")
 IN_PAGE = re.compile(rf"`{SCHEMA.pattern}`")
@@ -23,15 +22,12 @@ def in_code() -> set[str]:
 
 def test_every_schema_of_the_code_is_in_the_page() -> None:
     """A format that is stored or sent has a line that says who writes and reads it."""
-    assert {"run/1", "sim-record/1", "film-events/1"} <= in_code() <= set(IN_PAGE.findall(BEFORE))
+    assert {"run/1", "sim-record/1", "film-events/1"} <= in_code() <= set(IN_PAGE.findall(PAGE))
 
 
 def test_every_schema_in_the_page_is_in_the_code() -> None:
-    """The page names no format that is gone, and what it reserves is not in use."""
-    assert set(IN_PAGE.findall(BEFORE)) - in_code() == set()
-    reserved = set(re.findall(rf"^\| `{SCHEMA.pattern}` \|", RESERVED, re.MULTILINE))
-    assert {"chunk/1"} <= reserved
-    assert reserved & in_code() == set()
+    """The page names no format that is gone."""
+    assert set(IN_PAGE.findall(PAGE)) - in_code() == set()
 
 
 def test_every_module_in_the_page_exists() -> None:
@@ -52,4 +48,4 @@ def test_every_file_of_a_library_has_a_line() -> None:
     """Each YAML file that ships has a schema that the page knows."""
     files = [*(CLONE / "fault_library").rglob("*.yaml"), *(CLONE / "templates").glob("*.yaml")]
     heads = {re.search(rf"^schema: {SCHEMA.pattern}$", file.read_text(), re.MULTILINE) for file in files}
-    assert {found and found[1] for found in heads} <= set(IN_PAGE.findall(BEFORE))
+    assert {found and found[1] for found in heads} <= set(IN_PAGE.findall(PAGE))

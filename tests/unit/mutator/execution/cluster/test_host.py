@@ -1,0 +1,121 @@
+"""A worker's side of a run: pieces are run in a process of its own, which goes when nobody wants it."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import Choices
+from mutator.errors import MutatorError
+from mutator.execution.cluster.board import Board
+from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.host import Host, NotWanted
+from mutator.execution.cluster.pieces import Ending, Piece
+from mutator.execution.session import open_session
+from mutator.workspace import Workspace
+
+
+def children(host: Host) -> list[int]:
+    """The processes that run its pieces."""
+    words = str(host.folder).encode()
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if words in (told := path.read_bytes()) and b"cluster.child" in told:
+                found.append(int(path.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+@contextmanager
+def attended(host: Host) -> Iterator[threading.Event]:
+    """While it is attended; the event says that it is not wanted any more."""
+    unwanted = threading.Event()
+    thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
+    thread.start()
+    try:
+        yield unwanted
+    finally:
+        unwanted.set()
+        thread.join()
+
+
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory: pytest.TempPathFactory, copy_toycar: object) -> tuple[Bundle, Piece]:
+    """What a worker is sent of the toy's small campaign: the bundle and a piece of work."""
+    folder = tmp_path_factory.mktemp("sent")
+    toy: Workspace = copy_toycar(folder)  # type: ignore[operator]
+    with open_session(toy, "small", folder / "run", workers=2, choices=Choices(), engine="fork") as session:
+        session.prepare()
+        board = Board(session.folder, session.pending, ())
+        board.join("w", 1)
+        piece = board.take("w")
+        assert piece is not None
+        return Bundle.of(toy, session.folder, "fork"), piece
+
+
+@pytest.fixture
+def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
+    return Host.lay_out(sent[0].data, str(tmp_path / "place"), "alpha")
+
+
+def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """Two pieces are run by one process; once the host is not wanted, process and folder are gone."""
+    piece = sent[1]
+    with attended(host):
+        first = host.run(piece.packed(), lambda: True)
+        [child] = children(host)
+        second = host.run(piece.packed(), lambda: True)
+        assert children(host) == [child]
+    assert (first.ending, first.text, len(first.records)) == (Ending.DONE, "", len(piece.lines))
+    assert second.records == first.records
+    assert first.forked and first.patches and first.series and first.series_of == (piece.golden,)
+    assert children(host) == [] and not host.folder.exists()
+
+
+def test_a_process_that_dies_is_told_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """A killed process is no error of the host: the result says how it ended and at which experiment, and the
+    next piece has a new one."""
+    with attended(host):
+        killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
+        killer.start()
+        result = host.run(sent[1].packed(), lambda: True)
+        killer.join()
+        assert (result.ending, result.at) == (Ending.DIED, sent[1].ids[0])
+        assert "killed by SIGKILL" in result.text
+        assert host.run(sent[1].packed(), lambda: True).ending is Ending.DONE
+
+
+def _first(host: Host) -> int:
+    while not (found := children(host)):
+        time.sleep(0.01)
+    return found[0]
+
+
+def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """A piece that nobody waits for ends within a second, with its process."""
+    asked: list[float] = []
+
+    def wanted() -> bool:
+        asked.append(time.monotonic())
+        return len(asked) < 4
+
+    with attended(host):
+        with pytest.raises(NotWanted):
+            host.run(sent[1].packed(), wanted)
+        assert children(host) == []
+
+
+def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
+    """Of a bundle that arrived damaged nothing is laid out; a damaged piece is not begun."""
+    with pytest.raises(MutatorError, match="damaged parcel"):
+        Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
+    assert not [*(tmp_path / "other").iterdir()]
+    with pytest.raises(MutatorError, match="damaged parcel"):
+        host.run(sent[1].packed()[:-1], lambda: True)
