@@ -191,7 +191,7 @@ class Experiment:
         method = self.method.value
         return f"{self.scenario}, {method} {self.trigger.name.removeprefix(f'{method}/')}"
 
-    @property
+    @cached_property
     def changes(self) -> tuple[str, ...]:
         """All changes of the scenario, each once: the fault's own, then those of the setting."""
         return tuple(dict.fromkeys((*self.fault.changes, *self.setting)))

@@ -2,6 +2,7 @@
 
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
+      runs/<digest>.json   finished runs that were verified: what was found
       targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
 
 Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
@@ -15,14 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-CHECKS, TARGETS = "checks", "targets"
+CHECKS, RUNS, TARGETS = "checks", "runs", "targets"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """Something in the cache that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `target openpilot`. `size` is what it takes on the disk, in
+    `what` says whose it is: `checks`, `runs`, `target openpilot`. `size` is what it takes on the disk, in
     bytes, and `used` when it was last read or written, in seconds since the epoch.
     """
 
@@ -55,14 +56,20 @@ def of_checks() -> Path:
     return folder() / CHECKS
 
 
+def of_runs() -> Path:
+    """Where it is kept which runs were verified."""
+    return folder() / RUNS
+
+
 def of_target(name: str) -> Path:
     """Where the target of that name keeps what its runs share; any name is one folder there."""
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
 
 
 def entries() -> list[Entry]:
-    """All that is cached: each campaign's checks, and each file that a target keeps."""
+    """All that is cached: each campaign's checks, each verified run, and each file that a target keeps."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
+    found += [_entry(RUNS, path) for path in _children(of_runs())]
     for target in _children(folder() / TARGETS):
         found += [_entry(f"target {target.name}", path) for path in _files(target)]
     return sorted(found, key=lambda entry: (entry.what, entry.path))

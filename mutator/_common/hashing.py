@@ -27,6 +27,8 @@ def added(default: Any) -> Any:
 def added_values(record: Any) -> dict[str, Any]:
     """The `added` fields of a dataclass instance that differ from their defaults, as `plain` values."""
     _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable, says Python
+    if not later:
+        return {}
     values = ((name, getattr(record, name), default) for name, default in later)
     return {name: plain(value) for name, value, default in values if value != default}
 
@@ -47,8 +49,11 @@ def plain(value: Any) -> Any:
     if type(value) in _SCALARS:
         return value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        first, _ = _fields(type(value))
-        return {name: plain(getattr(value, name)) for name in first} | added_values(value)
+        found = {}
+        for name in _fields(type(value))[0]:
+            one = getattr(value, name)
+            found[name] = one if type(one) in _SCALARS else plain(one)
+        return found | added_values(value)
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

@@ -4,8 +4,9 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from mutator.model import Experiment, Record, Status
+from mutator.model import Experiment, Record
 from mutator.store import plan_file
+from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 
 
@@ -40,7 +41,7 @@ class Pending:
 def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
     """Every chunk of the folder's share that has experiments without a record, or with a harness error,
     which is tried again."""
-    done = {name for name, record in records.items() if record.status is not Status.HARNESS_ERROR}
+    done = {one.experiment_id for one in endings(records) if one.counts}
     names = plan_file.ids(folder.path) if done else None
     shard = folder.shard
     left: list[Pending] = []

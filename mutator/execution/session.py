@@ -27,13 +27,15 @@ from mutator.engines.kinds import REFERENCE
 from mutator.engines.reference import prepare_base
 from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWarning
+from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
-from mutator.model import Record, Status
+from mutator.model import Record
 from mutator.outcomes import results
 from mutator.outcomes.ranking import worth
 from mutator.outcomes.reader import Results
 from mutator.store import digests
 from mutator.store.progress import Progress, label
+from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import pack, segments
 from mutator.targets.requirements import check_requirements
@@ -111,12 +113,18 @@ class Session:
         self._began = time.monotonic()
         self._done_before = 0
         self._records: Mapping[str, Record] | None = None
+        self._known: Ended | None = None
 
     def prepare(self) -> None:
         """Find what is left to run; if anything is, pass the checks, lay out the pristine tree, and note the
         stretch of work that begins. MutatorError for other versions than before that are not accepted."""
+        self._known = ended_before(self.folder)
+        if self._known and are_there(self.folder):
+            self._done_before = self.folder.planned
+            return
+        self._known = None
         records = self.folder.records()
-        self._done_before = sum(r.status is not Status.HARNESS_ERROR for r in records.values())
+        self._done_before = sum(one.counts for one in endings(records))
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
             equivalence.begin(self.folder.path)
@@ -163,8 +171,12 @@ class Session:
     def finish(self) -> Summary:
         """Build the table from what there is now, and say what the run has come to."""
         self.notify(Progress(stage="tables"))
+        if self._known:
+            return self._finish_again(self._known)
         records = self.folder.records() if self._records is None else self._records
-        wrong = {r.experiment_id: r.detail for r in records.values() if r.status is Status.HARNESS_ERROR}
+        ends = Counter((one.status, one.outcome) for one in endings(records))
+        failed = (one.experiment_id for one in endings(records) if not one.counts)
+        wrong = {name: records[name].detail for name in failed}
         done = len(records) - len(wrong)
         built = None
         with self._noting_full_disk():
@@ -180,18 +192,45 @@ class Session:
         if done == self.folder.planned and (proven is None or proven.whole):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
+        outcomes = Counter[str]()
+        for (status, outcome), count in ends.items():
+            outcomes[label(status, outcome)] += count
+        seal = seal_of(self.folder)
+        if seal:
+            keep_end(self.folder, Ended(outcomes=outcomes, proof=proven, seal=seal))
         return Summary(
             planned=self.folder.planned,
             done=done,
             ran=done - self._done_before,
-            outcomes=Counter(label(r.status, r.outcome) for r in records.values()),
+            outcomes=outcomes,
             harness_errors=(*sorted(wrong.items()), *(proven.errors if proven else ())),
             problem=self.problem,
             interrupted=self.interrupted,
             results=built,
             proof=proven,
-            seal=seal_of(self.folder),
+            seal=seal,
             not_forked=not_forked,
+            elapsed_s=time.monotonic() - self._began,
+        )
+
+    def _finish_again(self, known: Ended) -> Summary:
+        """As `finish`, of a run that was finished before."""
+        built = None
+        with self._noting_full_disk():
+            built = results.ensure(self.folder.path)
+            self._pack_series()
+        return Summary(
+            planned=self.folder.planned,
+            done=self.folder.planned,
+            ran=0,
+            outcomes=known.outcomes,
+            harness_errors=(),
+            problem=self.problem,
+            interrupted=self.interrupted,
+            results=built,
+            proof=known.proof,
+            seal=known.seal,
+            not_forked="" if known.proof else self._not_forked,
             elapsed_s=time.monotonic() - self._began,
         )
 

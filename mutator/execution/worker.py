@@ -3,6 +3,7 @@
 import signal
 import socket
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from mutator.model import Experiment, Status
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
+from mutator.store.planned import Planned
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import SeriesWriter
@@ -59,7 +61,7 @@ class Worker:
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
         self._needs_proof: bool | None = None  # None: nothing that it ran itself says so
-        self._planned: dict[str, Experiment] = {}
+        self._planned: Mapping[str, Experiment] = {}
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
         self._head = {"schema": SCHEMA, "plan": plan}
@@ -93,7 +95,7 @@ class Worker:
         if self._prover is None or self._proofs is None:
             self._prover = self._make_runner(self._independent_engine())
             self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)
-            self._planned = {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
+            self._planned = Planned(self.folder.path)
         errors = []
         for finished in self._prover.run([self._planned[sample.id]]):
             self._proofs.append(line_of(finished.record))

@@ -26,7 +26,7 @@ from mutator.outcomes.paths import ways_of
 from mutator.outcomes.propagation import columns_of
 from mutator.outcomes.table_files import CsvTable, ParquetTable
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
 from mutator.store.digests import Digest
 from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
@@ -185,7 +185,8 @@ def _made_from(folder: RunFolder) -> str:
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
-    found = [(path.relative_to(run).as_posix(), Digest.of_file(path)) for path in files]
+    names = (path.relative_to(run).as_posix() for path in files)
+    found = list(zip(names, digests.of_files(files), strict=True))
     head = folder.head
     told = [head["hazards"], head["compared"], head.get("metrics", [])]
     told += [head[key] for key in ("severity", "channels", "structure") if key in head]
@@ -194,7 +195,8 @@ def _made_from(folder: RunFolder) -> str:
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
     """Digests of the tables as they are now; None of a missing one."""
-    found = {name: Digest.of_file(folder.path / name) for name in names(folder)}
+    known = names(folder)
+    found = dict(zip(known, digests.of_files([folder.path / name for name in known]), strict=True))
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 

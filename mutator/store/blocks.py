@@ -98,19 +98,29 @@ def as_block(kind: int, key: str, data: bytes) -> bytes:
 
 def read_blocks(path: Path) -> Blocks:
     """Verify the blocks of a file."""
-    data = path.read_bytes()
-    found: list[Block] = []
-    damaged, at = False, 0
+    found = list(_verified(path.read_bytes()))
+    blocks = tuple(block for block in found if block is not None)
+    return Blocks(path=path, blocks=blocks, damaged=len(blocks) < len(found))
+
+
+def intact_blocks(path: Path) -> Iterator[Block]:
+    """The blocks of a file that are as they were written, one at a time."""
+    yield from (block for block in _verified(path.read_bytes()) if block is not None)
+
+
+def _verified(data: bytes) -> Iterator[Block | None]:
+    """The blocks that are as they were written, and None for whatever is damaged."""
+    at = 0
     while at < len(data):
         block = _block_at(data, at)
         if block is not None:
-            found.append(block)
+            yield block
             at = block.offset + len(block.data)
             continue
         following = next(_intact(data, at + 1), None)
-        damaged |= following is not None or not _is_cut(data, at)
+        if following is not None or not _is_cut(data, at):
+            yield None
         at = len(data) if following is None else following
-    return Blocks(path=path, blocks=tuple(found), damaged=damaged)
 
 
 def _block_at(data: bytes, at: int) -> Block | None:

@@ -6,12 +6,14 @@ its new digest, and confirmed afterwards: a kill in between leaves a folder in w
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from mutator._common.cores import usable_cores
 from mutator._common.files import (
     is_no_file,
     json_bytes,
@@ -25,6 +27,7 @@ from mutator.errors import MutatorError
 from mutator.store.lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
+_WORTH_THREADS = 20_000_000  # bytes
 SEGMENTS = ("records", "proof")  # folders of append-only files; each file is entered once it is closed
 
 
@@ -59,6 +62,19 @@ class Digest:
     def is_of(self, found: "Digest | None") -> bool:
         """Whether a file that was found is still what it was."""
         return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
+
+
+def of_files(paths: Sequence[Path]) -> list[Digest | None]:
+    """Of each file; several at a time, as hashing leaves other threads alone."""
+    sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
+    if sum(sizes) < _WORTH_THREADS:
+        return [Digest.of_file(path) for path in paths]
+    largest_first = sorted(range(len(paths)), key=lambda at: -sizes[at])
+    with ThreadPoolExecutor(usable_cores()) as pool:
+        found = dict(
+            zip(largest_first, pool.map(lambda at: Digest.of_file(paths[at]), largest_first), strict=True)
+        )
+    return [found[at] for at in range(len(paths))]
 
 
 class DigestingFile:

@@ -86,6 +86,10 @@ class IndexedLines(Mapping[str, T], Generic[T]):
     def __len__(self) -> int:
         return len(self._index)
 
+    def problem(self, line: "Line") -> MutatorError:
+        """What is said of a line that is not what it should be."""
+        return self._problem(line.path, line.number)
+
     def _problem(self, path: Path, number: int) -> MutatorError:
         return bare_segment(path, checksums=self._checksums).problem(number)
 

@@ -4,19 +4,19 @@ Files are compared with `digests.json`, lines with their checksums, the records 
 earlier schema has neither digests nor checksums; of it only the ids are checked.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from mutator._common.files import is_half_written
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
-from mutator.model import Status
-from mutator.store import digests, plan_file
+from mutator.store import digests, plan_file, verified_runs
 from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import Segment, read_segment
+from mutator.store.lines import Segment, bare_segment, intact_lines, read_segment
 from mutator.store.patches import Patches
-from mutator.store.records import SCHEMA, second_record
+from mutator.store.records import SCHEMA, ending_on, second_record
 from mutator.store.run_head import CAMPAIGN, HEAD, Head
 from mutator.store.shards import Shard
 
@@ -26,25 +26,67 @@ TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
 _MANY = 5  # experiments that one message names
 
 
-def problems(run: Path, head: Head, ledger: Ledger | None, shard: Shard | None) -> Iterator[MutatorError]:
-    """All that is wrong in a run folder, of which `shard` is run in it."""
+def problems(
+    run: Path, head: Head, ledger: Ledger | None, shard: Shard | None, *, anew: bool = False
+) -> Iterator[MutatorError]:
+    """All that is wrong in a run folder, of which `shard` is run in it.
+
+    Of a finished run whose very bytes this machine has verified before, only these bytes are compared, unless
+    that is to be done `anew`.
+    """
+    key = ""
     if ledger is not None:
-        yield from file_problems(run, ledger)
-        yield from _open_segments(run, ledger)
+        found = digests_of(run, ledger)
+        wrong = [*file_problems(run, ledger, found), *_open_segments(run, ledger)]
+        yield from wrong
         if ledger.finished:
-            for path in strangers(run, ledger):
-                yield MutatorError(
+            others = [
+                MutatorError(
                     f"not named in {digests.FILE}",
                     where=path,
                     expected="only what the finished run wrote",
                     remedy=_remedy(run, ""),
                 )
+                for path in strangers(run, ledger)
+            ]
+            yield from others
+            wrong += others
+            key = "" if wrong or ledger.rewriting else key_of(run, found)
+    if key and not anew and verified_runs.recall(key).get("verified"):
+        return
     try:
         planned = share(run, head, shard)
     except MutatorError as err:
         yield err
         return
-    yield from id_problems(run, head, ledger, planned)
+    none_yet = True
+    for problem in id_problems(run, head, ledger, planned):
+        none_yet = False
+        yield problem
+    if key and none_yet:
+        verified_runs.remember(key, verified=True)
+
+
+def content_key(run: Path) -> str:
+    """What stands for all that counts in a finished run folder (`verified_runs`); empty where it is not
+    finished, or not as its digests say."""
+    ledger = digests.read(run)
+    found = digests_of(run, ledger)
+    settled = ledger.finished and not ledger.rewriting
+    return key_of(run, found) if settled and not any(file_problems(run, ledger, found)) else ""
+
+
+def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
+    """Of all files that count, by their names in the run folder."""
+    names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
+    return dict(zip(names, digests.of_files([run / name for name in names]), strict=True))
+
+
+def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
+    """`verified_runs.key_of` of these files, and of what says which must be there."""
+    ledger = Digest.of_file(run / digests.FILE)
+    told = {**found, digests.FILE: ledger}
+    return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
 
 
 def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
@@ -73,10 +115,12 @@ def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
     return {name: place for name, place in places.items() if ours[place]}
 
 
-def file_problems(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
+def file_problems(
+    run: Path, ledger: Ledger, digests_found: Mapping[str, Digest | None]
+) -> Iterator[MutatorError]:
     """Files that are missing, or have other bytes than were written."""
     for name in ledger.names:
-        found = Digest.of_file(run / name)
+        found = digests_found[name]
         if ledger.accepts(name, found):
             continue
         if found is None:
@@ -148,16 +192,25 @@ def id_problems(
 ) -> Iterator[MutatorError]:
     """Records of experiments that are not planned here, two of one experiment, and missing ones."""
     patches = Patches(run) if ledger is not None else None
+    stored = dict(patches.digests()) if patches is not None else {}
     for kind in digests.SEGMENTS:
         done: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
+            segment = bare_segment(path, checksums=ledger is not None)
+            lines = intact_lines(path, checksums=segment.checksums)
             try:
-                segment = read_segment(path, checksums=ledger is not None)
+                yield from _head_problem(segment, lines, head["plan"])
+                for number, name, patch, content in _counted(segment, lines, planned):
+                    if isinstance(name, MutatorError):
+                        yield name
+                        continue
+                    if patches is not None and kind == "records" and stored.get(name, "") != patch:
+                        yield from patch_problems(patches, name, patch, path.stem)
+                    if name in done:
+                        yield second_record(path, number, name, same=done[name] == content)
+                    done[name] = content
             except MutatorError as err:
                 yield err
-                continue
-            yield from _head_problem(segment, head["plan"])
-            yield from _id_problems(segment, planned, done, patches if kind == "records" else None)
         missing = [name for name in planned if name not in done]
         if ledger is not None and ledger.finished and kind == "records" and missing:
             more = f" and {len(missing) - _MANY} more" if len(missing) > _MANY else ""
@@ -169,11 +222,18 @@ def id_problems(
             )
 
 
-def _head_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
+_Lines = Iterator[tuple[int, bytes]]  # number from 1, and bytes
+
+
+def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[MutatorError]:
     """A segment of another run, or in another's place."""
+    number, line = next(lines, (0, b""))
+    if number != 1:
+        return
+    told = replace(segment, lines={1: line})
     try:
-        segment.check_head(SCHEMA)
-        if 1 in segment.lines and (found := segment.content(1).get("plan")) != plan:
+        told.check_head(SCHEMA)
+        if (found := told.content(1).get("plan")) != plan:
             yield MutatorError(
                 f"records of plan {str(found)[:16]}",
                 where=segment.path,
@@ -185,36 +245,28 @@ def _head_problem(segment: Segment, plan: str) -> Iterator[MutatorError]:
         yield err
 
 
-def _id_problems(
-    segment: Segment, planned: Collection[str], done: dict[str, int], patches: Patches | None
-) -> Iterator[MutatorError]:
-    """Those of one segment, with those of the `patches` that its records name, if any. `done` is what
-    the segments before it had, and is added to."""
-    for number in segment.lines:
-        if number == 1:
-            continue
+def _counted(
+    segment: Segment, lines: _Lines, planned: Collection[str]
+) -> Iterator[tuple[int, str | MutatorError, str, int]]:
+    """Of each record of a segment that counts its line, experiment and patch, and a hash of it; what is wrong
+    with a line in the place of the experiment."""
+    for number, line in lines:
         try:
-            data = segment.content(number)
-            name, status = str(data["experiment_id"]), data["status"]
-        except (MutatorError, KeyError):
-            yield segment.problem(number)
+            ending = ending_on(line)
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+            yield number, segment.problem(number), "", 0
             continue
-        if name not in planned:
-            yield MutatorError(
-                f"a record of {name}, which is not planned for this run",
+        if ending.experiment_id not in planned:
+            problem = MutatorError(
+                f"a record of {ending.experiment_id}, which is not planned for this run",
                 where=segment.path,
                 line=number,
                 expected=f"experiments of {plan_file.EXPERIMENTS}, those of this shard",
                 remedy=_remedy(segment.path.parent.parent, ""),
             )
-        elif status != Status.HARNESS_ERROR.value:
-            if patches is not None:
-                known = str(data.get("patch", ""))
-                yield from patch_problems(patches, name, known, segment.path.stem)
-            content = hash(segment.body(number))
-            if name in done:
-                yield second_record(segment.path, number, name, same=done[name] == content)
-            done[name] = content
+            yield number, problem, "", 0
+        elif ending.counts:
+            yield number, ending.experiment_id, ending.patch, hash(segment.body_of(line))
 
 
 def patch_problems(

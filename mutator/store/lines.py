@@ -123,7 +123,11 @@ class Segment:
 
     def body(self, number: int) -> bytes:
         """A line without its checksum: the same in every file that it is in."""
-        return self.lines[number][_BODY if self.checksums else 0 :]
+        return self.body_of(self.lines[number])
+
+    def body_of(self, line: bytes) -> bytes:
+        """As `body`."""
+        return line[_BODY if self.checksums else 0 :]
 
     def check_head(self, schema: str) -> None:
         """MutatorError for a file of another schema, or one that was written under another name."""
@@ -189,6 +193,18 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
                 yield number, offset, data
             last = line[_SUM]
             offset += len(line)
+
+
+def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
+    """Number and bytes of each whole line that is as it was written, one at a time. MutatorError where there
+    is no file."""
+    last = b""
+    with _no_pipe(path).open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            data = line[:-1]
+            if line.endswith(b"\n") and (not checksums or _is_intact(last, data)):
+                yield number, data
+            last = line[_SUM]
 
 
 def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None, *, checksums: bool) -> Segment:

@@ -11,7 +11,8 @@ from functools import cached_property
 from pathlib import Path
 
 from mutator._common.files import write_atomic
-from mutator.store.blocks import Block, BlockWriter, as_block, read_blocks
+from mutator._common.hashing import digest
+from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
 
 FOLDER, SUFFIX = "patches", ".blocks"
 WHOLE, BESIDE = 0, 1  # kinds of blocks: a patch by itself, or beside the last whole one before it
@@ -88,6 +89,17 @@ class _Place:
     whole: _Whole | None
 
 
+def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
+    """The patch of a block; None where the whole patch that it is beside is lost."""
+    try:
+        if block.kind == WHOLE or whole is None:
+            return whole.data if whole is not None and block.kind == WHOLE else zlib.decompress(block.data)
+        packer = zlib.decompressobj(zdict=whole.data[-_WINDOW:])
+        return packer.decompress(block.data) + packer.flush()
+    except zlib.error:
+        return None
+
+
 class Patches:
     """Reads the patches of the run folder at `run`."""
 
@@ -105,13 +117,17 @@ class Patches:
         if place is None:
             path = self.old_file(experiment_id)
             return path.read_bytes() if path.is_file() else None
-        try:
-            if place.block.kind == WHOLE or place.whole is None:
-                return zlib.decompress(place.block.data)
-            packer = zlib.decompressobj(zdict=place.whole.data[-_WINDOW:])
-            return packer.decompress(place.block.data) + packer.flush()
-        except zlib.error:  # the whole patch is lost
-            return None
+        return _unpacked(place.block, place.whole)
+
+    def digests(self) -> Iterator[tuple[str, str]]:
+        """Each experiment that a patch is packed of, and the SHA-256 of the patch, empty for a damaged one; a
+        newer one comes later. They are unpacked one at a time."""
+        for path in filter(Path.is_file, self.files()):
+            whole: _Whole | None = None
+            for block in intact_blocks(path):
+                whole = _Whole(block) if block.kind == WHOLE else whole
+                data = _unpacked(block, whole)
+                yield block.key, "" if data is None else digest(data)
 
     def file(self, experiment_id: str, worker: str = "") -> Path:
         """The file that has it, or that would have it if it were there: a damaged one, else that of the

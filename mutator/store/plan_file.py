@@ -1,6 +1,7 @@
 """The frozen plan on disk: one line per experiment, read whole or one chunk at a time."""
 
 import json
+import re
 from bisect import bisect_right
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
@@ -31,6 +32,7 @@ EXPERIMENTS = "plan/experiments.jsonl"
 FAULTS = "plan/faults.jsonl"
 _REMEDY = "the plan is damaged: take the file from a copy of the run folder, or plan into a new one"
 
+_ID = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?"fault":"[0-9a-f]{16}","id":"([0-9a-f]{16})",')
 _HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")  # as Experiment.id
 _FIELDS = {"id", *_HASHED}
 
@@ -203,7 +205,12 @@ def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fau
 def ids(run: Path) -> Iterator[str]:
     """Every experiment's id, in the plan's order."""
     path = run / EXPERIMENTS
-    return _read(path, _lines(path), lambda data: str(data["id"]))
+    for number, line in _lines(path):
+        found = _ID.match(line)
+        if found and line.count(b'"id":') == 1:  # as it is written, and no other id follows
+            yield found[1].decode()
+        else:
+            yield from _read(path, [(number, line)], lambda data: str(data["id"]))
 
 
 def problems(run: Path) -> Iterator[MutatorError]:

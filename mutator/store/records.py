@@ -1,9 +1,11 @@
 """Records on disk: appended by workers, one file each, read back whatever a kill left behind."""
 
-from collections.abc import Mapping
+import json
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
@@ -47,6 +49,54 @@ def record_from(data: Mapping[str, Any]) -> Record:
 
 def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
     return tuple([(name, value) for name, value in items])  # a list: faster than a generator
+
+
+class Ending(NamedTuple):
+    """How an experiment ended: what is looked for in a record most often."""
+
+    experiment_id: str
+    status: str
+    outcome: str | None
+    patch: str
+
+    @property
+    def counts(self) -> bool:
+        """Whether the experiment is done: a harness error is tried again."""
+        return self.status != Status.HARNESS_ERROR.value
+
+
+# as canonical JSON has it; within a text the quotation marks would be escaped
+_NAME, _OUTCOME = b'"experiment_id":"', b'"outcome":'
+_END = re.compile(rb'"outcome":(?:null|"([a-z_]+)"),"patch":"([0-9a-f]*)","status":"([a-z_]+)"')
+_ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
+
+
+def ending_on(line: bytes) -> Ending:
+    """The ending that a record's line tells, a tenth of the time that the record takes. ValueError and others
+    as of `json.loads` and of missing keys, for a line that is none."""
+    begin = line.find(_NAME) + len(_NAME)
+    found = _END.match(line, line.find(_OUTCOME))
+    if begin >= len(_NAME) and found and all(line.count(key) == 1 for key in _ONCE):
+        outcome = found[1].decode() if found[1] else None
+        return Ending(
+            line[begin : line.index(b'"', begin)].decode(), found[3].decode(), outcome, found[2].decode()
+        )
+    data = json.loads(line)
+    return Ending(str(data["experiment_id"]), data["status"], data.get("outcome"), str(data.get("patch", "")))
+
+
+def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
+    """How each experiment ended."""
+    for name in records:
+        if isinstance(records, IndexedLines):
+            line = records.line(name)
+            try:
+                yield ending_on(line.data)
+            except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+                raise records.problem(line) from None
+        else:
+            one = records[name]
+            yield Ending(name, one.status.value, one.outcome.value if one.outcome else None, one.patch)
 
 
 def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:

@@ -138,8 +138,9 @@ class RunFolder:
         """Whether there is a run folder at `path`."""
         return (path / HEAD).is_file()
 
-    def problems(self) -> list[MutatorError]:
-        """All that is not as it was written; a folder of an earlier schema cannot tell all."""
+    def problems(self, *, anew: bool = False) -> list[MutatorError]:
+        """All that is not as it was written; a folder of an earlier schema cannot tell all. With `anew` it
+        does not matter what was verified before (`verified_runs`)."""
         if not self.verifiable:
             stray = (self.path / digests.FILE).exists()
             downgraded = MutatorError(
@@ -152,7 +153,7 @@ class RunFolder:
                 ledger = digests.read(self.path)
             except MutatorError as err:
                 return [err]
-            found = list(integrity.problems(self.path, self.head, ledger, self.shard))
+            found = list(integrity.problems(self.path, self.head, ledger, self.shard, anew=anew))
             if not found or digests.read(self.path) == ledger:
                 break
         return found

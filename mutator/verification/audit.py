@@ -104,7 +104,7 @@ def _files(folder: RunFolder) -> int:
 def _content(folder: RunFolder) -> Problems:
     if not folder.verifiable:
         yield MutatorError(not_verifiable(folder), where=folder.path / HEAD, expected="a run of this version")
-    yield from folder.problems()
+    yield from folder.problems(anew=True)
     for path in filter(Path.is_file, folder.patches.files()):
         if read_blocks(path).damaged:
             yield MutatorError(

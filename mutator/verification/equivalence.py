@@ -9,6 +9,8 @@ run folder, as records. Where no experiment was forked after all there is nothin
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import groupby
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
@@ -18,6 +20,7 @@ from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
 from mutator.store import digests, plan_file
+from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 
 FOLDER = "proof"
@@ -68,6 +71,25 @@ def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ..
     return tuple(chosen)
 
 
+def _sample_of(folder: RunFolder) -> set[str]:
+    """Ids of the sample of a whole plan. Of several seeds each has its own part, one in a hundred; those of
+    the first are chosen as those of a campaign with one seed."""
+    return set(_sampled_ids(folder.path, folder.head["plan"], len(folder.seeds)))
+
+
+@lru_cache(maxsize=4)  # a session asks several times, and the plan is frozen
+def _sampled_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
+    if seeds == 1:
+        head = RunFolder.unverified(run).head
+        return tuple(e.id for e in sample(plan_file.read_all(run), head["seed"]))
+    found: list[str] = []
+    for seed, group in groupby(plan_file.iterate(run), key=lambda experiment: experiment.seed):
+        some = tuple(group)
+        more = pick(some, -(-len(some) // _SHARE), seed) if found else sample(some, seed)
+        found += [experiment.id for experiment in more]
+    return tuple(found)
+
+
 def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
     yield (experiment.fault.module, experiment.fault.fault_type)
     yield (experiment.scenario,)
@@ -80,12 +102,13 @@ def needless(folder: RunFolder) -> str | None:
     """
     if folder.shard is not None:
         return None
-    told, records = folder.timings(), folder.records()
+    told = folder.timings()
+    done = {one.experiment_id for one in endings(folder.records()) if one.counts}
     reasons = Counter[str]()
     for name in folder.share():
-        record, line = records.get(name), told.get(name, {})
-        if record is None or not _counts(record):  # it is still to be run: what is told is of before
+        if name not in done:  # it is still to be run: what is told is of before
             return None
+        line = told.get(name, {})
         if line.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
             return None
         reasons[str(line.get("why", ""))] += 1
@@ -113,7 +136,7 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
 
 def sampled(folder: RunFolder) -> list[str]:
     """Ids of the sample that are of this folder's share, in the plan's order."""
-    wanted = {experiment.id for experiment in sample(plan_file.read_all(folder.path), folder.head["seed"])}
+    wanted = _sample_of(folder)
     return [name for name in folder.share() if name in wanted]
 
 

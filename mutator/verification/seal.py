@@ -10,11 +10,11 @@ from typing import Any
 
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
-from mutator.model import Status
 from mutator.store import digests
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.lines import read_segment
+from mutator.store.lines import bare_segment, intact_lines
+from mutator.store.records import ending_on
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "seal/1"
@@ -78,9 +78,8 @@ def _records(folder: RunFolder, kind: str) -> dict[str, str]:
     """Digest of each record that counts, by experiment id: of its line, without the checksum."""
     found = {}
     for path in sorted((folder.path / kind).glob("*.jsonl")):
-        segment = read_segment(path)
-        for number in segment.lines:
-            data = segment.content(number)
-            if number > 1 and data["status"] != Status.HARNESS_ERROR.value:
-                found[str(data["experiment_id"])] = digest(segment.body(number))
+        segment = bare_segment(path, checksums=True)
+        for number, line in intact_lines(path, checksums=True):
+            if number > 1 and (ending := ending_on(line)).counts:
+                found[ending.experiment_id] = digest(segment.body_of(line))
     return found

@@ -216,8 +216,8 @@ def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: 
     """Who opens a folder while its owner rewrites a file sees the old or the new one, never damage."""
     real, seen = integrity.problems, []
 
-    def look(*arguments: object) -> list[MutatorError]:
-        found = list(real(*arguments))  # type: ignore[arg-type]
+    def look(*arguments: object, **more: object) -> list[MutatorError]:
+        found = list(real(*arguments, **more))  # type: ignore[arg-type]
         if not seen:
             seen.append("the owner was faster")
             digests.rewrite(run, "plan.csv", b"other")

@@ -1,0 +1,42 @@
+"""What a finished run came to, known again without a look at its million records."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+from mutator.store import integrity, verified_runs
+from mutator.store.run_folder import RunFolder
+from mutator.verification.equivalence import Proof
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ended:
+    """What every session of a finished run says at its end."""
+
+    outcomes: Counter[str]
+    proof: Proof | None
+    seal: str
+
+
+def keep_end(folder: RunFolder, ended: Ended) -> None:
+    """Keep for the next time what a finished run came to."""
+    if key := integrity.content_key(folder.path):
+        proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
+        told = {"outcomes": dict(ended.outcomes), "proof": proof, "seal": ended.seal}
+        verified_runs.remember(key, ended=told)
+
+
+def ended_before(folder: RunFolder) -> Ended | None:
+    """What a finished run came to, where this machine has seen it end with these very bytes, and verified
+    them; else None."""
+    if not folder.finished or not (key := integrity.content_key(folder.path)):
+        return None
+    known = verified_runs.recall(key)
+    if not known.get("verified") or "ended" not in known:
+        return None
+    told = known["ended"]
+    proof = told["proof"]
+    return Ended(
+        outcomes=Counter(told["outcomes"]),
+        proof=Proof(sampled=proof["sampled"], same=proof["same"]) if proof else None,
+        seal=told["seal"],
+    )

@@ -1,0 +1,61 @@
+"""Finished runs that this machine has verified: what it found is kept in the cache, to be found by bytes.
+
+An entry's name is a digest of the SHA-256 of every file that counts, and of the version that looked at them.
+It vouches for no other byte, whoever changed it and whatever digests were computed anew: such a run is
+verified as if it had never been seen. An unwritable or damaged cache is ignored.
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mutator._common import caches
+from mutator._common.files import json_bytes, no_pipe, write_atomic
+from mutator._common.hashing import digest
+from mutator._common.version import VERSION
+from mutator.errors import MutatorError
+
+_SCHEMA = "verified/1"
+_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # that count, and that the ledger does not name
+Digests = Mapping[str, str | None]  # SHA-256 by name
+
+
+def other_files(run: Path) -> list[str]:
+    """The names of the files that count beside those of the ledger."""
+    paths = (path for pattern in _OTHER_FILES for path in run.glob(pattern))
+    return sorted(path.relative_to(run).as_posix() for path in paths)
+
+
+def key_of(found: Digests) -> str:
+    """What stands for a run with these files."""
+    return digest([_SCHEMA, VERSION, sorted(found.items())])
+
+
+def recall(key: str) -> dict[str, Any]:
+    """What is known of a run; nothing of one that was never seen."""
+    path = _path(key)
+    try:
+        data = json.loads(no_pipe(path).read_bytes())
+        if data.pop("sum") == digest([key, data]):
+            os.utime(path)  # used now
+            return dict(data)
+    except (OSError, MutatorError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    return {}
+
+
+def remember(key: str, **facts: Any) -> None:
+    """Add to what is known of a run."""
+    data = recall(key) | facts
+    path = _path(key)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, json_bytes({"sum": digest([key, data]), **data}))
+    except (OSError, MutatorError):
+        return
+
+
+def _path(key: str) -> Path:
+    return caches.of_runs() / f"{key}.json"

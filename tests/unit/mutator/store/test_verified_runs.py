@@ -1,0 +1,111 @@
+"""Finished runs that were verified on this machine are verified by their bytes."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.execution.ended_runs import ended_before
+from mutator.execution.running import run_campaign
+from mutator.store import digests, integrity, verified_runs
+from mutator.store.patches import Patches
+from mutator.store.patches import rewrite as rewrite_patches
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+@pytest.fixture(scope="module")
+def made(
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
+) -> tuple[Workspace, Path]:
+    """A finished campaign of two seeds."""
+    place = tmp_path_factory.mktemp("seeds")
+    workspace = copy_toycar(place)
+    path = workspace.campaign("small")
+    path.write_text(path.read_text().replace("\nseed: 3\n", "\nseeds: {from: 3, to: 4}\nsample: 4\n"))
+    assert run_campaign(workspace, "small", place / "run", engine="fork").exit_code == 0
+    return workspace, place / "run"
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, Path], tmp_path: Path) -> None:
+    """Each record is the one that the seed alone has, and the run can be proved."""
+    workspace, run = made
+    several = RunFolder.open(run)
+    path = workspace.campaign("small")
+    for seed in (3, 4):
+        alone = tmp_path / f"{seed}.yaml"
+        alone.write_text(path.read_text().replace("seeds: {from: 3, to: 4}", f"seed: {seed}"))
+        run_campaign(workspace, alone, tmp_path / str(seed), engine="reference")
+        records = RunFolder.open(tmp_path / str(seed)).records()
+        assert len(records) == 4
+        assert all(several.records()[name] == records[name] for name in records)
+    assert several.finished
+
+
+def test_a_known_run_is_not_looked_into_again(
+    made: tuple[Workspace, Path], cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second time its bytes are compared, and the summary is the same; an audit looks at all of it."""
+    workspace, run = made
+    first = run_campaign(workspace, "small", run)
+    assert ended_before(RunFolder.open(run)) is not None
+
+    def look(*arguments: object) -> None:
+        raise AssertionError("looked into")
+
+    monkeypatch.setattr(integrity, "id_problems", look)
+    again = run_campaign(workspace, "small", run)
+    for name in ("planned", "done", "ran", "outcomes", "proof", "seal", "results", "harness_errors"):
+        assert getattr(again, name) == getattr(first, name), name
+    with pytest.raises(AssertionError, match="looked into"):
+        RunFolder.open(run).problems(anew=True)
+
+
+def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path) -> None:
+    """A patch that is another one than was run is found, though the folder was verified before; so is any
+    change where all digests were computed anew, as this is another run then."""
+    run = made[1]
+    RunFolder.open(run)
+    patches = Patches(run)
+    [path] = patches.files()
+    before, kept = path.read_bytes(), {name: patches.read(name) or b"" for name in patches}
+    try:
+        name = next(iter(kept))
+        rewrite_patches(path, [*(kept | {name: kept[name] + b"\n"}).items()])
+        with pytest.raises(MutatorError, match=f"another patch of {name}"):
+            RunFolder.open(run)
+    finally:
+        path.write_bytes(before)
+    RunFolder.open(run)
+
+
+def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache: Path) -> None:
+    """What somebody wrote into the cache by hand is ignored."""
+    run = made[1]
+    RunFolder.open(run)
+    key = integrity.content_key(run)
+    assert verified_runs.recall(key) == {"verified": True}
+    [entry] = (cache / "mutator" / "runs").iterdir()
+    entry.write_text(json.dumps(json.loads(entry.read_text()) | {"ended": {}}))
+    assert verified_runs.recall(key) == {}
+    entry.write_text("[]")
+    assert verified_runs.recall(key) == {}
+
+
+def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Path) -> None:
+    """Nothing of it is known beforehand."""
+    run = made[1]
+    ledger = digests.read(run)
+    try:
+        digests.write(run, digests.Ledger(files=ledger.files))
+        assert integrity.content_key(run) == ""
+    finally:
+        digests.write(run, ledger)
