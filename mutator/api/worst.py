@@ -5,22 +5,26 @@ from pathlib import Path
 
 from mutator.campaigns.filters import compile_filter
 from mutator.outcomes.columns import is_text
-from mutator.outcomes.ranking import worst
+from mutator.outcomes.ranking import places
 from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row, row_from
+from mutator.outcomes.rows import Row, lines_of, row_from
+
+_BATCH = 10_000  # rows that are filtered at a time
 
 
-def worst_results(run: Path, only: str | None = None) -> list[Row]:
-    """The rows of a run folder, the worst first; of those for which the filter `only` over the columns of its
-    results holds (`severity >= "S2" and not alerts`). The table is brought up to date first; MutatorError for
-    a filter that does not fit it."""
-    lines = list(Results.up_to_date(run).lines())
-    rows = worst(map(row_from, lines))  # of all: those that are left keep their order
-    if only is None:
-        return rows
-    accepts = compile_filter(only, list(lines[0]) if lines else [])
-    accepted = {line["experiment_id"] for line in lines if accepts(_typed(line))}
-    return [row for row in rows if row.experiment_id in accepted]
+def worst_results(run: Path, only: str | None = None, limit: int | None = None) -> tuple[list[Row], int]:
+    """The rows of a run folder, the worst first, at most `limit`; of those for which the filter `only` over
+    the columns of its results holds (`severity >= "S2" and not alerts`), and how many these are. The table is
+    brought up to date first; MutatorError for a filter that does not fit it."""
+    texts = Results.up_to_date(run).texts()
+    order = places(texts).argsort().tolist()  # of all: those that are left keep their order
+    if only is not None:
+        accepts = compile_filter(only, list(texts.columns))
+        batches = range(0, len(texts), _BATCH)
+        lines = (line for first in batches for line in lines_of(texts.iloc[first : first + _BATCH]))
+        fits = [accepts(_typed(line)) for line in lines]
+        order = [row for row in order if fits[row]]
+    return [row_from(line) for line in lines_of(texts.iloc[order[:limit]])], len(order)
 
 
 def _typed(line: Mapping[str, str]) -> dict[str, object]:

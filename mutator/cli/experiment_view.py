@@ -35,16 +35,14 @@ def list_worst(
 ) -> None:
     """The worst results of `run`, or of the newest run, as a table, those that the filter accepts."""
     folder = run or newest_run(workspace.library.parent)
-    found = worst_results(load_run(folder).path, only)
-    rows = [_line(row) for row in found[:limit]]
+    found, count = worst_results(load_run(folder).path, only, limit)
+    rows = [_line(row) for row in found]
     if terminal.as_json:
-        terminal.emit({"run": str(folder), "count": len(found), "worst": rows})
+        terminal.emit({"run": str(folder), "count": count, "worst": rows})
         return
     heads = tuple(rows[0]) if rows else ()
     terminal.table(heads, [tuple(row.values()) for row in rows], right=(3, 5))
-    terminal.say(
-        f"{len(rows)} of {counted(len(found), 'experiment')} in {short_path(folder)}, the worst first"
-    )
+    terminal.say(f"{len(rows)} of {counted(count, 'experiment')} in {short_path(folder)}, the worst first")
 
 
 def _line(row: "Row") -> dict[str, object]:

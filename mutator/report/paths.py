@@ -27,9 +27,10 @@ class _PathsById(Mapping[str, Path]):
         self._last: tuple[str, Path | None] | None = None  # the one that was made last
 
     def __getitem__(self, name: str) -> Path:
-        if self._last is None or self._last[0] != name:
-            self._last = name, self._ways.path(self._planned[name], self._records[name])
-        path = self._last[1]
+        last = self._last
+        if last is None or last[0] != name:
+            self._last = last = name, self._ways.path(self._planned[name], self._records[name])
+        path = last[1]
         if path is None:
             raise KeyError(name)
         return path

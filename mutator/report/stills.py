@@ -9,10 +9,10 @@ from pathlib import Path
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
-from mutator.outcomes.ranking import worst
+from mutator.outcomes.ranking import places
 from mutator.outcomes.reader import Results
 from mutator.report.film import Filming, Shot
-from mutator.store import plan_file
+from mutator.store.planned import Planned
 from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.workspace import Workspace
@@ -32,7 +32,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
     manifest = workspace.manifest(folder.head["target"])
     if manifest.film is None or not manifest.film.pictures:
         return ""
-    experiments = {e.id: e for e in plan_file.read_all(folder.path)}
+    experiments = Planned(folder.path)
     records = folder.records()
     due = _due(folder, manifest.film.pictures, experiments, records)
     if not due:
@@ -81,12 +81,11 @@ def _due(
     """The pictures that are not there yet, by experiment, the worst first: at the activation, the first alert
     and the first hazard of the worst experiments that see `pictures`."""
     seeing = set(pictures)
-    rows = (row for row in worst(Results.of_run(folder.path).rows()) if row.status is Status.OK)
-    wanted = (
-        row.experiment_id
-        for row in rows
-        if row.t_manifest is not None and seeing & set(experiments[row.experiment_id].changes)
-    )
+    texts = Results.of_run(folder.path).texts()
+    moved = ((texts["status"] == Status.OK.value) & (texts["t_manifest"] != "")).to_numpy()
+    order = [row for row in places(texts).argsort() if moved[row]]
+    ids = (str(texts["experiment_id"].iloc[row]) for row in order)
+    wanted = (name for name in ids if seeing & set(experiments[name].changes))
     chosen = islice(wanted, min(MOST, folder.planned // ONE_IN))
     due = {name: _missing(folder, name, records[name]) for name in chosen}
     return {name: shots for name, shots in due.items() if shots}

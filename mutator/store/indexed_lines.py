@@ -9,6 +9,7 @@ import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from threading import Lock
 from typing import Any, Generic, TypeVar
 
 from mutator.errors import MutatorError
@@ -66,9 +67,10 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return Line(self._files.paths[file], self._number[at], data)
 
     def __getitem__(self, name: str) -> T:
-        if self._last is None or self._last[0] != name:
-            self._last = name, self._read_one(name)
-        return self._last[1]
+        last = self._last  # threads may ask for others meanwhile
+        if last is None or last[0] != name:
+            self._last = last = name, self._read_one(name)
+        return last[1]
 
     def _read_one(self, name: str) -> T:
         line = self.line(name)
@@ -125,13 +127,15 @@ class Files:
     def __init__(self, paths: list[Path]) -> None:
         self.paths = paths
         self._open: dict[int, int] = {}
+        self._lock = Lock()
 
     def read(self, file: int, offset: int, length: int) -> bytes:
-        if file not in self._open:
-            if len(self._open) >= _OPEN:
-                os.close(self._open.pop(next(iter(self._open))))
-            self._open[file] = os.open(self.paths[file], os.O_RDONLY | os.O_CLOEXEC)
-        return os.pread(self._open[file], length, offset)
+        with self._lock:  # no thread closes a file that another one reads
+            if file not in self._open:
+                if len(self._open) >= _OPEN:
+                    os.close(self._open.pop(next(iter(self._open))))
+                self._open[file] = os.open(self.paths[file], os.O_RDONLY | os.O_CLOEXEC)
+            return os.pread(self._open[file], length, offset)
 
     def __del__(self) -> None:
         for opened in self._open.values():

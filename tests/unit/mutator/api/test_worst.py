@@ -1,0 +1,35 @@
+"""The worst results of a run: chosen by a filter, in the order of all, a few of them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.api import worst as module
+from mutator.api.worst import worst_results
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.model import Outcome, Record
+from mutator.store.lines import written
+from mutator.store.records import SCHEMA, line_of
+from mutator.workspace import Workspace
+
+
+def test_the_worst_that_a_filter_leaves(
+    toycar: Workspace, tmp_path: Path, record: Callable[..., Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Hazards come before what did less, whatever the batches; a limit cuts the list, not the count."""
+    plan = make_plan(toycar, "toy")
+    run = freeze(plan, tmp_path / "run", toycar).path
+    hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 5.0),)}
+    made = [record(e.id, **(hazard if i % 5 == 0 else {})) for i, e in enumerate(plan.experiments)]
+    path = run / "records" / "0001-main.jsonl"
+    path.parent.mkdir()
+    path.write_bytes(written(path, {"schema": SCHEMA, "plan": plan.digest}, map(line_of, made)))
+    monkeypatch.setattr(module, "_BATCH", 7)
+    rows, count = worst_results(run)
+    assert count == len(rows) == 24 and [bool(row.hazards) for row in rows] == [True] * 5 + [False] * 19
+    some, left = worst_results(run, "t_h3 > 4", 2)
+    assert left == 5 and some == rows[:2]
+    none, zero = worst_results(run, 'outcome == "masked" and t_h3 > 4')
+    assert (none, zero) == ([], 0)
