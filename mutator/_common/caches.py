@@ -17,6 +17,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 CHECKS, RUNS, TARGETS = "checks", "runs", "targets"
+TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with many seeds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +78,16 @@ def entries() -> list[Entry]:
 
 def prune(most: int) -> list[Entry]:
     """Delete the least recently used entries until at most `most` bytes are left; what was deleted."""
-    kept = entries()
+    return _pruned(entries(), most)
+
+
+def make_room(target: str) -> list[Entry]:
+    """Delete what the target of that name has not used for longest, until it keeps at most TARGET_BYTES; what
+    was deleted. A run of many seeds does so before each next one, which has pictures of its own."""
+    return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
+
+
+def _pruned(kept: list[Entry], most: int) -> list[Entry]:
     total = sum(entry.size for entry in kept)
     deleted = []
     for entry in sorted(kept, key=lambda entry: entry.used):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator._common import caches
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
@@ -58,6 +59,7 @@ class Worker:
         self._runner = self._make_runner(
             self._engine(assignment.engine), with_series=self._series is not None
         )
+        self._seed: int | None = None  # that is being driven
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
         self._needs_proof: bool | None = None  # None: nothing that it ran itself says so
@@ -73,6 +75,7 @@ class Worker:
         experiments = plan_file.read_chunk(
             self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
         )
+        self._make_room(experiments[0].seed)
         errors = []
         for finished in self._runner.run([experiments[place] for place in pending.places]):
             self._keep(finished)
@@ -81,6 +84,12 @@ class Worker:
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
+
+    def _make_room(self, seed: int) -> None:
+        """The pictures of a hundred seeds would fill the disk."""
+        if len(self.folder.seeds) > 1 and seed != self._seed:
+            caches.make_room(self._manifest.name)
+        self._seed = seed
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:
         """Run an experiment of the proof's sample on the reference engine; harness errors as `run`.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator._common import caches
 from mutator._common.files import remove_folder
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine, prepare_base
@@ -86,6 +87,8 @@ class CheckDriver:
         try:
             execution = engine.execute(job, scratch)
             run = look(self.manifest, execution)
+            if name[0] == GOLDEN and name[1].seed is not None:
+                caches.make_room(self.manifest.name)
             if name[0] == NULL:
                 unreached.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
             if name[0] == GOLDEN and not run.problem:

@@ -91,3 +91,14 @@ def test_clearing_leaves_no_file(filled: Path) -> None:
     assert len(caches.clear()) == 5
     assert [path for path in filled.rglob("*") if path.is_file()] == []
     assert (outside / "kept").exists()
+
+
+def test_a_target_that_is_driven_with_many_seeds_keeps_what_it_used_last(
+    filled: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it used longest ago goes; nothing else does, and nothing while there is room."""
+    assert caches.make_room("car") == []
+    monkeypatch.setattr(caches, "TARGET_BYTES", 2 * 12_288)
+    assert [entry.path.name for entry in caches.make_room("car")] == ["hog.so"]
+    assert caches.make_room("truck") == []
+    assert len(caches.entries()) == 3

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common import caches
+from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
 from mutator.execution.ended_runs import ended_before
 from mutator.execution.running import run_campaign
@@ -109,3 +111,15 @@ def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Pa
         assert integrity.content_key(run) == ""
     finally:
         digests.write(run, ledger)
+
+
+def test_room_is_made_for_the_pictures_of_the_next_seed(
+    made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run of several seeds asks for it when golden runs were driven, and when a worker goes on to another
+    seed."""
+    asked = []
+    monkeypatch.setattr(caches, "make_room", asked.append)
+    run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
+    goldens = len(RunFolder.open(tmp_path / "run").goldens)
+    assert asked == ["toycar"] * (goldens + 2)
