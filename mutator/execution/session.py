@@ -31,7 +31,7 @@ from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
 from mutator.model import Record
 from mutator.outcomes import results
-from mutator.outcomes.ranking import worth
+from mutator.outcomes.ranking import worth_of
 from mutator.outcomes.reader import Results
 from mutator.store import digests
 from mutator.store.progress import Progress, label
@@ -251,8 +251,8 @@ class Session:
         """Pack what this session's workers appended; if one is still dying, the next session does it."""
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
-            rows = Results.of_run(folder.path).rows()
-            pack(folder.path, folder.head["plan"], worth(rows), folder.series_mb)
+            texts = Results.of_run(folder.path).texts()
+            pack(folder.path, folder.head["plan"], worth_of(texts), folder.series_mb)
 
 
 @contextmanager

@@ -91,6 +91,13 @@ def _turn(
     return turn
 
 
+def worth_of(texts: "pd.DataFrame") -> dict[str, int]:
+    """As `worth`, of a frame as `Results.texts` has it."""
+    found = places(texts)
+    ended = (texts["status"] == Status.OK.value).to_numpy()
+    return dict(zip(texts["experiment_id"][ended], found[ended].tolist(), strict=True))
+
+
 def worth(rows: Iterable[Row]) -> dict[str, int]:
     """What the experiments that ended well are sorted by where there is no room for the series of all."""
     return {row.experiment_id: i for i, row in enumerate(worst(rows)) if row.status is Status.OK}

@@ -5,7 +5,7 @@ import random
 from pathlib import Path
 
 from mutator.outcomes.columns import SEVERITY, result_columns
-from mutator.outcomes.ranking import places, worst
+from mutator.outcomes.ranking import places, worst, worth, worth_of
 from mutator.outcomes.reader import Results
 
 METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
@@ -79,3 +79,4 @@ def test_places_are_those_of_the_worst(tmp_path: Path) -> None:
     texts = found.texts()
     order = texts["experiment_id"].to_numpy()[places(texts).argsort()]
     assert list(order) == [row.experiment_id for row in worst(found.rows())]
+    assert worth_of(texts) == worth(found.rows())
