@@ -16,19 +16,18 @@ from mutator._common.text import counted
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Record, Status
 from mutator.outcomes import results
 from mutator.outcomes.ranking import worth
 from mutator.outcomes.reader import row_of
 from mutator.outcomes.rows import Row
 from mutator.review.gate import FILE as REVIEWED
-from mutator.store import cleaning, digests, plan_file
+from mutator.store import cleaning, digests, integrity, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import read_segment, written
+from mutator.store.lines import verified_lines, write_copy
 from mutator.store.patches import PatchWriter
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_head import SCHEMA as HEAD_SCHEMA
@@ -148,7 +147,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 def _check_complete(folder: RunFolder) -> None:
     """Every experiment of the share has a record that counts, and the proof is whole."""
     records = folder.records()
-    done = sum(_counts(record) for record in records.values())
+    done = sum(one.counts for one in endings(records))
     if done < folder.planned:
         raise MutatorError(
             f"unfinished: {done} of {folder.planned} experiments done",
@@ -164,10 +163,6 @@ def _check_complete(folder: RunFolder) -> None:
             expected="a finished shard",
             remedy="run it to its end with the command it was begun with",
         )
-
-
-def _counts(record: Record) -> bool:
-    return record.status is not Status.HARNESS_ERROR
 
 
 def _check_goldens(folders: Sequence[RunFolder]) -> None:
@@ -233,9 +228,12 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
     """The patches that the records name."""
     assert folder.shard is not None
     writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
-    for record in folder.records().values():
-        if (data := folder.read_patch(record.experiment_id, record)) is not None:
-            writer.append(record.experiment_id, data)
+    for record in endings(folder.records()):
+        name, known = record.experiment_id, record.patch
+        for problem in integrity.patch_problems(folder.patches, name, known):
+            raise problem
+        if known and (data := folder.patches.read(name)) is not None:
+            writer.append(name, data)
     writer.close()
 
 
@@ -250,7 +248,7 @@ def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
 
 def _rows(folder: RunFolder) -> Iterator[Row]:
     records, hazards, scale = folder.records(), folder.head["hazards"], folder.scale
-    for experiment in plan_file.read_all(folder.path):
+    for experiment in plan_file.iterate(folder.path):
         if (record := records.get(experiment.id)) is not None:
             yield row_of(experiment, record, hazards, scale)
 
@@ -264,5 +262,5 @@ def _copy_segments(folder: RunFolder, out: Path) -> None:
         for path in sorted((folder.path / kind).glob("*.jsonl")):
             place = out / kind / f"{path.stem}-shard{folder.shard.number}.jsonl"
             head = {"schema": schema, "plan": folder.head["plan"]}
-            lines = (line for _, line in read_segment(path).objects(schema))
-            write_atomic(place, written(place, head, lines))
+            lines = verified_lines(path, schema, checksums=True)
+            write_copy(place, head, (line for _, _, line in lines))

@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import check_schema, raising_disk_full
+from mutator._common.files import check_schema, raising_disk_full, writing_atomic
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
@@ -239,6 +239,18 @@ def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, A
     for value in (_head(path, head), *values):
         lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
     return b"".join(lines)
+
+
+def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
+    """Write a file whose lines, after its own head, are those of other files, with their checksums."""
+    first = _line(b"", canonical(_head(path, head)).encode()[1:])
+    with writing_atomic(path) as file:
+        file.write(first)
+        last = first[_SUM]
+        for line in lines:
+            copied = _line(last, line[_BODY:])
+            file.write(copied)
+            last = copied[_SUM]
 
 
 def _line(last: bytes, body: bytes) -> bytes:
