@@ -199,6 +199,44 @@ def whole_toy(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar)
     return results(folder / "run"), summary.seal
 
 
+_UNLIKE = """\
+import sys
+if any("cluster.child" in word for word in sys.orig_argv):
+    from dataclasses import replace
+    from mutator.verification import preflight_rules
+    real = preflight_rules.look
+    preflight_rules.look = lambda *given: replace(real(*given), digest="f" * 64)
+"""
+_OTHER = "import mutator._common.version as version\nversion.VERSION = '0.0.1'\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        (_UNLIKE, r"golden run .* has the digest ffffffffffffffff here"),
+        (_OTHER, r"mutator 0\.0\.1, here "),
+    ],
+    ids=["arithmetic", "version"],
+)
+def test_a_refused_worker_is_told_and_the_others_do_its_work(
+    toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str], code: str, why: str
+) -> None:
+    """A worker whose arithmetic or version is another one is refused by name, and the campaign ends right."""
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(code)
+    machines.add("alpha")
+    machines.add("odd", PYTHONPATH=str(tmp_path / "site"))
+    with pytest.warns(MutatorWarning, match=rf"worker odd at .*gets no work: {why}"):
+        summary = run_campaign(
+            toy, "toy", tmp_path / "run", engine="fork", distributor=distributor(str(machines.file))
+        )
+    assert (summary.exit_code, summary.problem) == (0, "")
+    assert (results(tmp_path / "run"), summary.seal) == whole_toy
+    [machine] = RunFolder.open(tmp_path / "run").stretches[-1].machines
+    assert str(machine["worker"]).startswith("alpha")
+
+
 @pytest.mark.slow
 def test_the_scheduler_dies(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str]

@@ -101,6 +101,7 @@ class _Tended:
     task: "asyncio.Task[None] | None" = None
     has: dict[int, Piece] = field(default_factory=dict)
     failures: int = 0
+    facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted
 
 
 class _Deal:
@@ -237,7 +238,7 @@ class _Deal:
             one.lease = self._submit(one.address, dask_side.attend, self._run)
             self._crew.let_in(one.name, facts)
             self._board.join(one.name, one.slots)
-            self._session.note_machine({"worker": one.name, **facts})
+            one.facts = facts
             await self._employ(one, one.lease)
         except _Refused as why:
             self._crew.refuse(one.name, str(why))
@@ -280,6 +281,9 @@ class _Deal:
         """Take in what came of a piece."""
         if result.ending is Ending.DONE:
             if self._board.done(piece, one.name, result.seconds):
+                if one.facts:  # its first results: the run says where they come from
+                    self._session.note_machine({"worker": one.name, **one.facts})
+                    one.facts = {}
                 self._forked |= result.forked
                 self._crew.finished(one.name, len(piece.lines))
                 write = asyncio.create_task(self._write(piece, result))
