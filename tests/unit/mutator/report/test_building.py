@@ -232,3 +232,26 @@ def test_a_study_that_cannot_be_asked_is_said_and_left_out(
     text = building.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
     assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
     assert ("moon_landing, which needs a fault library" in text) == (workspace is None)
+
+
+def test_several_seeds_have_a_part_of_the_report(run: Path) -> None:
+    """Their spread is in both forms, in files, and in a table that the command line prints; one seed has none
+    of it."""
+    assert building.write(run, None).summaries == ()
+    path = run / "results.csv"
+    lines = list(csv.DictReader(path.read_text().splitlines()))
+    more = [line | {"experiment_id": f"{i}a" * 8, "seed": str(9 + i)} for i, line in enumerate(lines)]
+    with path.open("w", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        table.writerows([line | {"seed": "2"} for line in lines] + more)
+    written = building.write(run, None)
+    assert "## Seeds\n\n3 seeds, from 2 to 11: each is" in written.markdown.read_text()
+    assert '<section class="part" id="seeds">' in written.page.read_text()
+    assert (run / "report" / "tables" / "seeds_by_fault_type.csv").is_file()
+    assert (
+        (run / "report" / "tables" / "seeds.csv").read_text().startswith("faults,what,of,all seeds: count,")
+    )
+    [summary] = written.summaries
+    rows = {row[0]: row for row in summary.rows}
+    assert rows["hazards / activated"][3:] == ["0.0 % (seed 11)", "100.0 % (seed 9)"]
