@@ -264,7 +264,9 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
     if "after_hazard" in data:
         read["after_hazard"] = AfterHazard(data["after_hazard"])
     experiment = _make(Experiment, values, **read)
-    if not _is_named(data) and experiment.id != data["id"]:
+    if _is_named(data):
+        vars(experiment)["id"] = data["id"]  # what the property would find, and keep
+    elif experiment.id != data["id"]:
         raise MutatorError(
             f"what is called experiment {data['id']} is {experiment.id}",
             expected="the content that the id was made from",
