@@ -6,8 +6,9 @@ A field that joins one of them later is declared with `hashing.added`, so that i
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import Any
 
-from mutator._common.hashing import added, added_values, content_id
+from mutator._common.hashing import added, added_values, content_id, plain
 
 Value = int | float | str | bool | None
 
@@ -176,9 +177,15 @@ class Experiment:
     @cached_property
     def id(self) -> str:
         # through the fault's id, not its whole content: a plan hashes each fault once, not once a run
-        parts = (self.scenario, self.scenario_digest, self.method, self.trigger, self.seed, self.setting)
+        trigger = self.plain_trigger
+        parts = (self.scenario, self.scenario_digest, self.method, trigger, self.seed, self.setting)
         later = added_values(self)
         return content_id([self.fault.id, *parts, *([later] if later else [])])
+
+    @cached_property
+    def plain_trigger(self) -> dict[str, Any]:
+        """The trigger as JSON knows it: in its id, and in its line of the plan."""
+        return dict(plain(self.trigger))
 
     @property
     def label(self) -> str:

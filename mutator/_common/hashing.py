@@ -29,8 +29,8 @@ def added_values(record: Any) -> dict[str, Any]:
     _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable, says Python
     if not later:
         return {}
-    values = ((name, getattr(record, name), default) for name, default in later)
-    return {name: plain(value) for name, value, default in values if value != default}
+    changed = [name for name, default in later if getattr(record, name) != default]
+    return {name: plain(getattr(record, name)) for name in changed}
 
 
 @lru_cache(maxsize=256)
@@ -48,6 +48,8 @@ def plain(value: Any) -> Any:
     """
     if type(value) in _SCALARS:
         return value
+    if isinstance(value, Enum):  # first, as an enumeration takes long to say that it has no fields
+        return value.value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         found = {}
         for name in _fields(type(value))[0]:
@@ -58,8 +60,6 @@ def plain(value: Any) -> Any:
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [plain(v) for v in value]
-    if isinstance(value, Enum):
-        return value.value
     return value
 
 

@@ -241,7 +241,7 @@ def _line(experiment: Experiment) -> dict[str, Any]:
         "scenario": experiment.scenario,
         "scenario_digest": experiment.scenario_digest,
         "method": experiment.method,
-        "trigger": experiment.trigger,
+        "trigger": experiment.plain_trigger,
         "seed": experiment.seed,
         "setting": experiment.setting,
         **added_values(experiment),
