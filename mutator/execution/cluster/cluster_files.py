@@ -96,12 +96,14 @@ class ClusterFile:
             except BaseException:
                 with suppress(Exception):  # what went wrong is known
                     await cluster.close()
+                _delete_keys(cluster)
                 raise
             try:
                 async with connected(cluster, where=self.source.path) as client:
                     yield client
             finally:
                 await cluster.close()
+                _delete_keys(cluster)
 
     async def _started(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
         """Once scheduler and jobs are started; `problems` is filled by jobs that the system refuses."""
@@ -212,6 +214,13 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
                 self.status = Status.running
 
     return Noting
+
+
+def _delete_keys(cluster: Any) -> None:
+    """Delete the files of `security: true` now: Dask does when the cluster is collected, which may be never."""
+    for key in ("ca_file", "cert", "key"):
+        if file := getattr(cluster, f"_job_{key}", None):
+            file.close()
 
 
 def _class(kind: str) -> Any:

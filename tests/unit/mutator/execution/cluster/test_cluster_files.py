@@ -1,7 +1,6 @@
 """Cluster files: what may stand in one, and that a queueing system is asked for what it says."""
 
 import asyncio
-import gc
 import os
 import subprocess
 import sys
@@ -128,7 +127,6 @@ def test_workers_over_tls_are_told_of_the_certificates(
     asyncio.run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))
     job = (tmp_path / "job").read_text()
     assert "tls://127.0.0.1:" in job and f"--tls-ca-file {tmp_path}" in job
-    gc.collect()
     assert not list(tmp_path.glob(".dask*")), "the key outlives the cluster"
 
 
