@@ -217,7 +217,7 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
 
 
 def _delete_keys(cluster: Any) -> None:
-    """Delete the files of `security: true` now: Dask does when the cluster is collected, which may be never."""
+    """Delete the files of `security: true`: Dask does once the cluster is collected, which may be never."""
     for key in ("ca_file", "cert", "key"):
         if file := getattr(cluster, f"_job_{key}", None):
             file.close()
