@@ -15,6 +15,7 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from mutator._common import caches
 from mutator._common.files import DiskFull
 from mutator._common.hashing import canonical
 from mutator._common.shortages import Shortage, shortage
@@ -115,6 +116,8 @@ class PieceRunner:
                 raise Unlike(f"golden run {key} {came}")
             self._goldens.mkdir(exist_ok=True)
             execution.out.rename(self._goldens / key)
+            if golden.seed is not None:  # the pictures of a hundred seeds would fill the disk
+                caches.make_room(site.manifest.name)
         self._alike.add(key)
 
     def _golden_folder(self, experiment: Experiment) -> Path:
