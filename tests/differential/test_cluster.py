@@ -129,18 +129,21 @@ def test_a_worker_with_another_version_is_refused(
     assert "no worker is left" in summary.problem
 
 
+@pytest.mark.parametrize(
+    ("number", "code"), [(KILL, -KILL), pytest.param(INT, 130, marks=pytest.mark.slow)], ids=["KILL", "INT"]
+)
 def test_a_dead_command_leaves_nothing_at_work(
-    toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
+    toy: Workspace, tmp_path: Path, two: Machines, number: signal.Signals, code: int
 ) -> None:
-    """When the command is killed, the work of the workers stops within 10 s, children included; the same
-    command then comes to the same results."""
+    """When the command is killed or interrupted, the work of the workers stops within 10 s, children included;
+    the same command then comes to the end."""
     out = tmp_path / "run"
     words = ["-m", "mutator", "run", "toy", "--out", str(out), "--engine", "fork", "--cluster", str(two.file)]
     command = Command(toy, out, *words)
     command.wait_for_records(1)
     assert two.children()
-    os.kill(command.process.pid, KILL)
-    command.process.wait()
+    os.kill(command.process.pid, number)
+    assert command.process.wait() == code
     deadline = time.monotonic() + 10.0
     while two.children():
         assert time.monotonic() < deadline

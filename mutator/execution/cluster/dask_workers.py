@@ -54,17 +54,18 @@ class ClusterWorkers:
         remarks: queue.Queue[str] = queue.Queue()
         loop = asyncio.new_event_loop()
         deal = loop.create_task(self._deal(session, remarks.put))
-        thread = threading.Thread(target=_run, args=(loop, deal), name="cluster")
+        # not by joining: in CPython 3.11 and 3.12 a thread counts as ended once Ctrl-C interrupts its join
+        over = threading.Event()
+        thread = threading.Thread(target=_run, args=(loop, deal, over), name="cluster")
         thread.start()
         try:
-            while thread.is_alive():
-                thread.join(_LOOK_S)
+            while not over.wait(_LOOK_S) or not remarks.empty():
                 while not remarks.empty():
                     warnings.warn(remarks.get(), MutatorWarning, stacklevel=2)
         except KeyboardInterrupt:
             session.interrupted = True
             loop.call_soon_threadsafe(deal.cancel)
-            thread.join()
+            over.wait()
         if not deal.cancelled() and (error := deal.exception()) is not None:
             raise error
 
@@ -74,12 +75,15 @@ class ClusterWorkers:
             await _Deal(session, client, remark, patient=patient).run()
 
 
-def _run(loop: asyncio.AbstractEventLoop, deal: "asyncio.Task[None]") -> None:
-    with suppress(BaseException):  # who waits for the task asks it
-        loop.run_until_complete(deal)
-    loop.run_until_complete(loop.shutdown_asyncgens())
-    loop.run_until_complete(loop.shutdown_default_executor())
-    loop.close()
+def _run(loop: asyncio.AbstractEventLoop, deal: "asyncio.Task[None]", over: threading.Event) -> None:
+    try:
+        with suppress(BaseException):  # who waits for the task asks it
+            loop.run_until_complete(deal)
+        loop.run_until_complete(loop.shutdown_asyncgens())
+        loop.run_until_complete(loop.shutdown_default_executor())
+        loop.close()
+    finally:
+        over.set()
 
 
 class _Gone(Exception):
