@@ -135,8 +135,8 @@ def test_a_worker_with_another_version_is_refused(
 def test_a_dead_command_leaves_nothing_at_work(
     toy: Workspace, tmp_path: Path, two: Machines, number: signal.Signals, code: int
 ) -> None:
-    """When the command is killed or interrupted, the work of the workers stops within 10 s, children included;
-    the same command then comes to the end."""
+    """When the command is killed or interrupted, the work of the workers stops within 10 s, with all its
+    processes; the same command then comes to the end."""
     out = tmp_path / "run"
     words = ["-m", "mutator", "run", "toy", "--out", str(out), "--engine", "fork", "--cluster", str(two.file)]
     command = Command(toy, out, *words)
