@@ -13,6 +13,7 @@ from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
 from mutator.outcomes.golden import load_trace
 from mutator.outcomes.paths import ways_of
 from mutator.outcomes.reader import Results
+from mutator.outcomes.rows import Row
 from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import FOLDER, Panel
 from mutator.report.paths import FoundPaths
@@ -68,6 +69,11 @@ class ReportedRun:
             experiments=experiments,
             records=records,
         )
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows of results.csv, all at once; of a large run rather ask `frame`."""
+        return Results.of_run(self.folder.path).rows()
 
     @property
     def out(self) -> Path:

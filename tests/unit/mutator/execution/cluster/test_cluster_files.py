@@ -1,6 +1,5 @@
 """Cluster files: what may stand in one, and that a queueing system is asked for what it says."""
 
-import asyncio
 import os
 import subprocess
 import sys
@@ -11,6 +10,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.cluster.where import parse
+
+from .loops import run
 
 SLURM = """\
 schema: cluster/1
@@ -63,7 +64,7 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
 def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: str, tmp_path: Path) -> None:
     """Unknown kinds, keys and options, and what the class itself does not like."""
     with pytest.raises(MutatorError, match=error):
-        asyncio.run(opened(tmp_path, SLURM.replace(before, after)))
+        run(opened(tmp_path, SLURM.replace(before, after)))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +81,7 @@ def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path)
     with pytest.raises(
         MutatorError, match=r"some.yaml:4: the network .* neither on the loopback nor encrypted"
     ):
-        asyncio.run(opened(tmp_path, text))
+        run(opened(tmp_path, text))
 
 
 def test_ctrl_c_stays_what_it_is() -> None:
@@ -101,13 +102,13 @@ def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setitem(sys.modules, "dask_kubernetes", None)
     monkeypatch.setitem(sys.modules, "dask_kubernetes.operator", None)
     with pytest.raises(MutatorError, match=r"no package dask_kubernetes.*'.\[kubernetes\]'"):
-        asyncio.run(opened(tmp_path, SLURM.replace("kind: slurm", "kind: kubernetes"), insecure=True))
+        run(opened(tmp_path, SLURM.replace("kind: slurm", "kind: kubernetes"), insecure=True))
 
 
 def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four workers on two cores each are two jobs, of workers with one thread; at the end none is left."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job$$; echo Submitted batch job $$")
-    dashboard = asyncio.run(opened(tmp_path, SLURM))
+    dashboard = run(opened(tmp_path, SLURM))
     assert dashboard.startswith("http://127.0.0.1:")
     jobs = {job.name.removeprefix("job"): job.read_text() for job in tmp_path.glob("job*")}
     assert len(jobs) == 2
@@ -124,7 +125,7 @@ def test_workers_over_tls_are_told_of_the_certificates(
     """`security: true` makes certificates for this cluster alone, and needs no `--insecure-network`."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job; echo Submitted batch job 7")
     options = f"  security: true\n  shared_temp_directory: {tmp_path}\n  interface: lo"
-    asyncio.run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))
+    run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))
     job = (tmp_path / "job").read_text()
     assert "tls://127.0.0.1:" in job and f"--tls-ca-file {tmp_path}" in job
     assert not list(tmp_path.glob(".dask*")), "the key outlives the cluster"
@@ -137,7 +138,7 @@ def test_a_job_that_is_refused_ends_it(
     """What the queueing system said is in the error, and nothing else is printed."""
     with_slurm(tmp_path, monkeypatch, script)
     with pytest.raises(MutatorError, match=r"some.yaml:4: .*(no such partition|this is no answer)"):
-        asyncio.run(opened(tmp_path, SLURM))
+        run(opened(tmp_path, SLURM))
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
@@ -145,4 +146,4 @@ def test_a_machine_without_the_command_is_told_so(tmp_path: Path, monkeypatch: p
     """Jobs are submitted where the queueing system is installed."""
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(MutatorError, match=r"some.yaml:2: .*sbatch.*; submit from a machine"):
-        asyncio.run(opened(tmp_path, SLURM))
+        run(opened(tmp_path, SLURM))

@@ -1,6 +1,5 @@
 """What `WHERE` may be, what is refused before anything is started, and what is opened and closed again."""
 
-import asyncio
 import json
 import os
 import subprocess
@@ -12,6 +11,8 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.execution.cluster import connecting
 from mutator.execution.cluster.where import Local, Scheduler, Where, parse
+
+from .loops import run
 
 
 async def opened(where: Where, insecure: bool = False) -> None:
@@ -62,7 +63,7 @@ def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
     where = parse(str(file))
     assert where == Scheduler(address="tcp://10.0.0.1:8786", file=file)
     with pytest.raises(MutatorError, match=r"scheduler.json: tcp://10.0.0.1:8786, which is neither"):
-        asyncio.run(opened(where))
+        run(opened(where))
 
 
 @pytest.mark.parametrize(
@@ -104,7 +105,7 @@ def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.Mon
     with pytest.raises(
         MutatorError, match=r"neither on the loopback nor encrypted.*tls://.*`insecure_network`"
     ):
-        asyncio.run(opened(parse("tcp://10.0.0.1:8786")))
+        run(opened(parse("tcp://10.0.0.1:8786")))
 
 
 def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,14 +113,14 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setitem(sys.modules, "distributed", None)
     for text in ("local:1", "tcp://127.0.0.1:1"):
         with pytest.raises(MutatorError, match=r"no package distributed; pip install '.\[cluster\]'"):
-            asyncio.run(opened(parse(text)))
+            run(opened(parse(text)))
 
 
 def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a limited time, with an error that says why."""
     monkeypatch.setattr(connecting, "CONNECT_S", 0.3)
     with pytest.raises(MutatorError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1 \(.*refused"):
-        asyncio.run(opened(parse("tcp://127.0.0.1:1")))
+        run(opened(parse("tcp://127.0.0.1:1")))
 
 
 def test_tls_needs_certificates() -> None:
@@ -129,13 +130,13 @@ def test_tls_needs_certificates() -> None:
     with pytest.raises(
         MutatorError, match=r"tls:// without certificates; .*DASK_DISTRIBUTED__COMM__TLS__CA_FILE"
     ):
-        asyncio.run(opened(parse("tls://127.0.0.1:1")))
+        run(opened(parse("tls://127.0.0.1:1")))
     files = {"ca-file": "/no/ca.pem", "client.cert": "/no/cert.pem", "client.key": "/no/key.pem"}
     with (
         dask.config.set({f"distributed.comm.tls.{key}": file for key, file in files.items()}),
         pytest.raises(MutatorError, match="the TLS certificates"),
     ):
-        asyncio.run(opened(parse("tls://127.0.0.1:1")))
+        run(opened(parse("tls://127.0.0.1:1")))
 
 
 def test_local_workers_work_and_end() -> None:
@@ -148,7 +149,7 @@ def test_local_workers_work_and_end() -> None:
             [(pid, folder)] = found.values()
             return client.scheduler.address, await client.nthreads(), pid, folder
 
-    address, threads, pid, folder = asyncio.run(used())
+    address, threads, pid, folder = run(used())
     assert address.startswith("tcp://127.0.0.1:")
     assert list(threads.values()) == [1]
     assert pid != os.getpid() and not Path(f"/proc/{pid}").exists()
