@@ -245,6 +245,9 @@ class _Deal:
             one.facts = facts
             await self._employ(one, one.lease)
         except _Refused as why:
+            for piece in one.has.values():
+                self._board.give_back(piece, one.name)
+            one.has.clear()
             self._crew.refuse(one.name, str(why))
             self._remark(f"worker {describe(one.name, facts)} gets no work: {why}")
         finally:
@@ -266,7 +269,7 @@ class _Deal:
                     group.create_task(self._serve(one))
         except* _Refused as found:
             raise found.exceptions[0] from None
-        except* DiskFull as found:
+        except* MutatorError as found:
             raise found.exceptions[0] from None
 
     async def _serve(self, one: _Tended) -> None:
@@ -279,7 +282,7 @@ class _Deal:
             one.has[piece.number] = piece
             data = await self._call(one.address, dask_side.work, self._run, piece.packed())
             del one.has[piece.number]
-            await self._take(one, piece, Result.of(data))
+            await self._take(one, piece, _read(data, piece))
 
     async def _take(self, one: _Tended, piece: Piece, result: Result) -> None:
         """Take in what came of a piece."""
@@ -333,6 +336,14 @@ class _Deal:
                 pure=False,
                 retries=0,
             )
+
+
+def _read(data: bytes, piece: Piece) -> Result:
+    """What came of a piece; a result that arrived damaged is none."""
+    try:
+        return Result.of(data)
+    except MutatorError as err:
+        return Result(number=piece.number, ending=Ending.FAILED, text=str(err))
 
 
 async def _answer(future: "Future[_T]") -> _T:
