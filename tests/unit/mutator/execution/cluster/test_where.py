@@ -118,7 +118,7 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a limited time, with an error that says why."""
-    monkeypatch.setattr(connecting, "CONNECT_S", 0.3)
+    monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
     with pytest.raises(MutatorError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1 \(.*refused"):
         run(opened(parse("tcp://127.0.0.1:1")))
 
