@@ -2,6 +2,7 @@
 
 import asyncio
 import ipaddress
+import os
 import re
 import ssl
 from collections.abc import AsyncIterator, Iterator
@@ -137,7 +138,7 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
             ssl.SSLError,
         ) as error:  # Dask's own errors of connections are OSErrors
             raise MutatorError(
-                f"no Dask scheduler answers at {address}{_reason(error)}",
+                f"no Dask scheduler answers at {address}{await _reason(address, error)}",
                 where=where,
                 argument="cluster",
                 remedy="start it (`dask scheduler`), or check address, firewall and certificates",
@@ -147,8 +148,18 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
         await client.close()
 
 
-def _reason(error: BaseException) -> str:
-    """Why, as the innermost error has it: Dask says only for how long it has tried."""
+async def _reason(address: str, error: BaseException) -> str:
+    """Why, as the innermost error has it: Dask says only for how long it has tried. Where its last try was
+    cut short that error says nothing, and one more is made."""
     while error.__cause__ is not None:
         error = error.__cause__
-    return f" ({error})" if str(error) else ""
+    if str(error):
+        return f" ({error})"
+    if found := _ADDRESS.fullmatch(address):
+        try:
+            async with asyncio.timeout(1.0):
+                _, writer = await asyncio.open_connection(found["host"].strip("[]"), int(found["port"]))
+                writer.close()
+        except OSError as tried:
+            return f" ({os.strerror(tried.errno)})" if tried.errno else ""
+    return ""
