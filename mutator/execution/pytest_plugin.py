@@ -59,14 +59,13 @@ def pytest_configure(config: pytest.Config) -> None:
     from mutator.execution.distribution import distributor
     from mutator.execution.pytest_session import configure
 
-    cluster = config.getoption("campaign_cluster")
+    cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
     if cluster and getattr(config.option, "numprocesses", None):
         raise pytest.UsageError("--campaign-cluster with -n: its workers are those of the cluster")
     try:
-        deals = distributor(cluster, insecure=config.getoption("insecure_network")) if cluster else None
+        deals = distributor(cluster, insecure=insecure) if cluster or insecure else None
     except MutatorError as err:
         raise pytest.UsageError(str(err)) from None
-
     configure(
         config,
         campaign,

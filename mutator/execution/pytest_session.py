@@ -39,7 +39,19 @@ class HarnessErrors(Exception):
     """A chunk has experiments that the harness could not judge."""
 
 
-class WorkItem(pytest.Item):
+class CampaignItem(pytest.Item):
+    """Some work of a campaign. It fails for harness errors only, and then without a traceback."""
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, HarnessErrors | MutatorError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        return self.config.rootpath, None, self.name
+
+
+class WorkItem(CampaignItem):
     """One chunk of the plan, or one experiment of the proof. It fails for harness errors only: a hazard is a
     result, not a failure."""
 
@@ -63,16 +75,8 @@ class WorkItem(pytest.Item):
         if errors:
             raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
 
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        if isinstance(excinfo.value, HarnessErrors | MutatorError):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, style)
 
-    def reportinfo(self) -> tuple[Path, None, str]:
-        return self.config.rootpath, None, self.name
-
-
-class DealItem(pytest.Item):
+class DealItem(CampaignItem):
     """All of a session's work, which a cluster does."""
 
     def __init__(self, *, begun: Session, distributor: Deals, **keywords: Any) -> None:
@@ -86,14 +90,6 @@ class DealItem(pytest.Item):
             raise KeyboardInterrupt
         if self._begun.problem:
             raise HarnessErrors(self._begun.problem)
-
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        if isinstance(excinfo.value, HarnessErrors | MutatorError):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, style)
-
-    def reportinfo(self) -> tuple[Path, None, str]:
-        return self.config.rootpath, None, self.name
 
 
 def _defect(err: Exception, chunk: str) -> str:

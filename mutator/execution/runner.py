@@ -267,17 +267,24 @@ def _bare(
     activation: Activation | None = None,
 ) -> Record:
     """The record of an experiment without an outcome."""
+    bare = without_outcome(experiment.id, status, detail)
+    if built is not None:
+        bare = replace(bare, tree=built.tree_digest, patch=digest(built.patch_bytes))
+    return replace(bare, activation=activation)
+
+
+def without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
+    """The record of an experiment of which no more is known."""
     return Record(
-        experiment_id=experiment.id,
+        experiment_id=experiment_id,
         status=status,
         outcome=None,
         detail=detail,
-        tree=built.tree_digest if built else "",
-        activation=activation,
+        tree="",
+        activation=None,
         t_manifest=None,
         max_dev=(),
         hazards=(),
         alerts=(),
         trace_digest="",
-        patch=digest(built.patch_bytes) if built else "",
     )

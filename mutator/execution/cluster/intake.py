@@ -1,12 +1,13 @@
 """What comes back from workers, on its way into the run folder."""
 
 import json
-from typing import Any
+from pathlib import Path
 
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.execution.cluster.pieces import Kind, Piece, Result
-from mutator.model import Record, Status
+from mutator.execution.runner import without_outcome
+from mutator.model import Status
 from mutator.outcomes.judging import load_channels
 from mutator.outcomes.sampling import Sampler
 from mutator.store.lines import LineWriter
@@ -60,19 +61,7 @@ class Intake:
         """Note that the one experiment of a piece has no result, and why."""
         writer = self._records if piece.kind is Kind.RUN else self._proof_writer()
         for name in piece.lines:
-            record = Record(
-                experiment_id=name,
-                status=Status.HARNESS_ERROR,
-                outcome=None,
-                detail=why,
-                tree="",
-                activation=None,
-                t_manifest=None,
-                max_dev=(),
-                hazards=(),
-                alerts=(),
-                trace_digest="",
-            )
+            record = without_outcome(name, Status.HARNESS_ERROR, why)
             writer.extend([canonical(line_of(record)).encode()])
 
     def close(self) -> None:
@@ -97,5 +86,5 @@ class Intake:
         if self._series is not None:
             self._series.sync()
 
-    def _file(self, kind: str) -> Any:
+    def _file(self, kind: str) -> Path:
         return self._folder.path / kind / f"{self._name}.jsonl"
