@@ -113,6 +113,18 @@ def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
     assert [path for path in sorted(choosing) if not matches(path, manifest.forbid)] == []
 
 
+def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
+    """All that a library is found by travels with a mutant: without a header, say, the slow Python would run."""
+    manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
+    base = prepare_base(manifest, tmp_path / "base")
+    found = {
+        source.name: (compiled.file_name(source), compiled.file_name(base / source.relative_to(target)))
+        for source in target.rglob("*.c")
+    }
+    assert len(found) > 6
+    assert [name for name, (here, there) in found.items() if here != there] == []
+
+
 def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> None:
     """A fault in a detector's code gives the same trace and the same counts in a run that shares nothing, and
     in runs after itself and after the same fault at another time; nothing of it is kept.
