@@ -14,7 +14,8 @@ Value = int | float | str | bool | None
 
 
 class AnchorKind(StrEnum):
-    """Where, relative to a statement of the target, a snippet goes."""
+    """Where, relative to a statement of the target, a snippet goes; or, in VALUE_ANCHORS, whose value it
+    changes."""
 
     AFTER_ASSIGN = "after_assign"
     BEFORE_ASSIGN = "before_assign"
@@ -22,6 +23,24 @@ class AnchorKind(StrEnum):
     BEFORE_CALL = "before_call"
     BEFORE_RETURN = "before_return"
     ENTRY = "entry"
+    ASSIGNED_VALUE = "assigned_value"
+    RETURN_VALUE = "return_value"
+    CONDITION = "condition"
+    ARGUMENT = "argument"
+    RESULT = "result"
+    VALUE = "value"
+
+
+VALUE_ANCHORS = frozenset(
+    (
+        AnchorKind.ASSIGNED_VALUE,
+        AnchorKind.RETURN_VALUE,
+        AnchorKind.CONDITION,
+        AnchorKind.ARGUMENT,
+        AnchorKind.RESULT,
+        AnchorKind.VALUE,
+    )
+)
 
 
 class Hold(StrEnum):
@@ -67,15 +86,18 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Anchor:
-    """A statement in a function: the `nth` (from 1) that assigns to, calls or returns `name`.
+    """A statement of a function or an expression in it: the `nth` (from 1) that fits `kind` and `name`.
 
-    `name` is a dotted name as written in the source (`gap`, `self.angle`, `frames.append`), empty for
-    `entry` and for a bare `before_return`. Without `nth` there must be exactly one hit.
+    `name` is what is assigned to, called or returned, as in the source (`gap`, `self.angle`, `pose['x']`);
+    of a `value`, `condition` or `return_value` it is the expression. It is empty for `entry`, and where any
+    return or condition will do. `which` chooses an argument of a call, by its place (from 1) or keyword.
+    Without `nth` there must be exactly one hit.
     """
 
     kind: AnchorKind
     name: str = ""
     nth: int | None = None
+    which: str | None = added(None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,13 +1,18 @@
 """A place in the target as YAML writes it: `{file: ..., function: ..., after_assign: gap}`."""
 
+import ast
 import keyword
+import re
 
 from pydantic import Field
 
 from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
 PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target does (mutants/probe.py)
+
+_NAMELESS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
+_ASSIGNMENTS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
 class AtModel(StrictModel, title="A place"):
@@ -27,6 +32,29 @@ class AtModel(StrictModel, title="A place"):
         None, description="Before the `return` of this name; empty for a bare `return`."
     )
     entry: bool | None = Field(None, description="`true`: at the start of the function.")
+    assigned_value: str | None = Field(
+        None,
+        description="The value that is assigned to this name, wherever that stands (`if a: b = 1`, `:=`).",
+    )
+    return_value: str | None = Field(
+        None, description="The value that the `return` of this expression returns; empty for any."
+    )
+    condition: str | None = Field(
+        None,
+        description="What decides an `if`, `while`, `assert`, `x if ... else y`, or the filter of a "
+        "comprehension, "
+        "as written; empty for any.",
+    )
+    argument: str | None = Field(
+        None, description="An argument of the call of this name; `which` says which, if it has several."
+    )
+    result: str | None = Field(None, description="What the call of this name gives, within an expression.")
+    value: str | None = Field(
+        None, description="The value of this expression, as written, spaces and quotes aside."
+    )
+    which: str | int | None = Field(
+        None, description="Of an `argument`: its place in the call, from 1, or its keyword."
+    )
     nth: int | None = Field(None, ge=1, description="Which of several hits, counted from 1.")
 
     def location(self, source: Source, keys: Keys) -> FaultLocation:
@@ -41,16 +69,77 @@ class AtModel(StrictModel, title="A place"):
             )
         kind = given[0]
         name = "" if kind is AnchorKind.ENTRY else getattr(self, kind.value)
-        if not (dotted_name(name) or (not name and kind in (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN))):
-            raise source.error((*keys, kind.value), f"'{name}'", expected="a dotted name as in the source")
+        if not (_fits(kind, name) or (not name and kind in _NAMELESS)):
+            expected = (
+                "an expression as in the source" if kind in VALUE_ANCHORS else "a name as in the source"
+            )
+            raise source.error((*keys, kind.value), f"'{name}'", expected=expected)
+        which = None if self.which is None else str(self.which)
+        if which is not None and not (
+            kind is AnchorKind.ARGUMENT and (which.isdecimal() or which.isidentifier())
+        ):
+            raise source.error(
+                (*keys, "which"),
+                f"'{which}'",
+                expected="the place, from 1, or the keyword of an `argument`",
+                remedy="correct it, or leave it out",
+            )
         if not dotted_name(self.function.replace(".<locals>", "")):
             raise source.error(
                 (*keys, "function"),
                 f"'{self.function}'",
                 expected="a qualified name such as Sensor.measure",
             )
-        anchor = Anchor(kind=kind, name=name, nth=self.nth)
+        anchor = Anchor(kind=kind, name=name, nth=self.nth, which=which)
         return FaultLocation(path=self.file, function=self.function, anchor=anchor)
+
+
+def _fits(kind: AnchorKind, name: str) -> bool:
+    """Whether an anchor of this kind can have the name."""
+    if kind in VALUE_ANCHORS:
+        return is_expression(name)
+    return dotted_name(name) or (kind in _ASSIGNMENTS and assignable(name))
+
+
+def is_expression(text: str) -> bool:
+    """Whether `text` is an expression of Python, without the probe."""
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError):
+        return False
+    return not any(isinstance(node, ast.Name) and node.id == PROBE_NAME for node in ast.walk(tree))
+
+
+def assignable(text: str) -> bool:
+    """Whether `text` is something to assign to that has nothing to calculate: names, attributes, items by a
+    constant or a name."""
+    try:
+        node: ast.expr = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError):
+        return False
+    return isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _is_chain(node)
+
+
+def base_name(text: str) -> str:
+    """The first name of a chain."""
+    return re.split(r"[.\[\s]", text, maxsplit=1)[0]
+
+
+def _is_chain(node: ast.expr) -> bool:
+    match node:
+        case ast.Name(id=name):
+            return name != PROBE_NAME
+        case ast.Attribute(value=value):
+            return _is_chain(value)
+        case ast.Subscript(value=value, slice=index):
+            return _is_chain(value) and (_is_constant(index) or _is_chain(index))
+    return False
+
+
+def _is_constant(node: ast.expr) -> bool:
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        node = node.operand
+    return isinstance(node, ast.Constant) and isinstance(node.value, str | int)
 
 
 def dotted_name(text: str) -> bool:

@@ -14,10 +14,10 @@ from mutator._common.version import VERSION
 from mutator.execution import single_run
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
-from mutator.mutants.anchors import ParsedFile, Site, parsed
+from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import injection_id
-from mutator.mutants.splicing import Edit
+from mutator.mutants.splicing import Edit, Rank, in_lines, in_order
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -69,30 +69,33 @@ def _mutant(
 ) -> dict[str, Any]:
     first, *others = fault.injections
     file = parsed(manifest.tree, first.location.path)
-    site = file.resolve(first.location)
-    edit = injection_edit(file, models, first, injection_id(0, first))
+    edits = in_lines(file, [injection_edit(file, models, first, injection_id(0, first))])
     also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
     description = f"{fault.label}, aims at {fault.aim}" + (f"; also at {', '.join(also)}" if also else "")
     return {
         "id": fault.id,
         "mutatorName": first.model,
         "description": description,
-        **_splice(file, site, edit),
+        **_splice(file, file.span(first.location), edits),
         **verdict(experiments, records),
     }
 
 
 def _line(manifest: TargetManifest, injection: Injection) -> int:
-    return parsed(manifest.tree, injection.location.path).resolve(injection.location).first + 1
+    return parsed(manifest.tree, injection.location.path).span(injection.location)[0] + 1
 
 
-def _splice(file: ParsedFile, site: Site, edit: Edit) -> dict[str, Any]:
-    """The anchored statement's whole lines (at a function's entry the line there), and what replaces them."""
-    first = min(site.first, edit.index, len(file.lines) - 1)
-    last = max(site.last, first + 1)
-    lines, at = file.lines[first:last], edit.index - first
-    wrapped = [edit.unit + line for line in lines[at : at + edit.reindent]]
-    new = [*lines[:at], *edit.lines, *wrapped, *lines[at + edit.reindent :]]
+def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
+    """The anchored lines, whole (at a function's entry the line there), and what replaces them."""
+    first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
+    last = max(span[1], first + 1)
+    lines, new, done = file.lines[first:last], list[bytes](), 0
+    for edit in in_order(edits):
+        at = edit.index - first
+        gone = at + (1 if edit.rank is Rank.INSTEAD else edit.reindent)
+        new += [*lines[done:at], *edit.lines, *(edit.unit + line for line in lines[at : at + edit.reindent])]
+        done = gone
+    new += lines[done:]
     end = lines[-1].rstrip(b"\r\n").decode(file.encoding)
     return {
         "location": {

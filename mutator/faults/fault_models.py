@@ -31,6 +31,9 @@ class SnippetKind(StrEnum):
 
     INSERT = "insert"  # lines before or after it
     GUARD = "guard"  # lines above it, the last opening a block, the statement indented beneath
+    VALUE = (
+        "value"  # another value: of the expression that is anchored, or of the variable that is assigned to
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +55,14 @@ class ParamSchema:
     neutral: float | None = None
 
 
+_TARGET = ParamSchema(
+    name="target",
+    type="variable",
+    optional=True,
+    about="the variable that is changed, where that is not what the anchor names",
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Example:
     """A source before and after one injection (its tag is `example`): documentation that is run as a test."""
@@ -68,6 +79,7 @@ class FaultModel:
     """A fault model: template text, parameter schema, examples.
 
     `raises`: an exception of its injected lines is what it is for, and counts as a crash of the target.
+    `expression` is the template of a changed value; None for a model that cannot change an expression's.
     """
 
     name: str
@@ -77,6 +89,7 @@ class FaultModel:
     params: tuple[ParamSchema, ...]
     examples: tuple[Example, ...]
     template: str
+    expression: str | None = None
     source: Source  # the YAML
     template_path: Path
 
@@ -149,8 +162,16 @@ class FaultModelModel(StrictModel, title="The file"):
     """Name, parameters and examples of a fault model, whose template is the file beside it."""
 
     name: str = Field(description="Its name, that of the file.")
-    kind: Literal["insert", "guard"] = Field(
-        description="`insert`: lines before or after the statement; `guard`: the statement is wrapped."
+    kind: Literal["insert", "guard", "value"] = Field(
+        description="`insert`: lines before or after the statement; `guard`: the statement is wrapped; "
+        "`value`: the "
+        "template is one expression over `original`, the value that is changed, be it a variable's or an "
+        "expression's."
+    )
+    expression: str | None = Field(
+        None,
+        description="Of an `insert`: the template of the same change to the value of an expression, "
+        "`original`.",
     )
     about: str = Field(description="What it does, in a sentence.")
     raises: bool = Field(
@@ -171,7 +192,10 @@ def load_fault_models(folder: Path) -> FaultModels:
     if not models:
         raise MutatorError("no fault model", where=folder, expected="<model>.yaml beside <model>.py.j2")
     probe = _text(folder / PROBE_TEMPLATE)
-    texts = {name: model.template for name, model in models.items()}
+    texts = {
+        name: [model.template, model.expression] if model.expression else model.template
+        for name, model in models.items()
+    }
     raising = [name for name, model in models.items() if model.raises]
     digest = hashing.digest([texts, probe, *([raising] if raising else [])])
     return FaultModels(folder=folder, models=models, probe=probe, digest=digest)
@@ -181,13 +205,22 @@ def _load(path: Path) -> FaultModel:
     model, source = read(path, FaultModelModel, SCHEMA)
     if model.name != path.stem:
         raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', as the file is named")
-    template_path = path.with_suffix(".py.j2")
+    template_path, kind = path.with_suffix(".py.j2"), SnippetKind(model.kind)
+    if model.expression is not None and kind is not SnippetKind.INSERT:
+        raise source.error(
+            ("expression",),
+            f"an expression beside kind {kind.value}",
+            expected="one for kind insert: the template of a `value` is its expression, and a guard has none",
+            remedy="leave it out",
+        )
+    template = _text(template_path)
+    params = tuple(_param(name, param, source) for name, param in model.params.items())
     return FaultModel(
         name=model.name,
-        kind=SnippetKind(model.kind),
+        kind=kind,
         about=model.about,
         raises=model.raises,
-        params=tuple(_param(name, param, source) for name, param in model.params.items()),
+        params=(*params, _TARGET) if kind is SnippetKind.VALUE else params,
         examples=tuple(
             Example(
                 about=example.about,
@@ -198,7 +231,8 @@ def _load(path: Path) -> FaultModel:
             )
             for i, example in enumerate(model.examples)
         ),
-        template=_text(template_path),
+        template=template,
+        expression=template.removesuffix("\n") if kind is SnippetKind.VALUE else model.expression,
         source=source,
         template_path=template_path,
     )

@@ -3,13 +3,13 @@
 from mutator._common.random_streams import generator
 from mutator._common.text import shown, suggestion
 from mutator.config import units
-from mutator.config.locations import dotted_name
+from mutator.config.locations import assignable, dotted_name
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
 from mutator.faults.specs import Draw
-from mutator.model import AnchorKind, Injection, Value
+from mutator.model import VALUE_ANCHORS, AnchorKind, Injection, Value
 
 _NAMED = {"variable": "a name as in the source", "import": "a module of the target and a name in it"}
 _WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
@@ -40,7 +40,8 @@ def resolve(
             params[schema.name] = int(generator(seed, f"{key}/{schema.name}").random() * 2**53)
         elif schema.name == "target" and spec.location.anchor.kind in _WITH_DEFAULT_TARGET:
             params.setdefault("target", spec.location.anchor.name)
-        if schema.name not in params and not schema.optional:
+        at_value = schema.name == "target" and spec.location.anchor.kind in VALUE_ANCHORS
+        if schema.name not in params and not (schema.optional or at_value):
             raise source.error(
                 (*spec.keys, "params"),
                 f"parameter '{schema.name}' of model {model.name} is missing",
@@ -130,7 +131,8 @@ class _Resolver:
     def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """The parameter's value in the template's unit, of the right type and in range."""
         if schema.type in NAMES:
-            if not isinstance(param.value, str) or not dotted_name(param.value):
+            fits = dotted_name if schema.type == "import" else assignable
+            if not isinstance(param.value, str) or not fits(param.value):
                 raise self._wrong(param, _NAMED[schema.type])
             return param.value
         if schema.type == "boolean":

@@ -12,7 +12,9 @@ from pathlib import Path
 from mutator._common.interrupts import held
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
-from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
+from mutator.mutants.expression_choice import as_written, choose_expression
+from mutator.mutants.expressions import Expression, expressions_of
 from mutator.mutants.parsing import import_line, libcst_module, python_tree, reading, refuse_unfit
 from mutator.mutants.places import Place, places_by_ast
 from mutator.mutants.scopes import as_compiled, function_names
@@ -50,9 +52,29 @@ class ParsedFile:
     import_line: int
     functions: Mapping[str, tuple[Function, ...]]
     places: frozenset[Place]  # as `ast` sees them
+    expressions: Mapping[str, tuple[Expression, ...]]  # by function
     where: Path
     sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
+
+    def resolve_value(self, location: FaultLocation) -> Expression:
+        """The expression that `location` names; MutatorError with candidates unless there is exactly one."""
+        functions = _functions(self, location)
+        name = as_compiled(location.function.replace(".<locals>", ""))
+        return choose_expression(self.expressions.get(name, ()), location, self.where, functions[0].line)
+
+    def span(self, location: FaultLocation) -> tuple[int, int]:
+        """The lines of what the location names, from the first (from 0) to before the last; none at an entry."""
+        function's entry."""
+        if location.anchor.kind in VALUE_ANCHORS:
+            expression = self.resolve_value(location)
+            return expression.start[0], expression.end[0] + 1
+        site = self.resolve(location)
+        return site.first, site.last
+
+    def names(self, location: FaultLocation) -> frozenset[str]:
+        """The names that the functions of the location's name use."""
+        return frozenset().union(*(function.names for function in _functions(self, location)))
 
     def resolve(self, location: FaultLocation) -> Site:
         """The statement that `location` names; MutatorError with candidates unless there is exactly one."""
@@ -84,12 +106,13 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             indent_unit=module.default_indent.encode(),
             import_line=import_line(module, positions),
             functions=collect(module, positions, function_names(data)),
+            expressions=expressions_of(data, module, positions),
             places=places_by_ast(tree),
             where=where,
         )
 
 
-def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
+def _functions(file: ParsedFile, location: FaultLocation) -> tuple[Function, ...]:
     name = as_compiled(location.function.replace(".<locals>", ""))
     functions = file.functions.get(name)
     if not functions:
@@ -100,11 +123,18 @@ def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
             expected=f"one of {', '.join(known) or 'none: the file has no function'}",
             remedy="correct the qualified name" + suggestion(name, known),
         )
+    return functions
+
+
+def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
+    functions = _functions(file, location)
     if location.anchor.kind is AnchorKind.ENTRY:
         return _entry(file, location, functions)
     function, statement = _choose(file, location, functions)
     _refuse_awkward(file, location.anchor, statement)
     _check_place(file, statement.place)
+    if statement.opens is not None:
+        return _inside(file, statement.opens, function.names)
     first = statement.first
     return Site(
         first=first,
@@ -115,6 +145,12 @@ def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
         indent=_indent(file.lines[first]),
         names=function.names,
     )
+
+
+def _inside(file: ParsedFile, first: int, names: frozenset[str]) -> Site:
+    """The beginning of the block whose head binds the name."""
+    indent = _indent(file.lines[first])
+    return Site(first=first, last=first, after=True, alone=True, reindent=0, indent=indent, names=names)
 
 
 def _check_place(file: ParsedFile, place: Place | None) -> None:
@@ -171,7 +207,7 @@ def _choose(
 ) -> tuple[Function, Statement]:
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
-    name = as_compiled(anchor.name)
+    name = as_written(anchor.name)
     pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
     hits = [(f, s) for f, s in pairs if s.reason is None]
     nth = anchor.nth
@@ -229,7 +265,9 @@ def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> N
     """Refuse a statement that shares its line with others on the side where lines are inserted."""
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
-    if statement.one_line_suite:
+    if statement.opens is not None and not after:
+        reason = "is the head of a block"
+    elif statement.one_line_suite:
         reason = "stands on the line of its `if`, `for` or `def`"
     elif after and statement.is_return:
         reason = "returns, so nothing after it runs"

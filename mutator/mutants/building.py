@@ -23,7 +23,16 @@ from mutator.mutants.reusable_changes import (
     known_changes,
     reuse_key,
 )
-from mutator.mutants.splicing import Edit, apply_edits, insertion, joined, probe_import, unsplice
+from mutator.mutants.splicing import (
+    Edit,
+    ValueEdit,
+    apply_edits,
+    in_lines,
+    insertion,
+    joined,
+    probe_import,
+    unsplice,
+)
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
@@ -98,12 +107,12 @@ def _edits(
     manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection], ids: Sequence[str]
 ) -> dict[str, list[Edit]]:
     """The edits of each file: the observation's first, then those of the injections in their order."""
-    edits = {manifest.observation.location.path: [_observation(manifest)]}
+    edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
     for name, injection in zip(ids, injections, strict=True):
         check_location(manifest, injection.location)
         file = parsed(manifest.tree, injection.location.path)
         edits.setdefault(file.path, []).append(injection_edit(file, models, injection, name))
-    return edits
+    return {path: in_lines(parsed(manifest.tree, path), own) for path, own in edits.items()}
 
 
 def _observation(manifest: TargetManifest) -> Edit:

@@ -3,25 +3,39 @@
 import ast
 from collections.abc import Iterator, Sequence
 
+from mutator.config.locations import base_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
-from mutator.model import Injection
+from mutator.model import VALUE_ANCHORS, Injection
 from mutator.mutants.anchors import ParsedFile, Site
-from mutator.mutants.rendering import snippet
+from mutator.mutants.expressions import parts_of
+from mutator.mutants.rendering import changed_value, snippet
 from mutator.mutants.reusable_changes import reuse_key
 from mutator.mutants.scopes import as_compiled, moved_names
-from mutator.mutants.splicing import Edit, apply_edits, guard, insertion, joined
+from mutator.mutants.splicing import (
+    Edit,
+    ValueEdit,
+    apply_edits,
+    guard,
+    insertion,
+    joined,
+    value_change,
+)
 
 
-def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, name: str) -> Edit:
+def injection_edit(
+    file: ParsedFile, models: FaultModels, injection: Injection, name: str
+) -> Edit | ValueEdit:
     """The edit of one injection in its file; `name` tags its lines.
 
     MutatorError for an anchor that is not found, a name that the function does not know, and for lines that
     would change what the target's names mean while the fault is not active.
     """
     model = models.get(injection.model)
+    if injection.location.anchor.kind in VALUE_ANCHORS:
+        return _value_edit(file, model, injection, name)
     site = file.resolve(injection.location)
-    variables = _variables(file, site, model, injection)
+    variables = _variables(file, site.names, site.first, model, injection)
     code = snippet(model, dict(injection.params), name)
     make = guard if model.kind is SnippetKind.GUARD else insertion
     edit = make(file, site, code, name)
@@ -33,20 +47,30 @@ def injection_edit(file: ParsedFile, models: FaultModels, injection: Injection, 
     return edit
 
 
-def _variables(file: ParsedFile, site: Site, model: FaultModel, injection: Injection) -> frozenset[str]:
+def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
+    expression = file.resolve_value(injection.location)
+    _variables(file, file.names(injection.location), expression.start[0], model, injection)
+    params = dict(injection.params)
+    changed = changed_value(model, params, name, expression.written, parts_of(expression))
+    return value_change(file, expression, changed, name)
+
+
+def _variables(
+    file: ParsedFile, names: frozenset[str], first: int, model: FaultModel, injection: Injection
+) -> frozenset[str]:
     """The variables that are passed to the template; MutatorError for one that the function does not know."""
     params = dict(injection.params)
     found = set()
     for param in model.params:
         value = params.get(param.name)
         if param.type == "variable" and isinstance(value, str):
-            variable = as_compiled(value.partition(".")[0])
-            if variable not in site.names:
+            variable = as_compiled(base_name(value))
+            if variable not in names:
                 raise MutatorError(
                     f"'{value}' is not known in {injection.location.function}",
                     where=file.where,
-                    line=site.first + 1,
-                    expected=f"a name used there: {', '.join(sorted(site.names))}",
+                    line=first + 1,
+                    expected=f"a name used there: {', '.join(sorted(names))}",
                     remedy=f"correct `{param.name}`",
                 )
             found.add(variable)

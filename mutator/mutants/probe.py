@@ -7,7 +7,7 @@ code needs.
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import CodeType
 from typing import Any
@@ -25,12 +25,13 @@ OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the 
 INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
 
 _MARK = "# fi:"
-_TAG = rf"{_MARK}([0-9a-z]+)(?: guard:(\d+))?"
+_TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
 _NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
 _GUARD = re.compile(
     rf'\s*if (not )?{PROBE_NAME}\.active\("[0-9a-z]+"\)( or {PROBE_NAME}\.steps\(\))?:\Z'.encode()
 )
+_ASKED = re.compile(rf' if {PROBE_NAME}\.active\("([0-9a-z]+)"\) else '.encode())
 _TAGGED_ADDITION = re.compile(rf"^\+.*{_TAG}\r?$", re.MULTILINE)
 _FAULT_ADDITION = re.compile(rf"^\+.*{_MARK}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
 _SETTING = re.compile(
@@ -104,14 +105,18 @@ def template_values(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tag:
-    """The tag at the end of an injected line: the injection's id (or IMPORT_TAG, OBSERVE_TAG).
+    """The tag at the end of an injected line: the injection's id (or IMPORT_TAG, OBSERVE_TAG; several with
+    `+`
+    between them if they change values of one line).
 
     `guarded` is the number of lines that a guard indents, 0 in other lines; `code` the line without its tag.
+    `was` is the target's line in whose place this one stands; None for one that was inserted.
     """
 
     id: str
     guarded: int
     code: bytes
+    was: bytes | None = None
 
     @property
     def of_fault(self) -> bool:
@@ -123,18 +128,35 @@ class Tag:
         """Whether the line opens a block that runs only if the probe says so."""
         return _GUARD.match(self.code) is not None
 
+    @property
+    def asked_for(self) -> frozenset[str]:
+        """The injections whose values are those of a changed line only if the probe says so."""
+        return frozenset(found.decode() for found in _ASKED.findall(self.code))
+
 
 def tag_of(line: bytes) -> Tag | None:
     """The tag of a line, with or without its line end; None for a line of the target."""
     match = _TAG_OF_LINE.search(line)
     if match is None:
         return None
-    return Tag(id=match[1].decode(), guarded=int(match[2] or 0), code=line[: match.start()])
+    code = line[: match.start()]
+    return Tag(id=match[1].decode(), guarded=int(match[2] or 0), code=code, was=match[3])
 
 
 def tagged(code: str, tag: str, guarded: int = 0) -> str:
     """`code` with its tag; every line of a guard carries the number of lines that it guards."""
     return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
+
+
+def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
+    """The tag of a line that stands in the place of the target's line `was`."""
+    return f"  {_MARK}{'+'.join(ids)} was:".encode() + was
+
+
+def changed_value(tag: str, changed: str) -> str:
+    """How the line of an expression goes on before it: `changed` is what it is worth while the fault is
+    active."""
+    return f'({changed} if {PROBE_NAME}.active("{tag}") else '
 
 
 def tag_words() -> dict[str, Any]:

@@ -18,7 +18,7 @@ from jinja2.exceptions import SecurityError
 from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from mutator.config.locations import dotted_name
+from mutator.config.locations import PROBE_NAME, assignable, dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
@@ -75,12 +75,62 @@ def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[st
 
     MutatorError when the template fails or its result is not whole lines of Python.
     """
+    if model.kind is SnippetKind.VALUE:
+        target = str(params["target"])
+        return (
+            f'if {PROBE_NAME}.active("{fi}"):',
+            f"    {target} = {changed_value(model, params, fi, target)}",
+        )
     names = {param.name: _checked(param, params) for param in model.params}
     text = render(model.template, {"fi": fi, **names}, model.template_path)
     text = text.removesuffix("\n")
     if not _are_lines(normalized(text, (fi,)), model.kind):
         _check_lines(text, model.kind, model.template_path)
     return tuple(text.split("\n"))
+
+
+def changed_value(
+    model: FaultModel,
+    params: Mapping[str, Value],
+    fi: str,
+    original: str,
+    parts: Mapping[str, object] | None = None,
+) -> str:
+    """What the model makes of the value `original`, source on one line; `parts` are what that consists of.
+
+    MutatorError when the model changes no values, when the template fails, or does not give one expression.
+    """
+    if model.expression is None:
+        raise MutatorError(
+            f"model {model.name} changes no value of an expression",
+            where=model.source.path,
+            expected="a model of kind value, or one with `expression`",
+            remedy="anchor at a statement, or take another model",
+        )
+    names: dict[str, object] = {
+        param.name: _checked(param, params) for param in model.params if param.name != "target"
+    }
+    names |= {"fi": fi, "original": original, **(parts or {})}
+    text = render(model.expression, names, model.template_path)
+    if not _is_expression(normalized(text, (fi,))):
+        raise MutatorError(
+            f"the template gives {text!r}",
+            where=model.template_path,
+            expected="one expression on one line",
+            remedy="correct the template",
+        )
+    return text
+
+
+@lru_cache(maxsize=1024)
+def _is_expression(text: str) -> bool:
+    """Whether normalized source is an expression without `yield`, and with it every source that it stands
+    for."""
+    try:
+        tree = ast.parse(text, mode="eval")
+    except (SyntaxError, ValueError, RecursionError):
+        return False
+    return "\n" not in text and not any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(tree))
 
 
 def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
@@ -90,7 +140,8 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     if param.type == "constant":
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return value if number or param.name not in params else repr(value)
-    is_name = isinstance(value, str) and dotted_name(value)
+    fits = assignable if param.type == "variable" else dotted_name
+    is_name = isinstance(value, str) and fits(value)
     if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
         raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
     return value

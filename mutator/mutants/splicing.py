@@ -1,36 +1,57 @@
 """The splicer: inserts tagged lines between the lines of a source file, and removes them again.
 
 Edits are whole lines, so everything else keeps its bytes by construction: line ends, tabs, comments, a
-missing newline at the end. A guard also indents the statement it wraps; its tag says how many lines.
+missing newline at the end. A guard also indents the statement it wraps; its tag says how many lines. A line
+with an expression whose value is changed gives way to one that keeps the old line in its tag.
 """
 
 from codecs import BOM_UTF8
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import ParsedFile, Site
-from mutator.mutants.probe import import_statement, tag_of, tagged
+from mutator.mutants.expressions import Expression
+from mutator.mutants.probe import changed_value, import_statement, tag_instead, tag_of, tagged
 
 
 class Rank(IntEnum):
-    """Order of edits between the same two lines: first what follows the upper one, a guard last."""
+    """Order of edits between the same two lines: first what follows the upper one, then what precedes the
+    lower
+    one, then what changes this: a guard around it, a line in its place."""
 
     AFTER = 0
     BEFORE = 1
     GUARD = 2
+    INSTEAD = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edit:
-    """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`."""
+    """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`. One of
+    rank
+    INSTEAD takes the place of that line."""
 
     index: int
     rank: Rank
     lines: tuple[bytes, ...]
     reindent: int = 0
     unit: bytes = b""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValueEdit:
+    """What to write around an expression, from `start` to `end` (line and byte, from 0), which keeps its
+    bytes."""
+
+    start: tuple[int, int]
+    end: tuple[int, int]
+    before: bytes
+    after: bytes
+    tag: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +89,51 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
     )
 
 
+def value_change(file: ParsedFile, expression: Expression, changed: str, tag: str) -> ValueEdit:
+    """The edit that gives `expression` the value of `changed`, source on one line, while the fault is
+    active."""
+    opened, closed = ("(", "))") if expression.bare else ("", ")")
+    return ValueEdit(
+        start=expression.start,
+        end=expression.end,
+        before=_encoded(file, changed_value(tag, changed) + opened, expression.start[0]),
+        after=closed.encode(),
+        tag=tag,
+    )
+
+
+def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
+    """The edits with those of values made into lines, of which each stands in the place of one of the
+    target."""
+    edits = list(edits)
+    values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
+    for one, other in pairwise(values):
+        if other.start < one.end:
+            raise MutatorError(
+                "two injections into one expression",
+                where=file.where,
+                line=other.start[0] + 1,
+                expected="expressions that lie apart",
+                remedy="drop one of the injections",
+            )
+    written: dict[int, list[tuple[int, bytes, str]]] = defaultdict(list)
+    for edit in values:
+        written[edit.start[0]].append((edit.start[1], edit.before, edit.tag))
+        written[edit.end[0]].append((edit.end[1], edit.after, edit.tag))
+    lines = [_instead(file, index, texts) for index, texts in written.items()]
+    return [*(edit for edit in edits if isinstance(edit, Edit)), *lines]
+
+
+def _instead(file: ParsedFile, index: int, texts: Sequence[tuple[int, bytes, str]]) -> Edit:
+    whole = file.lines[index]
+    was = whole.rstrip(b"\r\n")
+    line = was
+    for column, text, _ in reversed(texts):
+        line = line[:column] + text + line[column:]
+    tag = tag_instead(dict.fromkeys(tag for *_, tag in texts), was)
+    return Edit(index=index, rank=Rank.INSTEAD, lines=(line + tag + whole[len(was) :],))
+
+
 def probe_import(file: ParsedFile, package: str | None) -> Edit:
     """The edit that imports the probe: after docstring and `__future__` imports."""
     if file.import_line == 0 and file.data.startswith(BOM_UTF8):
@@ -94,18 +160,22 @@ def _lines(
     for line in code:
         body = line.lstrip(" ")
         levels = (len(line) - len(body)) // 4
-        try:
-            text = tagged(body, tag, guarded).encode(file.encoding)
-        except UnicodeEncodeError:
-            raise MutatorError(
-                f"{body!r} cannot be written in {file.encoding}",
-                where=file.where,
-                line=site.first + 1,
-                expected="names that the file's encoding has",
-                remedy="use other names",
-            ) from None
+        text = _encoded(file, tagged(body, tag, guarded), site.first)
         result.append(site.indent + unit * levels + text + file.newline)
     return tuple(result)
+
+
+def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
+    try:
+        return text.encode(file.encoding)
+    except UnicodeEncodeError:
+        raise MutatorError(
+            f"{text!r} cannot be written in {file.encoding}",
+            where=file.where,
+            line=line + 1,
+            expected="names that the file's encoding has",
+            remedy="use other names",
+        ) from None
 
 
 def in_order(edits: Iterable[Edit]) -> list[Edit]:
@@ -123,7 +193,7 @@ def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
                 "two guards around one statement, or an injection inside a guarded one",
                 where=file.where,
                 line=edit.index + 1,
-                expected="one omission a statement",
+                expected="one guard a statement, and nothing else in it",
                 remedy="drop one of the injections",
             )
         _keep(pieces, file.lines[done : edit.index])
@@ -131,6 +201,9 @@ def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
         added = list(edit.lines)
         if done and edit.index == len(file.lines):
             added = _end_of_file(pieces, added, file.newline)
+        if edit.rank is Rank.INSTEAD:
+            pieces.append(Piece(sign="-", lines=file.lines[edit.index : edit.index + 1]))
+            done += 1
         if edit.reindent:
             done += edit.reindent
             wrapped = file.lines[edit.index : done]
@@ -176,14 +249,16 @@ def joined(pieces: Iterable[Piece]) -> bytes:
 
 
 def unsplice(data: bytes) -> bytes:
-    """The original bytes of a mutated file: tagged lines removed, guarded statements put back."""
+    """The original bytes of a mutated file: inserted lines removed, changed and guarded ones put back."""
     lines = data.splitlines(keepends=True)
     result: list[bytes] = []
     left = 0  # lines that are still indented by a guard
     margin = unit = b""
     for line in lines:
         tag = tag_of(line)
-        if tag:
+        if tag and tag.was is not None:
+            result.append(tag.was + line[len(line.rstrip(b"\r\n")) :])
+        elif tag:
             left = tag.guarded
             margin, unit = _margin(line), b""
         elif left and not unit:

@@ -1,10 +1,12 @@
 """What a function's statements assign, call and return, and the lines they are on."""
 
+import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import libcst as cst
 
+from mutator.config.locations import assignable
 from mutator.mutants.places import Place, Positions, function_place, line_after, statement_place
 from mutator.mutants.scopes import FunctionNames, as_compiled
 
@@ -28,6 +30,7 @@ class Statement:
     one_line_suite: bool = False
     spanning_string: bool = False
     reason: str | None = None
+    opens: int | None = None  # of what the head of a block binds: the block's first line
 
     def names(self, verb: str) -> tuple[str, ...]:
         """The names that it assigns, calls or returns, as `verb` says."""
@@ -77,6 +80,13 @@ def dotted(node: cst.CSTNode | None) -> str | None:
     return None
 
 
+def item(node: cst.Subscript) -> str | None:
+    """`a['b']`, as anchors name it; None if something is calculated in it, which a second time may be
+    another."""
+    text = ast.unparse(ast.parse(cst.Module([]).code_for_node(node), mode="eval"))
+    return text if assignable(text) else None
+
+
 class _Collector(cst.CSTVisitor):
     def __init__(self, positions: Positions, names: FunctionNames) -> None:
         super().__init__()
@@ -85,6 +95,7 @@ class _Collector(cst.CSTVisitor):
         self.functions: dict[str, list[Function]] = {}
         self.scope: list[str] = []
         self.open: list[list[Statement] | None] = []  # None for a class
+        self.heads: set[int] = set()  # targets in heads of blocks, by their identity
 
     def visit_ClassDef(self, node: cst.ClassDef) -> None:  # noqa: N802
         self.scope.append(as_compiled(node.name.value))
@@ -119,10 +130,20 @@ class _Collector(cst.CSTVisitor):
         self._add(node, one_line_suite=True)
 
     def visit_For(self, node: cst.For) -> None:  # noqa: N802
-        self._add_other(node.target, _targets(node.target), "it is the target of a `for`")
+        self._add_head(node.target, node.body, "it is the target of a `for`")
+
+    def visit_With(self, node: cst.With) -> None:  # noqa: N802
+        for item in node.items:
+            if item.asname:
+                self._add_head(item.asname.name, node.body, "it is bound by `as`")
+
+    def visit_ExceptHandler(self, node: cst.ExceptHandler) -> None:  # noqa: N802
+        if node.name:
+            self._add_head(node.name.name, node.body, "it is bound by `as`")
 
     def visit_AsName(self, node: cst.AsName) -> None:  # noqa: N802
-        self._add_other(node, _targets(node.name), "it is bound by `as`")
+        if id(node.name) not in self.heads:
+            self._add_other(node, _targets(node.name), "it is bound by `as`")
 
     def visit_NamedExpr(self, node: cst.NamedExpr) -> None:  # noqa: N802
         self._add_other(node, _targets(node.target), "it is bound by `:=` inside an expression")
@@ -156,6 +177,21 @@ class _Collector(cst.CSTVisitor):
                     spanning_string=_spanning_string(small, self.positions),
                 )
             )
+
+    def _add_head(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
+        """What the head of a block binds: its block is where a snippet goes, if that has lines of its own."""
+        self.heads.add(id(target))
+        statements, names = self.open[-1] if self.open else None, _targets(target)
+        if statements is None or not names:
+            return
+        if not isinstance(body, cst.IndentedBlock):
+            self._add_other(target, names, reason)
+            return
+        first = body.body[0]
+        decorators = first.decorators if isinstance(first, cst.FunctionDef | cst.ClassDef) else ()
+        opens = min(self.positions[one].start.line for one in (first, *decorators)) - 1
+        line = self.positions[target].start.line - 1
+        statements.append(Statement(first=line, last=opens, assigns=tuple(names), opens=opens))
 
     def _add_other(self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False) -> None:
         statements = self.open[-1] if self.open else None
@@ -210,7 +246,7 @@ def _targets(node: cst.CSTNode) -> list[str]:
         return [name for element in node.elements for name in _targets(element.value)]
     if isinstance(node, cst.StarredElement):
         return _targets(node.value)
-    name = dotted(node)
+    name = item(node) if isinstance(node, cst.Subscript) else dotted(node)
     return [name] if name else []
 
 

@@ -238,7 +238,8 @@ def _spec(fault: Fault) -> str:
 
 
 def _anchor(anchor: Anchor) -> dict[str, Any]:
-    return {anchor.kind.value: anchor.name} | ({"nth": anchor.nth} if anchor.nth else {})
+    chosen = {"which": anchor.which, "nth": anchor.nth}
+    return {anchor.kind.value: anchor.name} | {key: value for key, value in chosen.items() if value}
 
 
 def _setting(experiment: Experiment) -> str:

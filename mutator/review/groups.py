@@ -112,7 +112,9 @@ def location_label(location: FaultLocation) -> str:
     """A location in words."""
     anchor = location.anchor
     number = f"#{anchor.nth}" if anchor.nth is not None else ""
-    return " ".join(filter(None, (location.path, location.function, anchor.kind.value, anchor.name, number)))
+    which = f"which {anchor.which}" if anchor.which else ""
+    words = (location.path, location.function, anchor.kind.value, anchor.name, which, number)
+    return " ".join(filter(None, words))
 
 
 def injection_label(injection: Injection) -> str:

@@ -296,4 +296,5 @@ def _setting(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
 
 def _own_line(data: bytes, line: int) -> int:
     """The line of the target's own file that is this one of a mutant's."""
-    return line - sum(tag_of(one) is not None for one in data.splitlines()[: line - 1])
+    tags = map(tag_of, data.splitlines()[: line - 1])
+    return line - sum(tag is not None and tag.was is None for tag in tags)

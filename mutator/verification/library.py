@@ -19,7 +19,7 @@ from mutator.model import Fault
 from mutator.mutants.anchors import parse_file, parsed
 from mutator.mutants.building import build
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, joined, unsplice
+from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
 from mutator.onboarding.marks import unfilled
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
@@ -201,7 +201,7 @@ def run_example(model: FaultModel, models: FaultModels, example: Example) -> str
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
-    after = joined(apply_edits(file, [edit]))
+    after = joined(apply_edits(file, in_lines(file, [edit])))
     if unsplice(after) != file.data:
         raise MutatorError("the example does not un-splice to its `before`")
     return after.decode()

@@ -142,6 +142,7 @@ def _with_count(models: FaultModels) -> FaultModels:
         params=(),
         examples=(),
         template='_fi.active("{{ fi }}")\n',
+        expression="{{ original }}",
         source=some.source,
         template_path=some.template_path,
     )

@@ -74,7 +74,7 @@ def test_an_example_that_does_not_hold(folder: Path) -> None:
     path = folder / "scale.py.j2"
     path.write_text(path.read_text().replace(" * ", " / "))
     (problem,) = check_examples(load_fault_models(folder))
-    assert problem.where == str(folder / "scale.yaml") and problem.line == 9
+    assert problem.where == str(folder / "scale.yaml") and problem.line == 11
     assert all(f"self.yaw_rate {sign} _fi.like(" in str(problem) for sign in "*/")
 
 
@@ -82,7 +82,7 @@ def test_an_example_that_fails(folder: Path) -> None:
     """A template that does not parse is a problem of its examples, not a traceback."""
     (folder / "scale.py.j2").write_text("if {{ target:\n")
     (problem,) = check_examples(load_fault_models(folder))
-    assert "scale.yaml:9: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
+    assert "scale.yaml:11: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
         problem
     )
 
@@ -101,11 +101,16 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
     ("name", "old", "new", "said"),
     [
         ("scale.yaml", "name: scale", "name: times", "2: 'times'; expected 'scale', as the file is named"),
-        ("scale.yaml", "kind: insert", "kind: wrap", "3: 'wrap' for 'kind'; expected one of 'insert' or"),
+        (
+            "scale.yaml",
+            "kind: insert",
+            "kind: wrap",
+            "3: 'wrap' for 'kind'; expected one of 'insert', 'guard'",
+        ),
         ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
         ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
         ("offset.yaml", "unit: target", "unit: feet", "8: 'feet'; expected target or one of m, mm, cm"),
-        ("scale.yaml", "examples:", "samples:", "8: unknown key 'samples'"),
+        ("scale.yaml", "examples:", "samples:", "10: unknown key 'samples'"),
         (
             "scale.yaml",
             "before: |",

@@ -1,0 +1,70 @@
+"""From the words of an anchor to the one expression that they name."""
+
+import ast
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants.expressions import Expression
+
+_MOST = 12  # candidates that an error lists
+
+
+def as_written(name: str) -> str:
+    """The text by which anchors know an expression; a text that is none stays as it is."""
+    try:
+        return ast.unparse(ast.parse(name.strip(), mode="eval"))
+    except (SyntaxError, ValueError, RecursionError):
+        return name
+
+
+def choose_expression(
+    known: Sequence[Expression], location: FaultLocation, where: Path, line: int
+) -> Expression:
+    """The one of a function's expressions that the location's anchor names; MutatorError that lists those
+    that
+    it may have meant unless there is exactly one. The function begins at `line` (from 0)."""
+    anchor, kind = location.anchor, location.anchor.kind
+    name = as_written(anchor.name)
+    hits = [one for one in known if one.answers(kind, name, anchor.which)]
+    nth = anchor.nth
+    if hits and (len(hits) == 1 if nth is None else nth <= len(hits)):
+        return hits[(nth or 1) - 1]
+    what = " ".join(filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _which(anchor))))
+    if hits:
+        lines = ", ".join(str(one.start[0] + 1) for one in hits)
+        take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+        raise MutatorError(
+            f"{what} names {len(hits)} expressions in {location.function}: lines {lines}",
+            where=where,
+            line=hits[0].start[0] + 1,
+            expected="exactly one",
+            remedy=f"give `nth`, {take}" if nth is None else f"`nth` is {nth}: give {take}",
+        )
+    raise MutatorError(
+        f"no {what} in {location.function}",
+        where=where,
+        line=line + 1,
+        expected=_candidates(known, kind, name),
+        remedy="correct the text as it is written in the source",
+    )
+
+
+def _which(anchor: Anchor) -> str:
+    return f"which {anchor.which}" if anchor.which else ""
+
+
+def _candidates(known: Sequence[Expression], kind: AnchorKind, name: str) -> str:
+    """The anchors of this kind, those of the name first if there are any; the most similar of many."""
+    roles = [(called, place, one) for one in known for own, called, place in one.roles if own is kind]
+    roles = [role for role in roles if role[0] == name] or roles
+    if len(roles) > _MOST:
+        near = get_close_matches(name, [called for called, *_ in roles], n=_MOST, cutoff=0.0)
+        roles = [role for role in roles if role[0] in near][:_MOST]
+    told = [
+        f"`{called}`" + (f" which {place}" if place else "") + f" (line {one.start[0] + 1})"
+        for called, place, one in roles
+    ]
+    return f"one of {', '.join(told)}" if told else "another anchor: there is none of this kind"

@@ -1,0 +1,308 @@
+"""Expressions whose value can be changed where they stand: what a function returns, asks, passes on,
+calculates.
+
+Python's own parser finds them, and what each is for; one counts only if LibCST sees an expression in the same
+place. None begins or ends on a line that cannot carry a tag: one that ends inside a string, or in a
+backslash.
+"""
+
+import ast
+import io
+import tokenize
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import libcst as cst
+
+from mutator.model import AnchorKind
+from mutator.mutants.places import Positions
+
+_Point = tuple[int, int]  # line and column in bytes, both from 0
+_Role = tuple[AnchorKind, str, str | None]
+_Found = tuple[str, ast.expr, tuple[_Role, ...]]
+
+_ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | ast.List | ast.Dict | ast.Set
+_NOT_ALONE = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom | ast.NamedExpr
+_BLOCKS = ("body", "orelse", "finalbody")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expression:
+    """An expression of a function, from `start` to before `end`.
+
+    `roles` are the anchors that it answers to: kind, name, which argument; the last is VALUE, with its text.
+    `written` is its source on one line, in parentheses if an operator beside it could tear it apart.
+    """
+
+    function: str
+    start: _Point
+    end: _Point
+    roles: tuple[_Role, ...]
+    written: str
+    bare: bool  # a tuple without parentheses
+    node: ast.expr
+
+    @property
+    def text(self) -> str:
+        """What an anchor calls it, however it is spaced and quoted in the source."""
+        return self.roles[-1][1]
+
+    def answers(self, kind: AnchorKind, name: str, which: str | None) -> bool:
+        """Whether an anchor of this kind names it: an empty name or no `which` stands for any."""
+        return any(
+            kind is own and name in (called, "") and which in (place, None)
+            for own, called, place in self.roles
+        )
+
+
+def _grouped(found: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
+    """Expressions by their function."""
+    functions: dict[str, list[Expression]] = defaultdict(list)
+    for one in found:
+        functions[one.function].append(one)
+    return {name: tuple(own) for name, own in functions.items()}
+
+
+def expressions_of(
+    data: bytes, module: cst.Module, positions: Positions
+) -> dict[str, tuple[Expression, ...]]:
+    """The expressions of each function of a file whose value can be changed, in the order of the source."""
+    encoding = module.encoding.removesuffix("-sig")
+    lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
+    seen, untaggable = _seen_by_libcst(positions), _untaggable(data)
+    found = []
+    for function, node, roles in _in_functions(ast.parse(data)):
+        start, end = _extent(lines, node)
+        known = seen.issuperset(_extent(lines, one) for one in _known_by(node, lines, start))
+        if known and untaggable.isdisjoint((start[0], end[0])):
+            found.append(_expression(lines, encoding, (function, node, roles), start, end))
+    return _grouped(sorted(found, key=lambda one: (one.start, (-one.end[0], -one.end[1]))))
+
+
+def _expression(lines: Sequence[str], encoding: str, found: _Found, start: _Point, end: _Point) -> Expression:
+    function, node, roles = found
+    text = ast.unparse(node)
+    written = lines[start[0]][start[1] : end[1]] if start[0] == end[0] else text
+    bare = isinstance(node, ast.Tuple) and not written.startswith("(")
+    alone = isinstance(node, _ATOMS) or (isinstance(node, ast.Tuple) and not bare)
+    return Expression(
+        function=function,
+        start=(start[0], len(lines[start[0]][: start[1]].encode(encoding))),
+        end=(end[0], len(lines[end[0]][: end[1]].encode(encoding))),
+        roles=(*roles, (AnchorKind.VALUE, text, None)),
+        written=written if alone else f"({written})",
+        bare=bare,
+        node=node,
+    )
+
+
+def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
+    """Where a node begins and ends: line and column in characters, from 0. `ast` counts bytes of UTF-8."""
+    assert node.end_lineno is not None and node.end_col_offset is not None
+
+    def point(line: int, column: int) -> _Point:
+        text = lines[line - 1]
+        return line - 1, column if text.isascii() else len(text.encode()[:column].decode())
+
+    return point(node.lineno, node.col_offset), point(node.end_lineno, node.end_col_offset)
+
+
+def _known_by(node: ast.expr, lines: Sequence[str], start: _Point) -> list[ast.expr]:
+    """The nodes by whose places LibCST must know it: a tuple in parentheses, which LibCST does not count to
+    it, by its elements."""
+    in_parentheses = isinstance(node, ast.Tuple) and lines[start[0]][start[1] :].startswith("(")
+    return node.elts if isinstance(node, ast.Tuple) and in_parentheses else [node]
+
+
+def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
+    return frozenset(
+        ((span.start.line - 1, span.start.column), (span.end.line - 1, span.end.column))
+        for node, span in positions.items()
+        if isinstance(node, cst.BaseExpression)
+    )
+
+
+def _untaggable(data: bytes) -> frozenset[int]:
+    """The lines (from 0) that cannot end in a comment."""
+    found = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
+    begun: list[int] = []  # lines in which f-strings began that have not ended
+    for token in tokenize.tokenize(io.BytesIO(data).readline):
+        kind = tokenize.tok_name[token.type]
+        if kind == "FSTRING_START":
+            begun.append(token.start[0])
+        first = begun.pop() if kind == "FSTRING_END" else token.start[0]
+        if kind in ("STRING", "FSTRING_END"):
+            found.update(range(first - 1, token.end[0] - 1))
+    return frozenset(found)
+
+
+def _in_functions(tree: ast.Module) -> Iterator[_Found]:
+    """Each expression in a function's body, with the function's qualified name and what it is there."""
+    yield from _of_scope(tree.body, (), inside=False)
+
+
+def _of_scope(body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool) -> Iterator[_Found]:
+    for statement in body:
+        if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            in_function = not isinstance(statement, ast.ClassDef)
+            yield from _of_scope(statement.body, (*scope, statement.name), inside=in_function)
+            continue
+        if inside:
+            name = ".".join(scope)
+            yield from ((name, node, roles) for node, roles in _of_statement(statement))
+        for block in _blocks(statement):
+            yield from _of_scope(block, scope, inside=inside)
+
+
+def _blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
+    for name in _BLOCKS:
+        yield getattr(statement, name, [])
+    for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
+        yield part.body
+
+
+_Pairs = Iterator[tuple[ast.expr, tuple[_Role, ...]]]
+
+
+def _of_statement(statement: ast.stmt) -> _Pairs:
+    """The expressions of one statement, without those of the statements in it."""
+    match statement:
+        case ast.Assign(targets=targets, value=value):
+            yield from _assigned(targets, value)
+        case (
+            ast.AugAssign(target=target, value=value)
+            | ast.AnnAssign(target=target, value=ast.expr() as value)
+        ):
+            yield from _assigned([target], value)
+        case ast.Return(value=ast.expr() as value):
+            yield from _of(value, (AnchorKind.RETURN_VALUE, ast.unparse(value), None))
+        case ast.If(test=test) | ast.While(test=test) | ast.Assert(test=test):
+            yield from _condition(test)
+        case ast.For(target=target, iter=value) | ast.AsyncFor(target=target, iter=value):
+            yield from _of(value)
+            yield from _in_target(target)
+        case ast.With(items=items) | ast.AsyncWith(items=items):
+            for item in items:
+                yield from _of(item.context_expr)
+        case ast.Match(subject=subject, cases=cases):
+            yield from _of(subject)
+            for case in cases:
+                if case.guard:
+                    yield from _condition(case.guard)
+        case ast.Expr(value=value) if not isinstance(value, ast.Constant):
+            yield from _of(value)
+        case ast.Raise(exc=ast.expr() as value):
+            yield from _of(value)
+
+
+def _assigned(targets: Sequence[ast.expr], value: ast.expr) -> _Pairs:
+    yield from _of(value, *((AnchorKind.ASSIGNED_VALUE, ast.unparse(target), None) for target in targets))
+    for target in targets:
+        yield from _in_target(target)
+
+
+def _condition(test: ast.expr) -> _Pairs:
+    yield from _of(test, (AnchorKind.CONDITION, ast.unparse(test), None))
+
+
+def _in_target(target: ast.expr) -> _Pairs:
+    """What is calculated to find what is assigned to: an index."""
+    match target:
+        case ast.Tuple(elts=elements) | ast.List(elts=elements):
+            for element in elements:
+                yield from _in_target(element)
+        case ast.Starred(value=value):
+            yield from _in_target(value)
+        case ast.Subscript(value=value, slice=index):
+            yield from _base(value)
+            yield from _of(index)
+        case ast.Attribute(value=value):
+            yield from _base(value)
+
+
+def _base(node: ast.expr) -> _Pairs:
+    """What an attribute, an item or a method is taken of: names alone are objects, and no values."""
+    if isinstance(node, ast.Attribute):
+        yield from _base(node.value)
+    elif not isinstance(node, ast.Name):
+        yield from _of(node)
+
+
+def _of(node: ast.expr, *roles: _Role) -> _Pairs:
+    """An expression, and those in it."""
+    if isinstance(node, ast.JoinedStr):
+        return
+    if isinstance(node, ast.Call):
+        roles = (*roles, (AnchorKind.RESULT, ast.unparse(node.func), None))
+    parts = node.elts if isinstance(node, ast.Tuple) else ()
+    if not isinstance(node, _NOT_ALONE) and not any(isinstance(p, ast.Slice | ast.Starred) for p in parts):
+        yield node, roles
+    match node:
+        case ast.Call():
+            yield from _call(node)
+        case ast.Attribute(value=value):
+            yield from _base(value)
+        case ast.Subscript(value=value, slice=index):
+            yield from _base(value)
+            yield from _of(index)
+        case ast.IfExp(test=test, body=body, orelse=other):
+            yield from _of(body)
+            yield from _condition(test)
+            yield from _of(other)
+        case ast.NamedExpr(target=target, value=value):
+            yield from _of(value, (AnchorKind.ASSIGNED_VALUE, ast.unparse(target), None))
+        case ast.Lambda(body=body):
+            yield from _of(body)
+        case ast.UnaryOp(operand=ast.Constant()):
+            pass  # -1 is one constant
+        case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
+            yield from _comprehension(node)
+        case _:
+            for child in ast.iter_child_nodes(node):
+                if isinstance(child, ast.expr):
+                    yield from _of(child)
+
+
+def _call(node: ast.Call) -> _Pairs:
+    called = ast.unparse(node.func)
+    yield from _base(node.func)
+    for place, argument in enumerate(node.args, 1):
+        yield from _of(argument, (AnchorKind.ARGUMENT, called, str(place)))
+    for keyword in node.keywords:
+        roles = [(AnchorKind.ARGUMENT, called, keyword.arg)] if keyword.arg else []
+        yield from _of(keyword.value, *roles)
+
+
+def _comprehension(node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp) -> _Pairs:
+    made = (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,)
+    for value in made:
+        yield from _of(value)
+    for generator in node.generators:
+        yield from _of(generator.iter)
+        for test in generator.ifs:
+            yield from _condition(test)
+
+
+def parts_of(expression: Expression) -> dict[str, object]:
+    """What templates may ask of it beside the whole, each None or empty where there is none: the two sides
+    of an
+    operator (`left`, `right`), and of a call what is called (`called`) and its arguments (`arguments`)."""
+    node, left, right = expression.node, None, None
+    if isinstance(node, ast.BinOp):
+        left, right = node.left, node.right
+    elif isinstance(node, ast.Compare) and len(node.comparators) == 1:
+        left, right = node.left, node.comparators[0]
+    elif isinstance(node, ast.BoolOp) and len(node.values) == 2:
+        left, right = node.values
+    called, arguments = None, list[str]()
+    if isinstance(node, ast.Call):
+        called = ast.unparse(node.func)
+        arguments = [ast.unparse(argument) for argument in (*node.args, *node.keywords)]
+    sides = [side and _enclosed(side) for side in (left, right)]
+    return {"left": sides[0], "right": sides[1], "called": called, "arguments": arguments}
+
+
+def _enclosed(node: ast.expr) -> str:
+    text = ast.unparse(node)
+    return text if isinstance(node, _ATOMS) else f"({text})"
