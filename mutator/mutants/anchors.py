@@ -64,8 +64,7 @@ class ParsedFile:
         return choose_expression(self.expressions.get(name, ()), location, self.where, functions[0].line)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
-        """The lines of what the location names, from the first (from 0) to before the last; none at an entry."""
-        function's entry."""
+        """The lines that what the location names is on: the first (from 0), and the one after the last."""
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1
