@@ -14,8 +14,7 @@ Value = int | float | str | bool | None
 
 
 class AnchorKind(StrEnum):
-    """Where, relative to a statement of the target, a snippet goes; or, in VALUE_ANCHORS, whose value it
-    changes."""
+    """Where, relative to a statement of the target, a snippet goes; of VALUE_ANCHORS, whose value changes."""
 
     AFTER_ASSIGN = "after_assign"
     BEFORE_ASSIGN = "before_assign"

@@ -41,9 +41,8 @@ class AtModel(StrictModel, title="A place"):
     )
     condition: str | None = Field(
         None,
-        description="What decides an `if`, `while`, `assert`, `x if ... else y`, or the filter of a "
-        "comprehension, "
-        "as written; empty for any.",
+        description="What decides an `if`, a `while`, an `assert`, `x if ... else y` or what a comprehension "
+        "takes in; empty for any.",
     )
     argument: str | None = Field(
         None, description="An argument of the call of this name; `which` says which, if it has several."

@@ -15,7 +15,7 @@ from functools import lru_cache
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
-from mutator.mutants.probe import Tag, parts_of, probe_path, tag_of
+from mutator.mutants.probe import parts_of, probe_path, tag_of
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
@@ -106,8 +106,7 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
     imports: list[str] = []
     before, margin = "", 0
     tags = [tag for line in lines if (tag := tag_of(line)) and tag.was is not None]
-    changed, asked = ({name for tag in tags for name in names(tag)} for names in (_ids, _asked_for))
-    if changed != asked:
+    if {name for tag in tags for name in tag.ids} != {name for tag in tags for name in tag.asked_for}:
         raise NotSwappable(f"{path} has a changed value that does not ask the probe first")
     for line in lines:
         tag = tag_of(line)
@@ -121,14 +120,6 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
                 imports.append((found[1] or found[2]).decode())
         before = tag.id if tag else ""
     return tuple(imports)
-
-
-def _ids(tag: Tag) -> list[str]:
-    return tag.id.split("+")
-
-
-def _asked_for(tag: Tag) -> frozenset[str]:
-    return tag.asked_for
 
 
 def changed_functions(

@@ -47,7 +47,8 @@ class Job:
         return "" if self.mutant is None else report_problem(report, self.mutant, self.injections)
 
 
-Stack = tuple[tuple[str, int], ...]  # (file, line) in the tree, innermost first
+# (file, line, byte of the line at which what raised begins, -1 if unknown) in the tree, innermost first
+Stack = tuple[tuple[str, int, int], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +65,7 @@ class Raised:
     @property
     def place(self) -> str:
         """`file:line` of the innermost line of the target (the probe is none); empty if there is none."""
-        return next((f"{path}:{line}" for path, line in self.stacks[0] if not is_probe(path)), "")
+        return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe(path)), "")
 
     @property
     def text(self) -> str:

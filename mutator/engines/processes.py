@@ -103,7 +103,10 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
     error = report["error"]
     if error is None:
         return None
-    own, *others = (tuple((str(path), int(line)) for path, line in stack) for stack in error["stacks"])
+    own, *others = (
+        tuple((str(path), int(line), int(column)) for path, line, column in stack)
+        for stack in error["stacks"]
+    )
     stacks = (own, *others)
     return Raised(kind=str(error["kind"]), message=str(error["message"]), stacks=stacks)
 

@@ -212,7 +212,9 @@ class ReferenceEngine:
 
 def _steady(raised: Raised, folder: Path) -> Raised:
     """The exception in texts that can be kept: a run may give classes and files any name."""
-    stacks = tuple(tuple((steady(path, folder), line) for path, line in stack) for stack in raised.stacks)
+    stacks = tuple(
+        tuple((steady(path, folder), line, column) for path, line, column in stack) for stack in raised.stacks
+    )
     return Raised(kind=steady(raised.kind, folder), message=steady(raised.message, folder), stacks=stacks)
 
 

@@ -164,14 +164,11 @@ class FaultModelModel(StrictModel, title="The file"):
     name: str = Field(description="Its name, that of the file.")
     kind: Literal["insert", "guard", "value"] = Field(
         description="`insert`: lines before or after the statement; `guard`: the statement is wrapped; "
-        "`value`: the "
-        "template is one expression over `original`, the value that is changed, be it a variable's or an "
-        "expression's."
+        "`value`: the template is one expression over `original`, the value of a variable or an expression."
     )
     expression: str | None = Field(
         None,
-        description="Of an `insert`: the template of the same change to the value of an expression, "
-        "`original`.",
+        description="Of an `insert`: the template of the same change to an expression's value, `original`.",
     )
     about: str = Field(description="What it does, in a sentence.")
     raises: bool = Field(

@@ -23,9 +23,8 @@ def as_written(name: str) -> str:
 def choose_expression(
     known: Sequence[Expression], location: FaultLocation, where: Path, line: int
 ) -> Expression:
-    """The one of a function's expressions that the location's anchor names; MutatorError that lists those
-    that
-    it may have meant unless there is exactly one. The function begins at `line` (from 0)."""
+    """The one of a function's expressions that the location's anchor names; the function begins at `line`
+    (from 0). MutatorError that lists what it may have meant unless there is exactly one."""
     anchor, kind = location.anchor, location.anchor.kind
     name = as_written(anchor.name)
     hits = [one for one in known if one.answers(kind, name, anchor.which)]

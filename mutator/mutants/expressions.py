@@ -1,8 +1,7 @@
-"""Expressions whose value can be changed where they stand: what a function returns, asks, passes on,
-calculates.
+"""Expressions whose value can be changed where they stand: what a function returns, asks, passes on.
 
-Python's own parser finds them, and what each is for; one counts only if LibCST sees an expression in the same
-place. None begins or ends on a line that cannot carry a tag: one that ends inside a string, or in a
+Python's own parser finds them, and what each is for; one counts only if LibCST sees an expression in the
+same place. None begins or ends on a line that cannot carry a tag: one that ends inside a string, or in a
 backslash.
 """
 
@@ -285,9 +284,8 @@ def _comprehension(node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.Dic
 
 
 def parts_of(expression: Expression) -> dict[str, object]:
-    """What templates may ask of it beside the whole, each None or empty where there is none: the two sides
-    of an
-    operator (`left`, `right`), and of a call what is called (`called`) and its arguments (`arguments`)."""
+    """What templates may use beside the whole: the two sides of an operator (`left`, `right`), what a call
+    calls (`called`) and its arguments (`arguments`); None, or empty, where there is no such thing."""
     node, left, right = expression.node, None, None
     if isinstance(node, ast.BinOp):
         left, right = node.left, node.right

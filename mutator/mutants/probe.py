@@ -5,9 +5,12 @@ injected lines asks this module. Code inside a target's process cannot import it
 code needs.
 """
 
+import io
 import math
 import re
+import tokenize
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from types import CodeType
 from typing import Any
@@ -105,9 +108,8 @@ def template_values(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tag:
-    """The tag at the end of an injected line: the injection's id (or IMPORT_TAG, OBSERVE_TAG; several with
-    `+`
-    between them if they change values of one line).
+    """The tag at the end of an injected line: the injection's id, or IMPORT_TAG, OBSERVE_TAG. A line in which
+    several injections change values has their ids, with `+` between.
 
     `guarded` is the number of lines that a guard indents, 0 in other lines; `code` the line without its tag.
     `was` is the target's line in whose place this one stands; None for one that was inserted.
@@ -129,9 +131,32 @@ class Tag:
         return _GUARD.match(self.code) is not None
 
     @property
-    def asked_for(self) -> frozenset[str]:
-        """The injections whose values are those of a changed line only if the probe says so."""
-        return frozenset(found.decode() for found in _ASKED.findall(self.code))
+    def ids(self) -> list[str]:
+        """The ids of its injections."""
+        return self.id.split("+")
+
+    @property
+    def asked_for(self) -> list[str]:
+        """The injections whose values a changed line takes only if the probe says so."""
+        return [found.decode() for found in _ASKED.findall(self.code)]
+
+    @property
+    def changed_parts(self) -> list[tuple[int, int]]:
+        """Where these values stand in the line: from a byte to before another."""
+        ends = [found.start() for found in _ASKED.finditer(self.code)]
+        return [(_last_open(self.code[:end]), end) for end in ends]
+
+
+def _last_open(code: bytes) -> int:
+    """The byte after the last bracket in a line's beginning that is still open there."""
+    lines, opened = io.StringIO(code.decode("utf-8", "replace")), [0]
+    with suppress(tokenize.TokenError, IndentationError):
+        for token in tokenize.generate_tokens(lines.readline):
+            if token.string in ("(", "[", "{"):
+                opened.append(token.end[1])
+            elif token.string in (")", "]", "}") and len(opened) > 1:
+                opened.pop()
+    return len(code.decode("utf-8", "replace")[: opened[-1]].encode())
 
 
 def tag_of(line: bytes) -> Tag | None:
@@ -154,8 +179,7 @@ def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
 
 
 def changed_value(tag: str, changed: str) -> str:
-    """How the line of an expression goes on before it: `changed` is what it is worth while the fault is
-    active."""
+    """What goes before an expression so that it is worth `changed` while the fault is active."""
     return f'({changed} if {PROBE_NAME}.active("{tag}") else '
 
 

@@ -124,8 +124,7 @@ def changed_value(
 
 @lru_cache(maxsize=1024)
 def _is_expression(text: str) -> bool:
-    """Whether normalized source is an expression without `yield`, and with it every source that it stands
-    for."""
+    """Whether normalized source is an expression that does not yield, and so is all that it stands for."""
     try:
         tree = ast.parse(text, mode="eval")
     except (SyntaxError, ValueError, RecursionError):

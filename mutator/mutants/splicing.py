@@ -20,8 +20,7 @@ from mutator.mutants.probe import changed_value, import_statement, tag_instead, 
 
 class Rank(IntEnum):
     """Order of edits between the same two lines: first what follows the upper one, then what precedes the
-    lower
-    one, then what changes this: a guard around it, a line in its place."""
+    lower one, then what changes that: a guard around it, a line in its place."""
 
     AFTER = 0
     BEFORE = 1
@@ -31,9 +30,10 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edit:
-    """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`. One of
-    rank
-    INSTEAD takes the place of that line."""
+    """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`.
+
+    One of rank INSTEAD takes the place of that line.
+    """
 
     index: int
     rank: Rank
@@ -44,8 +44,8 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueEdit:
-    """What to write around an expression, from `start` to `end` (line and byte, from 0), which keeps its
-    bytes."""
+    """What to write around an expression, which keeps its bytes. Its `start` and `end` are a line and a
+    byte in it, from 0."""
 
     start: tuple[int, int]
     end: tuple[int, int]
@@ -90,8 +90,7 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
 
 
 def value_change(file: ParsedFile, expression: Expression, changed: str, tag: str) -> ValueEdit:
-    """The edit that gives `expression` the value of `changed`, source on one line, while the fault is
-    active."""
+    """The edit that has `expression` be worth `changed` (source on one line) while the fault is active."""
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(
         start=expression.start,
@@ -103,8 +102,7 @@ def value_change(file: ParsedFile, expression: Expression, changed: str, tag: st
 
 
 def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
-    """The edits with those of values made into lines, of which each stands in the place of one of the
-    target."""
+    """The edits, those of values made into lines, each of which takes the place of one of the target."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
     for one, other in pairwise(values):

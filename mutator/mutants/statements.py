@@ -81,8 +81,7 @@ def dotted(node: cst.CSTNode | None) -> str | None:
 
 
 def item(node: cst.Subscript) -> str | None:
-    """`a['b']`, as anchors name it; None if something is calculated in it, which a second time may be
-    another."""
+    """`a['b']`, as anchors name it; None if something in it is calculated: it could differ the next time."""
     text = ast.unparse(ast.parse(cst.Module([]).code_for_node(node), mode="eval"))
     return text if assignable(text) else None
 

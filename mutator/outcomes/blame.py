@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
 
-from mutator.engines.jobs import Execution, Raised
+from mutator.engines.jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
 from mutator.mutants.probe import Tag, is_probe, tag_of
 
@@ -39,7 +39,7 @@ def assign_blame(
         return Status.HARNESS_ERROR, f"the probe failed: {detail}"
     if not execution.active:
         return Status.HARNESS_ERROR, f"{detail}, before the fault was active"
-    if source and source.tag and source.tag.id not in raising:
+    if source and source.tag and not any(name in raising for name in source.tag.ids):
         code = source.tag.code.decode("utf-8", "replace").strip()
         return Status.INVALID_MUTANT, f"{source.place}: the injected `{code}` ended the run: {detail}"
     return status, detail
@@ -59,7 +59,7 @@ def _source(raised: Raised, lines: _Lines) -> _Source | None:
     return min(found, key=lambda source: source.tag is not None, default=None)  # the probe goes first
 
 
-def _on_stack(stack: Sequence[tuple[str, int]], lines: _Lines) -> _Source | None:
+def _on_stack(stack: Stack, lines: _Lines) -> _Source | None:
     """The innermost line of it that is not the target's. What a helper of the probe cannot do with a value is
     put down to the line that called it, and whether the fault is active to the probe."""
     in_probe = False
@@ -67,14 +67,22 @@ def _on_stack(stack: Sequence[tuple[str, int]], lines: _Lines) -> _Source | None
         place, tag = f"{at[0]}:{at[1]}", _tag_at(at, lines)
         if is_probe(at[0]):
             in_probe = True
-        elif tag and tag.of_fault and not (in_probe and tag.asks_probe):
+        elif tag and _is_injected(tag, at[2], in_probe):
             return _Source(place=place, tag=tag)
-        elif tag or in_probe:
+        elif in_probe or (tag and tag.was is None):
             return _Source(place=place)
     return _Source(place="") if in_probe else None
 
 
-def _tag_at(at: tuple[str, int], lines: _Lines) -> Tag | None:
+def _is_injected(tag: Tag, column: int, in_probe: bool) -> bool:
+    """Whether what an injection has the line do is what raised there. A changed line does what it did,
+    too."""
+    if tag.was is None:
+        return tag.of_fault and not (in_probe and tag.asks_probe)
+    return any(first <= column < end for first, end in tag.changed_parts)
+
+
+def _tag_at(at: tuple[str, int, int], lines: _Lines) -> Tag | None:
     """The tag of that line, if it was injected."""
     file, line = lines.get(at[0], ()), at[1]
     return tag_of(file[line - 1]) if 0 < line <= len(file) else None

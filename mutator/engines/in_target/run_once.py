@@ -11,6 +11,7 @@ import errno
 import hashlib
 import importlib
 import importlib.util
+import itertools
 import json
 import operator
 import os
@@ -18,6 +19,7 @@ import resource
 import runpy
 import sys
 import time
+import types
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -199,16 +201,26 @@ def origins(err: BaseException) -> list[BaseException]:
     return list(found.values())
 
 
-def passed(err: BaseException, tree: str) -> list[tuple[str, int]]:
-    """Where the exception passed the tree, each (file, line) once, innermost first."""
+def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
+    """Where the exception passed the tree, each (file, line) once, innermost first, as is its column."""
     places = []
     trace = err.__traceback__
     while trace is not None:
         file = trace.tb_frame.f_code.co_filename
         if file.startswith(tree + os.sep):
-            places.append((os.path.relpath(file, tree), trace.tb_lineno or 0))
+            places.append((os.path.relpath(file, tree), trace.tb_lineno or 0, column(trace)))
         trace = trace.tb_next
-    return list(dict.fromkeys(reversed(places)))
+    kept: dict[tuple[str, int], tuple[str, int, int]] = {}
+    for place in reversed(places):
+        kept.setdefault(place[:2], place)
+    return list(kept.values())
+
+
+def column(trace: types.TracebackType) -> int:
+    """The byte of its line at which what raised, or was called, begins; -1 if that is unknown."""
+    positions = trace.tb_frame.f_code.co_positions()
+    *_, begins, _ = next(itertools.islice(positions, trace.tb_lasti // 2, None), (None,) * 4)
+    return -1 if begins is None else begins
 
 
 def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str]) -> list[str]:

@@ -18,8 +18,8 @@ def measure(truth):
 """,
     "car/go.py": b"_fi.observe(t=now)  # fi:observe\n",
 }
-TARGET, GUARD, INJECTED = ("car/radar.py", 6), ("car/radar.py", 4), ("car/radar.py", 5)
-ELSEWHERE, OBSERVES, PROBE = ("car/can.py", 5), ("car/go.py", 1), ("car/_fi.py", 70)
+TARGET, GUARD, INJECTED = ("car/radar.py", 6, 4), ("car/radar.py", 4, 4), ("car/radar.py", 5, 4)
+ELSEWHERE, OBSERVES, PROBE = ("car/can.py", 5, 4), ("car/go.py", 1, 4), ("car/_fi.py", 70, 4)
 
 
 def execution(
@@ -63,6 +63,33 @@ def test_what_was_on_the_stack(stack: Stack, status: Status) -> None:
     """The target's own code crashes. What an injected line was doing, itself, in a helper of the probe or in
     the target, makes the mutant invalid. To observe and to ask the probe is not the target's doing."""
     assert assign_blame(execution(stack), FILES, ())[0] is status
+
+
+CHANGED = {
+    "car/radar.py": b"""def measure(truth):
+    gap = at(1) + (scaled(truth.d, 2) if _fi.active("0a1b2c3d") else truth.d)  # fi:0a1b2c3d was:    gap =
+    at(1) + truth.d
+"""
+}
+
+
+@pytest.mark.parametrize(
+    ("stack", "status"),
+    [
+        ((("car/radar.py", 2, 19),), Status.INVALID_MUTANT),
+        ((("car/can.py", 5, 0), ("car/radar.py", 2, 19)), Status.INVALID_MUTANT),
+        ((PROBE, ("car/radar.py", 2, 19)), Status.INVALID_MUTANT),
+        ((PROBE, ("car/radar.py", 2, 41)), Status.HARNESS_ERROR),
+        ((("car/radar.py", 2, 10),), Status.CRASHED),
+        ((("car/can.py", 5, 0), ("car/radar.py", 2, 10)), Status.CRASHED),
+        ((("car/radar.py", 2, 69),), Status.CRASHED),
+        ((("car/radar.py", 2, -1),), Status.CRASHED),
+    ],
+)
+def test_a_changed_line_still_does_what_it_did(stack: Stack, status: Status) -> None:
+    """Only what an injection has put into a line is its doing. An exception of the rest is the target's, and one
+    of asking the probe the harness's."""
+    assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
 
 def test_words() -> None:

@@ -114,8 +114,7 @@ def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
 
 
 def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
-    """All that a library is found by travels with a mutant: without a header, say, the slow Python would
-    run."""
+    """All that a library is found by travels with a mutant: without a header, say, slow Python would run."""
     manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
     base = prepare_base(manifest, tmp_path / "base")
     found = {

@@ -119,14 +119,16 @@ def test_exceptions_are_described(
     came of."""
     found = described(name, *arguments)
     assert found["ended"] == "error"
-    assert found["error"] == {"kind": kind, "message": message, "stacks": stacks}
+    error = found["error"]
+    assert (error["kind"], error["message"]) == (kind, message)
+    assert [[at[:2] for at in stack] for stack in error["stacks"]] == stacks
 
 
 def test_what_is_in_a_group_counts(described: Callable[..., dict[str, Any]]) -> None:
     """A group of exceptions comes of those that are in it."""
     error = described("several")["error"]
     assert error["kind"] == "ExceptionGroup"
-    assert [("a.py", 3), ("a.py", 15)] in error["stacks"]
+    assert [("a.py", 3), ("a.py", 15)] in [[at[:2] for at in stack] for stack in error["stacks"]]
 
 
 def test_the_limit_of_steps_is_no_error(described: Callable[..., dict[str, Any]]) -> None:
