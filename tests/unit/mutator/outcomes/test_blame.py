@@ -87,8 +87,8 @@ CHANGED = {
     ],
 )
 def test_a_changed_line_still_does_what_it_did(stack: Stack, status: Status) -> None:
-    """Only what an injection has put into a line is its doing. An exception of the rest is the target's, and one
-    of asking the probe the harness's."""
+    """Only what an injection has put into a line is its doing. An exception of the rest is the target's, and
+    one of asking the probe the harness's."""
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
 

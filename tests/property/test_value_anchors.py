@@ -1,0 +1,145 @@
+"""Values that are changed where they stand, in modules of Python's own library: each is a case."""
+
+import ast
+import importlib.util
+import random
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
+from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.expressions import Expression
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.splicing import ValueEdit, apply_edits, in_lines, joined, unsplice
+
+TEMPLATES = Path(__file__).parents[2] / "templates"
+FEW = ("colorsys", "bisect", "shlex")
+TOGETHER = 40  # values that one mutant changes
+MANY = (
+    *FEW,
+    *("argparse", "ast", "calendar", "cmd", "configparser", "csv", "datetime", "decimal", "difflib", "dis"),
+    *("doctest", "email.message", "fractions", "ftplib", "gettext", "heapq", "html.parser", "http.client"),
+    *("inspect", "ipaddress", "json.decoder", "json.encoder", "locale", "mailbox", "nntplib", "optparse"),
+    *(
+        "pdb",
+        "pickle",
+        "pickletools",
+        "plistlib",
+        "pprint",
+        "random",
+        "sched",
+        "smtplib",
+        "string",
+        "tarfile",
+    ),
+    *("textwrap", "tokenize", "traceback", "turtle", "typing", "unittest.mock", "urllib.parse", "uuid"),
+    *("xml.dom.minidom", "zipfile"),
+)
+MODELS = (("stuck", (("value", 3.0),)), ("offset", (("by", -2.5),)), ("delay", (("delay", 0.5),)))
+
+
+@cache
+def models() -> FaultModels:
+    return load_fault_models(TEMPLATES)
+
+
+@cache
+def module(name: str) -> ParsedFile | None:
+    """A module of Python's library as a file of a target; None for one that this Python does not have."""
+    try:
+        found = importlib.util.find_spec(name)
+    except ModuleNotFoundError:
+        return None
+    if found is None or found.origin is None or not found.origin.endswith(".py"):
+        return None
+    return parse_file(f"{name}.py", Path(found.origin).read_bytes(), Path())
+
+
+def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
+    """Every expression of a file, by each of the anchors that lead to it."""
+    for function, known in file.expressions.items():
+        seen = Counter[tuple[AnchorKind, str, str | None]]()
+        for expression in known:
+            for role in dict.fromkeys(expression.roles):
+                seen[role] += 1
+                kind, name, which = role
+                anchor = Anchor(kind=kind, name=name, which=which, nth=seen[role])
+                yield expression, FaultLocation(path=file.path, function=function, anchor=anchor)
+
+
+class Inactive(ast.NodeTransformer):
+    """What a module does while no fault is active."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        self.generic_visit(node)
+        asks = isinstance(node.test, ast.Call) and ast.unparse(node.test.func) == "_fi.active"
+        return node.orelse if asks else node
+
+
+Case = tuple[Expression, FaultLocation]
+
+
+def edit_of(file: ParsedFile, case: Case, number: int) -> ValueEdit:
+    """The change of a case's value, by one of the models, under an id of its own."""
+    expression, location = case
+    assert file.resolve_value(location) is expression, location
+    name, params = MODELS[number % len(MODELS)]
+    injection = Injection(location=location, model=name, params=params)
+    edit = injection_edit(file, models(), injection, f"{number:08x}")
+    assert isinstance(edit, ValueEdit)
+    return edit
+
+
+def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
+    """The cases in groups of expressions of which none lies in another."""
+    left = list(cases)
+    while left:
+        group: list[Case] = []
+        rest: list[Case] = []
+        for case in left:
+            one = case[0]
+            beside = all(one.end <= other.start or other.end <= one.start for other, _ in group)
+            (group if beside and len(group) < TOGETHER else rest).append(case)
+        yield group
+        left = rest
+
+
+def check(file: ParsedFile, cases: Sequence[Case]) -> None:
+    """A mutant with these values changed compiles, un-splices, asks the probe once for each, and does
+    what the file does while nothing is active."""
+    edits = [edit_of(file, case, number) for number, case in enumerate(cases)]
+    data = joined(apply_edits(file, in_lines(file, edits)))
+    assert unsplice(data) == file.data, cases
+    tree = ast.parse(data)
+    compile(tree, "<mutant>", "exec", dont_inherit=True)
+    asked = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and ast.unparse(n.func) == "_fi.active"]
+    assert len(asked) == len(cases), cases
+    assert ast.dump(Inactive().visit(tree)) == ast.dump(ast.parse(file.data)), cases
+
+
+def checked(names: Sequence[str], count: int) -> int:
+    """Check so many cases drawn from the modules of these names; how many they were."""
+    files = [file for name in names if (file := module(name))]
+    cases = [(file, pair) for file in files for pair in anchors(file)]
+    chosen = random.Random(1).sample(cases, min(count, len(cases)))
+    for file in files:
+        for group in apart([pair for one, pair in chosen if one is file]):
+            check(file, group)
+    return len(chosen)
+
+
+def test_a_changed_value_is_all_that_differs() -> None:
+    """A mutant compiles, un-splices to every byte, asks the probe once for each value, and does what the
+    module does while no fault is active; each anchor leads to its own expression."""
+    assert checked(FEW, 300) == 300
+
+
+@pytest.mark.slow
+def test_a_changed_value_is_all_that_differs_at_large() -> None:
+    """The same of 20,000 cases in some fifty modules."""
+    assert checked(MANY, 20_000) == 20_000

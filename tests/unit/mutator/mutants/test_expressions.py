@@ -1,0 +1,172 @@
+"""Expressions: which of them anchors reach, under what names, and how a changed value reads in the source."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
+from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice, value_change
+
+SOURCE = '''\
+LIMIT = 3
+
+
+class Control:
+    gain = 2
+
+    def update(self, gap, *rest, low=0):
+        if gap < low: return None
+        self.gap, other = gap, -1
+        command["gas"] = self.pid.update(gap - LIMIT, speed=rest[0])
+        while (n := len(rest)) and not self.done():
+            total = [x * 2 for x in rest if x > 0]
+        assert other, f"{gap} is wrong"
+        text = """
+        long""" + str(low)
+        value = 1 + \\
+            2
+        return (gap,
+                low)
+
+    def inner(self):
+        def deeper(a):
+            return a, 1
+        return deeper
+'''
+
+
+def parsed(source: str = SOURCE) -> ParsedFile:
+    return parse_file("m.py", source.encode(), Path())
+
+
+def location(
+    kind: str, name: str, nth: int | None = None, which: str | None = None, function: str = "Control.update"
+) -> FaultLocation:
+    anchor = Anchor(kind=AnchorKind(kind), name=name, nth=nth, which=which)
+    return FaultLocation(path="m.py", function=function, anchor=anchor)
+
+
+def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
+    """The source with values changed, by tags that count from `a0`."""
+    file = parsed(source)
+    edits = [
+        value_change(file, file.resolve_value(place), text, f"a{number}")
+        for number, (place, text) in enumerate(changes)
+    ]
+    data = joined(apply_edits(file, in_lines(file, edits)))
+    assert unsplice(data) == file.data
+    return data.decode()
+
+
+def test_what_anchors_reach() -> None:
+    """Every value of a function has a name by each thing that it is for, but for what only names an object, is
+    inside a string, or begins or ends where no tag can stand."""
+    named = {
+        kind: [
+            (name, which) if which else name
+            for one in parsed().expressions["Control.update"]
+            for own, name, which in one.roles
+            if own is kind
+        ]
+        for kind in VALUE_ANCHORS
+    }
+    assert named[AnchorKind.CONDITION] == [
+        "gap < low",
+        "(n := len(rest)) and (not self.done())",
+        "x > 0",
+        "other",
+    ]
+    assert named[AnchorKind.RETURN_VALUE] == ["None", "(gap, low)"]
+    assert named[AnchorKind.ASSIGNED_VALUE] == ["(self.gap, other)", "command['gas']", "n", "total"]
+    assert named[AnchorKind.ARGUMENT] == [
+        ("self.pid.update", "1"),
+        ("self.pid.update", "speed"),
+        ("len", "1"),
+        ("str", "1"),
+    ]
+    assert named[AnchorKind.RESULT] == ["self.pid.update", "len", "self.done", "str"]
+    values = named[AnchorKind.VALUE]
+    assert {"LIMIT", "rest[0]", "gap - LIMIT", "-1", "x * 2", "0", "None", "(gap, low)"} <= set(values)
+    assert not {"self", "self.pid", "command", "1", "n := len(rest)", "1 + 2", "f'{gap} is wrong'"} & set(
+        values
+    )
+
+
+@pytest.mark.parametrize(
+    ("place", "line"),
+    [
+        (location("condition", "gap<low"), 8),
+        (location("condition", "", nth=3), 12),
+        (location("return_value", "None"), 8),
+        (location("assigned_value", 'command["gas"]'), 10),
+        (location("argument", "self.pid.update", which="speed"), 10),
+        (location("argument", "self.pid.update", which="1"), 10),
+        (location("result", "self.done"), 11),
+        (location("value", "x*2"), 12),
+        (location("return_value", "", function="Control.inner.<locals>.deeper"), 23),
+    ],
+)
+def test_an_anchor_names_one_expression(place: FaultLocation, line: int) -> None:
+    """Spaces and quotes are as one likes, and an empty name stands for any."""
+    assert parsed().span(place)[0] + 1 == line
+
+
+@pytest.mark.parametrize(
+    ("place", "pieces"),
+    [
+        (location("value", "gap"), ["m.py:8:", "`value: gap` names", "give `nth`, from 1 to"]),
+        (location("value", "gap", nth=9), ["`nth` is 9"]),
+        (location("condition", "gap > low"), ["no `condition: gap > low`", "`gap < low` (line 8)"]),
+        (location("argument", "len", which="2"), ["no `argument: len` which 2", "`len` which 1 (line 11)"]),
+        (location("argument", "self.pid.update"), ["names 2 expressions"]),
+        (location("value", "1 + 2"), ["no `value: 1 + 2`", "as it is written"]),
+        (location("condition", "", function="Control.inner"), ["another anchor: there is none of this kind"]),
+        (location("value", "a", function="deeper"), ["no function 'deeper'"]),
+    ],
+)
+def test_none_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
+    """The error names the line, the candidates, and what to do."""
+    with pytest.raises(MutatorError) as caught:
+        parsed().resolve_value(place)
+    assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
+
+
+def test_a_changed_line_keeps_the_old_one() -> None:
+    """The expression stays where it was; a value on several lines changes the first and the last; two in one
+    line share its tag."""
+    source = "def f(a, b):  # go\r\n    c = a, b\r\n    return g(a,  # first\r\n        b) + c  # sum\r\n"
+    at = {"function": "f"}
+    assert changed(source, (location("assigned_value", "c", **at), "None")) == source.replace(
+        "c = a, b\r\n", 'c = (None if _fi.active("a0") else (a, b))  # fi:a0 was:    c = a, b\r\n'
+    )
+    both = changed(
+        source,
+        (location("result", "g", **at), "0"),
+        (location("value", "c", **at), "-c"),
+    ).split("\r\n")
+    assert both[2:4] == [
+        '    return (0 if _fi.active("a0") else g(a,  # first  # fi:a0 was:    return g(a,  # first',
+        '        b)) + (-c if _fi.active("a1") else c)  # sum  # fi:a0+a1 was:        b) + c  # sum',
+    ]
+
+
+def test_one_value_in_another_is_refused() -> None:
+    """Of two injections into one expression it could not be said which acts on what."""
+    with pytest.raises(MutatorError, match="two injections into one expression"):
+        changed(SOURCE, (location("value", "gap - LIMIT"), "0"), (location("value", "LIMIT"), "0"))
+
+
+def test_a_file_in_another_encoding() -> None:
+    """Columns are bytes of the file's encoding, whatever Python counts."""
+    source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
+    file = parse_file("m.py", source.encode("latin-1"), Path())
+    place = location("value", "'ü' + é", function="f")
+    edit = value_change(file, file.resolve_value(place), "é", "a0")
+    data = joined(apply_edits(file, in_lines(file, [edit])))
+    assert data.decode("latin-1").splitlines()[2] == (
+        '    return (é if _fi.active("a0") else "ü" + é) + 1  # fi:a0 was:    return "ü" + é + 1'
+    )
+    assert unsplice(data) == file.data
