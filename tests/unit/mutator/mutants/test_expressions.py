@@ -62,8 +62,8 @@ def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
 
 
 def test_what_anchors_reach() -> None:
-    """Every value of a function has a name by each thing that it is for, but for what only names an object, is
-    inside a string, or begins or ends where no tag can stand."""
+    """Every value of a function has a name by each thing that it is for, except what only names an object, is in
+    a string, or begins or ends where no tag can stand."""
     named = {
         kind: [
             (name, which) if which else name
