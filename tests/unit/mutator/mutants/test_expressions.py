@@ -62,7 +62,7 @@ def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
 
 
 def test_what_anchors_reach() -> None:
-    """Every value of a function has a name by each thing that it is for, except what only names an object, is in
+    """Every value of a function has a name by each thing that it is for, but for what names an object, is in
     a string, or begins or ends where no tag can stand."""
     named = {
         kind: [
