@@ -1,6 +1,7 @@
 """The fork and warm engines against the reference engine: the same bytes for every fault and every end."""
 
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from mutator.model import (
     Trigger,
     Value,
 )
+from mutator.mutants.anchors import parsed
 from mutator.mutants.building import build
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
@@ -77,8 +79,7 @@ TRIGGERS = {
 
 def fault(model: str, anchor: Anchor, params: dict[str, Value]) -> Fault:
     place = FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
-    injection = Injection(location=place, model=model, params=tuple(sorted(params.items())))
-    return Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+    return fault_at(place, model, params)
 
 
 class Engines:
@@ -150,6 +151,22 @@ def three(
     made.close()
 
 
+def values(three: Engines, path: str) -> list[FaultLocation]:
+    """Every anchor of every value in a file of the toy."""
+    found, seen = [], Counter[tuple[str, AnchorKind, str, str | None]]()
+    for function, known in parsed(three.manifest.tree, path).expressions.items():
+        for kind, name, which in (role for one in known for role in dict.fromkeys(one.roles)):
+            seen[function, kind, name, which] += 1
+            anchor = Anchor(kind=kind, name=name, which=which, nth=seen[function, kind, name, which])
+            found.append(FaultLocation(path=path, function=function, anchor=anchor))
+    return found
+
+
+def fault_at(place: FaultLocation, model: str, params: dict[str, Value]) -> Fault:
+    injection = Injection(location=place, model=model, params=tuple(sorted(params.items())))
+    return Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
+
+
 def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Execution:
     """Status, words, probe and files are those of the reference engine; the fork engine's execution."""
     expected, files = three.run("reference", job)
@@ -187,6 +204,32 @@ def test_every_model_under_every_trigger(three: Engines, model: str, trigger: st
             three.job(fault(*MODELS[model]), TRIGGERS[trigger], scenario),
             how if scenario == "A" else None,
         )
+
+
+def test_a_changed_value_is_forked(three: Engines) -> None:
+    """A value that is changed where it stands gives the reference engine's bytes, without its interpreter."""
+    anchor = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="closing")
+    place = FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
+    check_same(
+        three, three.job(fault_at(place, "offset", {"by": -4.0}), TRIGGERS["in a context"]), RunMode.FORK
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trigger", ["always", "for 1 s", "off and on"])
+@pytest.mark.parametrize("path", ["toycar/sensing.py", "toycar/driver.py"])
+def test_every_value_under_some_triggers(three: Engines, path: str, trigger: str) -> None:
+    """Every value of the toy, by each of its anchors, changed by a model that fits or ends badly:
+    every engine gives the reference engine's bytes or words."""
+    places = values(three, path)
+    assert len(places) > 10
+    changes: tuple[tuple[str, dict[str, Value]], ...] = (
+        ("stuck", {"value": 0.5}),
+        ("offset", {"by": 2.0}),
+        ("delay", {"delay": 0.7}),
+    )
+    for number, place in enumerate(places):
+        check_same(three, three.job(fault_at(place, *changes[number % 3]), TRIGGERS[trigger]))
 
 
 @pytest.mark.slow
