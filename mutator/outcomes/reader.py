@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from mutator._common.files import no_pipe
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.outcomes import results
+from mutator.outcomes import result_rows, results
 from mutator.outcomes.columns import SINCE, hazards_in
 from mutator.outcomes.rows import Row, row_from
 from mutator.store.run_folder import RunFolder
@@ -202,7 +202,7 @@ def row_of(
     experiment: Experiment, record: Record, hazards: "Sequence[str]", scale: Scale | None = None
 ) -> Row:
     """The row that results.csv has, or would have, for an experiment and its record."""
-    cells = results.row(experiment, record, hazards, scale=scale)
+    cells = result_rows.row(experiment, record, hazards, scale=scale)
     return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
 
 

@@ -4,96 +4,32 @@ import gc
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from mutator._common.cores import usable_cores
 from mutator._common.files import half_written, read_json, write_json
 from mutator._common.hashing import digest
+from mutator._common.processes import shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
-from mutator.model import Experiment, Record, Status
 from mutator.outcomes import propagation
-from mutator.outcomes.columns import (
-    T_END,
-    TIMINGS,
-    deviation_columns,
-    hazard_columns,
-    plan_row,
-    result_columns,
-    severity_columns,
-)
-from mutator.outcomes.paths import ways_of
+from mutator.outcomes.columns import TIMINGS
 from mutator.outcomes.propagation import columns_of
-from mutator.outcomes.table_files import CsvTable, ParquetTable
-from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.outcomes.result_rows import ResultRows
+from mutator.outcomes.table_files import CsvTable, ParquetTable, csv_lines, record_batch
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest
 from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
-from mutator.targets.severity import Scale
 
 CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
 PROPAGATION = "propagation.parquet"
 TABLES = (CSV, PARQUET, PROPAGATION, TIMINGS_PARQUET)
 SCHEMA, STAMP = "results/1", "results.json"
-_BATCH = 5_000  # experiments that are read before their rows are written
-_TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
-
-
-def row(
-    experiment: Experiment,
-    record: Record,
-    hazards: Sequence[str],
-    *,
-    ends: bool = False,
-    scale: Scale | None = None,
-) -> dict[str, object]:
-    """One row by column, in any order; without the largest differences where the run left no trace.
-
-    `hazards` are those that the target checks; `ends` says that one of them can end the drive, and `scale`
-    makes classes of delta-v. None stands for nothing; flags are 0 or 1; times are seconds of simulation
-    since its start.
-    """
-    cells = plan_row(experiment) | _verdict_cells(record, scale)
-    ok, times = record.status is Status.OK, dict(record.hazards)
-    for name in hazards:
-        flag, time = hazard_columns(name)
-        cells[flag.name] = int(name in times) if ok else None
-        cells[time.name] = _time(times.get(name))
-    columns = deviation_columns([name for name, _ in record.max_dev])
-    cells |= {columns[name]: value for name, value in record.max_dev}
-    if ends:
-        driven = dict(record.max_dev) | dict(record.dev)
-        cells |= {columns[name].removeprefix("max_"): value for name, value in driven.items()}
-        cells[T_END] = _time(record.t_end)
-    return cells | dict(record.metrics)
-
-
-def _verdict_cells(record: Record, scale: Scale | None) -> dict[str, object]:
-    """The cells that every target's results have."""
-    activation = record.activation
-    ok = record.status is Status.OK
-    return {
-        "status": record.status.value,
-        "outcome": record.outcome.value if record.outcome else None,
-        "activated": 1 if activation else (0 if ok else None),
-        "t_activation": _time(activation.first) if activation else None,
-        "activations": activation.count if activation else (0 if ok else None),
-        "manifested": int(record.t_manifest is not None) if ok else None,
-        "t_manifest": _time(record.t_manifest),
-        "alerts": ";".join(name for name, _ in record.alerts) or None,
-        "t_alert": _time(record.alerts[0][1]) if record.alerts else None,
-        "reaction_time": _time(reaction_time(record.hazards, record.alerts)),
-        "severity": severity_of(record, scale),
-        "fault_tolerant_time": _time(since_activation(record)),
-        "manifest_to_hazard": _time(since_manifestation(record)),
-        "detail": record.detail or None,
-    }
-
-
-def _time(value: float | None) -> float | None:
-    return None if value is None else round(value, _TIME_DIGITS)
+_BATCH = 2_000  # experiments that are read before their rows are written
+_WORTH_PROCESSES = 10  # batches
+_PROCESSES = 2  # at most, which share the work on a large table
 
 
 def ensure(run: Path) -> Path:
@@ -132,25 +68,39 @@ def names(folder: RunFolder) -> tuple[str, ...]:
 def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     """Write the tables of a run folder, made from its plan, records and timings, each to its path in `paths`.
 
-    Experiments are read by their ids, a batch at a time: a million takes some hundred MB.
+    Experiments are read by their ids, a batch at a time: a million takes some hundred MB. Two processes make
+    the batches of a large run.
     """
-    records, planned, table = folder.records(), Planned(folder.path), _Table(folder)
+    records, planned, rows = folder.records(), Planned(folder.path), ResultRows(folder)
+    tells_propagation = PROPAGATION in paths
+
+    def made(batch: Sequence[str]) -> tuple[bytes, Any, Any]:
+        done = [(planned[name], records[name]) for name in batch]
+        cells = [rows.cells(*one) for one in done]
+        table = record_batch(rows.columns, list(zip(*cells, strict=True)))
+        if not tells_propagation:
+            return csv_lines(cells), table, None
+        found = columns_of((record for _, record in done), folder.head["channels"])
+        return csv_lines(cells), table, record_batch(propagation.COLUMNS, list(found.values()))
+
     with ExitStack() as stack:
         stack.enter_context(_without_collection())
-        csv = stack.enter_context(CsvTable(paths[CSV], table.columns))
-        parquet = stack.enter_context(ParquetTable(paths[PARQUET], table.columns))
+        csv = stack.enter_context(CsvTable(paths[CSV], rows.columns))
+        parquet = stack.enter_context(ParquetTable(paths[PARQUET], rows.columns))
         propagated = None
-        if PROPAGATION in paths:
+        if tells_propagation:
             propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))
-        for batch in _batches(name for name in sorted(planned) if name in records):
-            done = [(planned[name], records[name]) for name in batch]
-            rows = [table.cells(*one) for one in done]
-            csv.append(rows)
-            parquet.append(list(zip(*rows, strict=True)))
+        batches = _batches(name for name in sorted(planned) if name in records)
+        for lines, table, departures in shared(made, batches, _processes(batches)):
+            csv.append(lines)
+            parquet.append(table)
             if propagated:
-                found = columns_of((record for _, record in done), folder.head["channels"])
-                propagated.append(list(found.values()))
+                propagated.append(departures)
     _write_timings(folder, paths[TIMINGS_PARQUET])
+
+
+def _processes(batches: Sequence[object]) -> int:
+    return min(_PROCESSES, usable_cores()) if len(batches) >= _WORTH_PROCESSES else 1
 
 
 @contextmanager
@@ -165,33 +115,9 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
-class _Table:
-    """The columns of a run's results.csv, and the cells of its rows."""
-
-    def __init__(self, folder: RunFolder) -> None:
-        head = folder.head
-        metrics = head.get("metrics", ())
-        self._hazards, self._scale, self._ways = head["hazards"], folder.scale, ways_of(head)
-        self._ends = T_END in (name for name, *_ in metrics)
-        self.columns = result_columns(
-            *(head["hazards"], head["compared"], metrics, severity_columns(head)),
-            paths=self._ways is not None,
-        )
-        self._names = [column.name for column in self.columns]
-
-    def cells(self, experiment: Experiment, record: Record) -> list[object]:
-        """A row, in the order of the columns."""
-        made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
-        course = self._ways.course(experiment.fault, record) if self._ways else None
-        if course:
-            made |= {"reached": course.reached or None, "stopped_at": ";".join(course.stopped_at) or None}
-        return list(map(made.get, self._names))
-
-
-def _batches(items: Iterable[str]) -> Iterator[tuple[str, ...]]:
-    left = iter(items)
-    while batch := tuple(islice(left, _BATCH)):
-        yield batch
+def _batches(items: Iterable[str]) -> list[list[str]]:
+    found = list(items)
+    return [found[begin : begin + _BATCH] for begin in range(0, len(found), _BATCH)]
 
 
 def _made_from(folder: RunFolder) -> str:
@@ -242,7 +168,12 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
 def _write_timings(folder: RunFolder, path: Path) -> None:
     """What each experiment cost, where."""
     newest = folder.timings()
+
+    def made(batch: Sequence[str]) -> Any:
+        lines = [newest[name] for name in batch]
+        return record_batch(TIMINGS, [[line.get(column.name) for line in lines] for column in TIMINGS])
+
+    batches = _batches(sorted(newest))
     with ParquetTable(path, TIMINGS) as file:
-        for batch in _batches(sorted(newest)):
-            lines = [newest[name] for name in batch]
-            file.append([[line.get(column.name) for line in lines] for column in TIMINGS])
+        for table in shared(made, batches, _processes(batches)):
+            file.append(table)

@@ -1,6 +1,7 @@
 """Tables as files, written a batch of rows at a time: CSV for everyone, Parquet for programs."""
 
 import csv
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -13,19 +14,41 @@ _CELLS = 1 << 23  # of a row group, which is in memory as a whole
 _TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "float64"}
 
 
+def csv_lines(rows: Iterable[Sequence[object]]) -> bytes:
+    """Lines of a CSV file; None is an empty cell."""
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()
+
+
+def record_batch(columns: Sequence[Column], values: Sequence[Sequence[object]]) -> Any:
+    """Rows of a Parquet file, given as a sequence of values for each column."""
+    import pyarrow as pa  # type: ignore[import-untyped]
+
+    schema = _schema(columns)
+    arrays = [pa.array(some, field.type) for some, field in zip(values, schema, strict=True)]
+    return pa.record_batch(arrays, schema=schema)
+
+
+def _schema(columns: Sequence[Column]) -> Any:
+    import pyarrow as pa
+
+    return pa.schema([(c.name, pa.type_for_alias(_TYPES[c.type])) for c in columns])
+
+
 class CsvTable:
-    """A CSV file that begins with the names of its columns; None is an empty cell."""
+    """A CSV file that begins with the names of its columns."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        self._file = path.open("w", encoding="utf-8", newline="")
-        self._writer = csv.writer(self._file, lineterminator="\n")
-        self._writer.writerow([column.name for column in columns])
+        self._file = path.open("wb")
+        self.append(csv_lines([[column.name for column in columns]]))
 
     def __enter__(self) -> "CsvTable":
         return self
 
-    def append(self, rows: Iterable[Sequence[object]]) -> None:
-        self._writer.writerows(rows)
+    def append(self, lines: bytes) -> None:
+        """Append rows, as `csv_lines` makes them."""
+        self._file.write(lines)
 
     def __exit__(self, *error: object) -> None:
         self._file.close()
@@ -35,11 +58,11 @@ class ParquetTable:
     """A Parquet file; nothing in it depends on when or where it was made, or in which batches."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        import pyarrow as pa  # type: ignore[import-untyped]
+        import pyarrow as pa
         from pyarrow import parquet
 
         self._pa = pa
-        self._schema = pa.schema([(c.name, pa.type_for_alias(_TYPES[c.type])) for c in columns])
+        self._schema = _schema(columns)
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd")
         self._group = min(_ROWS, _CELLS // len(columns))
         self._held: list[Any] = []
@@ -49,10 +72,8 @@ class ParquetTable:
     def __enter__(self) -> "ParquetTable":
         return self
 
-    def append(self, values: Sequence[Sequence[object]]) -> None:
-        """Append rows, given as a sequence of values for each column."""
-        arrays = [self._pa.array(some, field.type) for some, field in zip(values, self._schema, strict=True)]
-        batch = self._pa.record_batch(arrays, schema=self._schema)
+    def append(self, batch: Any) -> None:
+        """Append rows, as `record_batch` makes them."""
         self._held.append(batch)
         self._count += batch.num_rows
         while self._count >= self._group:

@@ -27,6 +27,7 @@ from mutator.model import (
     Method,
     Trigger,
 )
+from mutator.store.plan_lines import experiment_as_written
 
 EXPERIMENTS = "plan/experiments.jsonl"
 FAULTS = "plan/faults.jsonl"
@@ -139,8 +140,7 @@ def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
 def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
     """The experiments of one chunk."""
     path, count = run / EXPERIMENTS, chunk[2]
-    lines = ((None, line) for line in chunk_lines(run, chunk))
-    found = tuple(_read(path, lines, partial(experiment_from, faults=faults)))
+    found = tuple(_experiments(path, ((None, line) for line in chunk_lines(run, chunk)), faults))
     if len(found) != count:
         raise MutatorError(f"{len(found)} experiments in a chunk of {count}", where=path, remedy=_REMEDY)
     return found
@@ -183,8 +183,8 @@ class ExperimentsInOrder(Sequence[Experiment]):
 
 def iterate(run: Path) -> Iterator[Experiment]:
     """As `read_all`, one after the other."""
-    path, faults = run / EXPERIMENTS, read_faults(run)
-    yield from _read(path, _lines(path), partial(experiment_from, faults=faults))
+    path = run / EXPERIMENTS
+    yield from _experiments(path, _lines(path), read_faults(run))
 
 
 def lines_of(path: Path) -> Iterator[bytes]:
@@ -198,8 +198,17 @@ def lines_of(path: Path) -> Iterator[bytes]:
 
 def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
     """The experiment on a line of the plan file at `path`."""
-    [experiment] = _read(path, [(number, line)], partial(experiment_from, faults=faults))
+    [experiment] = _experiments(path, [(number, line)], faults)
     return experiment
+
+
+def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iterator[Experiment]:
+    """The experiments on lines of the plan file at `path`."""
+    for number, line in lines:
+        if experiment := experiment_as_written(line, faults):
+            yield experiment
+        else:
+            yield from _read(path, [(number, line)], partial(experiment_from, faults=faults))
 
 
 def ids(run: Path) -> Iterator[str]:

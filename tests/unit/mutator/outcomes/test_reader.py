@@ -18,7 +18,7 @@ from mutator.execution.single_run import run_single
 from mutator.exports import Format
 from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
-from mutator.outcomes import results
+from mutator.outcomes import result_rows, results
 from mutator.outcomes.columns import SEVERITY, SINCE, metric_columns, result_columns
 from mutator.outcomes.reader import Results
 from mutator.report import building
@@ -178,7 +178,7 @@ def test_a_run_fills_the_columns_that_its_manifest_promises(
     assert record.status is Status.OK
     compared = [channel.name for channel in manifest.compared]
     columns = result_columns(manifest.hazards, compared, metric_columns(manifest), (SEVERITY, *SINCE))
-    cells = results.row(experiment, record, manifest.hazards)
+    cells = result_rows.row(experiment, record, manifest.hazards)
     assert {*cells} == {column.name for column in columns}
     assert cells["max_dev_wheel"]
 

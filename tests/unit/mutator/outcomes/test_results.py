@@ -19,7 +19,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
-from mutator.outcomes import propagation, results, table_files
+from mutator.outcomes import propagation, result_rows, results, table_files
 from mutator.outcomes.columns import TIMINGS, Column, result_columns, severity_columns
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
@@ -43,7 +43,7 @@ def test_a_hazard_row(experiment: Callable[..., Experiment], record: MakeRecord)
         alerts=(("steer_saturated", 3.02), ("fcw", 6.0)),
         max_dev=(("gas", 0.1), ("brake", 0.0), ("steer_torque", 1.5)),
     )
-    cells = results.row(one, kept, HAZARDS)
+    cells = result_rows.row(one, kept, HAZARDS)
     expected = {
         "value": 24,
         "unit": "m",
@@ -108,10 +108,10 @@ def test_severity_and_times_to_the_hazard(
     """A contact after the activation has a class; times count to the first hazard, of activation at 2 s."""
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
-    cells = results.row(experiment(), kept, HAZARDS, scale=SCALE)
+    cells = result_rows.row(experiment(), kept, HAZARDS, scale=SCALE)
     told = (cells["severity"], cells["fault_tolerant_time"], cells["manifest_to_hazard"])
     assert told == (severity, tolerant, after_manifest)
-    assert results.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
+    assert result_rows.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
 
 
 def test_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
@@ -148,7 +148,7 @@ def test_rows_of_what_did_not_end_well(
 ) -> None:
     """What is not known of a run that did not end well is empty, never 0."""
     given = {} if activation else {"activation": None}
-    cells = results.row(
+    cells = result_rows.row(
         experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
     )
     assert (cells["status"], cells["activated"], cells["detail"]) == (status.value, activated, "why")
@@ -158,7 +158,7 @@ def test_rows_of_what_did_not_end_well(
 
 def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
     """A run that ended well without activation says 0, not nothing."""
-    cells = results.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
+    cells = result_rows.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
     assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
     assert cells["t_activation"] is None
 
@@ -228,9 +228,9 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
     planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
-    columns = results._Table(folder).columns
+    columns = result_rows.ResultRows(folder).columns
     names = [column.name for column in columns]
-    rows = [dict(zip(names, results._Table(folder).cells(*one), strict=True)) for one in done]
+    rows = [dict(zip(names, result_rows.ResultRows(folder).cells(*one), strict=True)) for one in done]
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
     writer.writeheader()
@@ -259,12 +259,12 @@ def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]
     return sink.getvalue()
 
 
-@pytest.mark.parametrize("batch", [1, 7, 5_000])
+@pytest.mark.parametrize(("batch", "processes"), [(1, 1), (7, 2), (5_000, 1)])
 def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
-    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
 ) -> None:
-    """However many experiments are read at a time, the files are those of the version that had all rows in
-    memory; those of a run without a record, too."""
+    """However many experiments are read at a time, by one process or two, the files are those of the version
+    that had all rows in memory; those of a run without a record, too."""
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.read_all(folder.path)[22]
     lines = LineWriter(
@@ -273,6 +273,7 @@ def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
     lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
     lines.close()
     monkeypatch.setattr(results, "_BATCH", batch)
+    monkeypatch.setattr(results, "_processes", lambda batches: processes)
     for _ in range(2):
         results.build(folder.path)
         made = {name: (folder.path / name).read_bytes() for name in results.TABLES}
@@ -290,7 +291,8 @@ def test_a_long_table_has_several_row_groups(tmp_path: Path, monkeypatch: pytest
         for batch in (1, 3, 20):
             with table_files.ParquetTable(tmp_path / "t.parquet", columns) as file:
                 for first in range(0, size, batch):
-                    file.append([range(first, min(size, first + batch))])
+                    some = range(first, min(size, first + batch))
+                    file.append(table_files.record_batch(columns, [some]))
             found = pq.ParquetFile(tmp_path / "t.parquet")
             assert [found.metadata.row_group(i).num_rows for i in range(found.num_row_groups)] == groups
             assert found.read()["n"].to_pylist() == list(range(size))

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
-from mutator.model import Experiment, Hold
+from mutator.model import AfterHazard, Experiment, Hold
 from mutator.store import plan_file
+from mutator.store.plan_lines import experiment_as_written
 
 Make = Callable[..., Experiment]
 
@@ -26,6 +28,31 @@ def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
     assert plan_file.read_all(tmp_path) == plan
     assert plan_file.read_chunk(tmp_path, chunks[1], faults) == plan[2:]
     assert [*plan_file.ids(tmp_path)] == [e.id for e in plan]
+
+
+def test_a_line_as_it_is_written_is_read_from_its_bytes(experiment: Make) -> None:
+    """The quick way gives the experiment that the long way gives, and leaves to that one all that is not as
+    it was written, or not what its id stands for."""
+    for planned in (
+        experiment(),
+        experiment(2.5, changes=("no_lead",)),
+        replace(experiment(), setting=("a", "b")),
+    ):
+        faults = {planned.fault.id: planned.fault}
+        line = canonical(plan_file.to_plain(planned)).encode() + b"\n"
+        found = experiment_as_written(line, faults)
+        assert found == plan_file.experiment_from(json.loads(line), faults) == planned
+        assert found.id == planned.id and "id" in vars(found)
+        for old, new in (
+            (b'"seed":', b'"seed":1'),
+            (b'"method":', b'"method": '),
+            (b"hwt <=", b"hwt <"),
+            (b'"name":', b'"Name":'),
+        ):
+            assert old in line and experiment_as_written(line.replace(old, new), faults) is None
+        assert experiment_as_written(line, {}) is None
+    stopping = canonical(plan_file.to_plain(replace(planned, after_hazard=AfterHazard.STOP))).encode()
+    assert experiment_as_written(stopping, faults) is None
 
 
 def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:

@@ -1,0 +1,80 @@
+"""Work shared among processes, each a copy of this one; results come in the order of the work."""
+
+import os
+import pickle
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+from mutator.errors import MutatorError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
+    """`made` of each item, in the order of the items, by so many processes; by this one for fewer than two.
+
+    What this process has in memory the others have, too. A process is at most one result ahead of what is
+    taken, so results need no room. What `made` raises is raised here. MutatorError when a process dies.
+    """
+    if processes < 2:
+        yield from map(made, items)
+        return
+    context = get_context("fork")
+    pipes = [context.Pipe(duplex=False) for _ in range(processes)]
+    workers = [
+        context.Process(target=_work, args=(made, items[number::processes], pipes, number), daemon=True)
+        for number in range(processes)
+    ]
+    try:
+        for worker in workers:
+            worker.start()
+        for _, sender in pipes:
+            sender.close()
+        for number in range(len(items)):
+            yield _received(pipes[number % processes][0])
+    finally:
+        for receiver, _ in pipes:
+            receiver.close()
+        for worker in workers:
+            if worker.pid is not None:
+                worker.terminate()
+                worker.join()
+
+
+def _work(
+    made: Callable[[T], Any],
+    items: Sequence[T],
+    pipes: Sequence[tuple[Connection, Connection]],
+    number: int,
+) -> None:
+    """Send what is made of each item, or what was raised, which is the last."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all: the first process ends the others
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for receiver, _ in pipes:  # else nobody would notice that the first process is gone
+        receiver.close()
+    sender = pipes[number][1]
+    try:
+        for item in items:
+            sender.send_bytes(pickle.dumps((made(item), None), pickle.HIGHEST_PROTOCOL))
+    except BrokenPipeError:
+        os._exit(1)
+    except BaseException as err:
+        sender.send_bytes(pickle.dumps((None, err)))
+
+
+def _received(receiver: Connection) -> Any:
+    try:
+        result, error = pickle.loads(receiver.recv_bytes())
+    except EOFError:
+        raise MutatorError(
+            "a process that shared the work was killed",
+            expected="enough memory for it",
+            remedy="give the command again",
+        ) from None
+    if error is not None:
+        raise error
+    return result

@@ -1,0 +1,97 @@
+"""Rows of the results table: the cells of an experiment and its record, and the columns they are in."""
+
+from collections.abc import Sequence
+
+from mutator.model import Experiment, Record, Status
+from mutator.outcomes.columns import (
+    T_END,
+    deviation_columns,
+    hazard_columns,
+    plan_row,
+    result_columns,
+    severity_columns,
+)
+from mutator.outcomes.paths import ways_of
+from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.store.run_folder import RunFolder
+from mutator.targets.severity import Scale
+
+_TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
+
+
+def row(
+    experiment: Experiment,
+    record: Record,
+    hazards: Sequence[str],
+    *,
+    ends: bool = False,
+    scale: Scale | None = None,
+) -> dict[str, object]:
+    """One row by column, in any order; without the largest differences where the run left no trace.
+
+    `hazards` are those that the target checks; `ends` says that one of them can end the drive, and `scale`
+    makes classes of delta-v. None stands for nothing; flags are 0 or 1; times are seconds of simulation
+    since its start.
+    """
+    cells = plan_row(experiment) | _verdict_cells(record, scale)
+    ok, times = record.status is Status.OK, dict(record.hazards)
+    for name in hazards:
+        flag, time = hazard_columns(name)
+        cells[flag.name] = int(name in times) if ok else None
+        cells[time.name] = _time(times.get(name))
+    columns = deviation_columns([name for name, _ in record.max_dev])
+    cells |= {columns[name]: value for name, value in record.max_dev}
+    if ends:
+        driven = dict(record.max_dev) | dict(record.dev)
+        cells |= {columns[name].removeprefix("max_"): value for name, value in driven.items()}
+        cells[T_END] = _time(record.t_end)
+    return cells | dict(record.metrics)
+
+
+def _verdict_cells(record: Record, scale: Scale | None) -> dict[str, object]:
+    """The cells that every target's results have."""
+    activation = record.activation
+    ok = record.status is Status.OK
+    return {
+        "status": record.status.value,
+        "outcome": record.outcome.value if record.outcome else None,
+        "activated": 1 if activation else (0 if ok else None),
+        "t_activation": _time(activation.first) if activation else None,
+        "activations": activation.count if activation else (0 if ok else None),
+        "manifested": int(record.t_manifest is not None) if ok else None,
+        "t_manifest": _time(record.t_manifest),
+        "alerts": ";".join(name for name, _ in record.alerts) or None,
+        "t_alert": _time(record.alerts[0][1]) if record.alerts else None,
+        "reaction_time": _time(reaction_time(record.hazards, record.alerts)),
+        "severity": severity_of(record, scale),
+        "fault_tolerant_time": _time(since_activation(record)),
+        "manifest_to_hazard": _time(since_manifestation(record)),
+        "detail": record.detail or None,
+    }
+
+
+def _time(value: float | None) -> float | None:
+    return None if value is None else round(value, _TIME_DIGITS)
+
+
+class ResultRows:
+    """The columns of a run's results.csv, and the cells of its rows."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        head = folder.head
+        metrics = head.get("metrics", ())
+        self._hazards, self._scale, self._ways = head["hazards"], folder.scale, ways_of(head)
+        self._ends = T_END in (name for name, *_ in metrics)
+        self.columns = result_columns(
+            *(head["hazards"], head["compared"], metrics, severity_columns(head)),
+            paths=self._ways is not None,
+        )
+        self._names = [column.name for column in self.columns]
+
+    def cells(self, experiment: Experiment, record: Record) -> list[object]:
+        """A row, in the order of the columns."""
+        made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
+        course = self._ways.course(experiment.fault, record) if self._ways else None
+        if course:
+            made |= {"reached": course.reached or None, "stopped_at": ";".join(course.stopped_at) or None}
+        return list(map(made.get, self._names))

@@ -1,0 +1,49 @@
+"""Work that is shared among processes."""
+
+import os
+import signal
+from itertools import islice
+
+import pytest
+
+from mutator._common.processes import shared
+from mutator.errors import MutatorError
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_results_come_in_the_order_of_the_work(processes: int) -> None:
+    """Whoever does it, however much there is of it."""
+    for count in (0, 1, 7):
+        assert list(shared(lambda n: n * n, range(count), processes)) == [n * n for n in range(count)]
+
+
+def test_the_work_is_done_by_others() -> None:
+    """Two processes, neither of which is this one."""
+    found = list(shared(lambda _: os.getpid(), range(6), 2))
+    assert found == found[:2] * 3 and len({*found, os.getpid()}) == 3
+
+
+def test_what_goes_wrong_is_raised_here() -> None:
+    """An error comes as it was raised, after the results before it; a killed process is told."""
+
+    def fails(n: int) -> int:
+        if n == 3:
+            raise MutatorError("three", where="here", line=3)
+        return n
+
+    found = shared(fails, range(9), 2)
+    assert list(islice(found, 3)) == [0, 1, 2]
+    with pytest.raises(MutatorError, match="here:3: three"):
+        next(found)
+    with pytest.raises(MutatorError, match="was killed"):
+        list(shared(lambda _: os.kill(os.getpid(), signal.SIGKILL), range(4), 2))
+
+
+def test_no_process_is_left_behind() -> None:
+    """Whoever takes no more results leaves nobody at work."""
+    found = shared(lambda n: (os.getpid(), b"x" * 1_000_000), range(50), 2)
+    pids = [next(found)[0], next(found)[0]]
+    found.close()  # type: ignore[attr-defined]
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
