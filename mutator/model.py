@@ -28,6 +28,8 @@ class AnchorKind(StrEnum):
     ARGUMENT = "argument"
     RESULT = "result"
     VALUE = "value"
+    CONSTANT = "constant"
+    DEFAULT = "default"
 
 
 VALUE_ANCHORS = frozenset(
@@ -40,6 +42,7 @@ VALUE_ANCHORS = frozenset(
         AnchorKind.VALUE,
     )
 )
+FIXED_ANCHORS = frozenset((AnchorKind.CONSTANT, AnchorKind.DEFAULT))  # values that the probe sets
 
 
 class Hold(StrEnum):
@@ -85,11 +88,13 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Anchor:
-    """A statement of a function or an expression in it: the `nth` (from 1) that fits `kind` and `name`.
+    """A statement of a function or an expression in it, or a value that is fixed when its module is loaded:
+    the `nth` (from 1) that fits `kind` and `name`.
 
     `name` is what is assigned to, called or returned, as in the source (`gap`, `self.angle`, `pose['x']`);
     of a `value`, `condition` or `return_value` it is the expression. It is empty for `entry`, and where any
-    return or condition will do. `which` chooses an argument of a call, by its place (from 1) or keyword.
+    return or condition will do. Of a `constant` it is `LIMIT` or `Class.LIMIT`, of a `default` the parameter;
+    these have no `nth`. `which` chooses an argument of a call, by its place (from 1) or keyword.
     Without `nth` there must be exactly one hit.
     """
 
@@ -101,7 +106,8 @@ class Anchor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultLocation:
-    """A place in the target: a file relative to its root, a qualified function name, an anchor."""
+    """A place in the target: a file relative to its root, a qualified function name, an anchor. The function
+    is empty for a constant of a module or class."""
 
     path: str
     function: str

@@ -7,7 +7,7 @@ import re
 from pydantic import Field
 
 from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
+from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
 PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target does (mutants/probe.py)
 
@@ -21,7 +21,11 @@ class AtModel(StrictModel, title="A place"):
     (`gap`, `self.angle`, `frames.extend`)."""
 
     file: str = Field(description="A file of the target, relative to its root.")
-    function: str = Field(description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`.")
+    function: str | None = Field(
+        None,
+        description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`. Every anchor but "
+        "`constant` needs it.",
+    )
     after_assign: str | None = Field(None, description="After the statement that assigns to this name.")
     before_assign: str | None = Field(None, description="Before the statement that assigns to this name.")
     after_call: str | None = Field(None, description="After the statement that calls this name.")
@@ -50,6 +54,16 @@ class AtModel(StrictModel, title="A place"):
     result: str | None = Field(None, description="What the call of this name gives, within an expression.")
     value: str | None = Field(
         None, description="The value of this expression, as written, spaces and quotes aside."
+    )
+    constant: str | None = Field(
+        None,
+        description="A constant of the module (`LIMIT`) or of a class (`PIController.GAIN`), the default of "
+        "a dataclass's field included. It is set while the fault is active, also where other modules have "
+        "imported it by name, and put back afterwards.",
+    )
+    default: str | None = Field(
+        None,
+        description="The default of this parameter of the function, set while the fault is active.",
     )
     which: str | int | None = Field(
         None, description="Of an `argument`: its place in the call, from 1, or its keyword."
@@ -83,18 +97,44 @@ class AtModel(StrictModel, title="A place"):
                 expected="the place, from 1, or the keyword of an `argument`",
                 remedy="correct it, or leave it out",
             )
-        if not dotted_name(self.function.replace(".<locals>", "")):
+        if kind in FIXED_ANCHORS and self.nth is not None:
             raise source.error(
-                (*keys, "function"),
-                f"'{self.function}'",
-                expected="a qualified name such as Sensor.measure",
+                (*keys, "nth"),
+                f"`nth` of a {kind.value}",
+                expected="none: there is one of each name",
+                remedy="leave it out",
             )
+        function = self._function_of(kind, source, keys)
         anchor = Anchor(kind=kind, name=name, nth=self.nth, which=which)
-        return FaultLocation(path=self.file, function=self.function, anchor=anchor)
+        return FaultLocation(path=self.file, function=function, anchor=anchor)
+
+    def _function_of(self, kind: AnchorKind, source: Source, keys: Keys) -> str:
+        """The function, which a constant does not have."""
+        name = self.function
+        if kind is AnchorKind.CONSTANT:
+            if name is not None:
+                raise source.error(
+                    (*keys, "function"),
+                    f"'{name}' beside a constant",
+                    expected="none: a constant is one of a module or class",
+                    remedy="leave it out; write a class's constant as `constant: PIController.GAIN`",
+                )
+            return ""
+        if name is None:
+            raise source.error(
+                keys, "'function' is missing", expected="a qualified name such as Sensor.measure"
+            )
+        if not dotted_name(name.replace(".<locals>", "")):
+            raise source.error(
+                (*keys, "function"), f"'{name}'", expected="a qualified name such as Sensor.measure"
+            )
+        return name
 
 
 def _fits(kind: AnchorKind, name: str) -> bool:
     """Whether an anchor of this kind can have the name."""
+    if kind is AnchorKind.DEFAULT and "." in name:
+        return False
     if kind in VALUE_ANCHORS:
         return is_expression(name)
     return dotted_name(name) or (kind in _ASSIGNMENTS and assignable(name))

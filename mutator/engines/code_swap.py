@@ -1,11 +1,11 @@
 """Which functions of a loaded program a mutant changes, and whether their code can be swapped.
 
 A mutant's files differ from the pristine ones by inserted lines alone, so outside functions nothing differs
-but the import of the probe. Between two steps of a run no function of the target is at work. The code of the
-changed functions can then be swapped in place, and whatever refers to them (methods, closures, names imported
-elsewhere) goes on with the new code. Until its trigger first holds, such a program does what the pristine one
-does: the probe guards every inserted statement, and no mutant is built in which one of them changes what a
-name means.
+but the import of the probe, and lines that tell it which constants and defaults to set. Between two steps of
+a run no function of the target is at work. The code of the changed functions can then be swapped in place,
+and whatever refers to them (methods, closures, names imported elsewhere) goes on with the new code. Until its
+trigger first holds, such a program does what the pristine one does: the probe guards every inserted
+statement, and no mutant is built in which one of them changes what a name means.
 """
 
 import re
@@ -15,6 +15,7 @@ from functools import lru_cache
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
+from mutator.mutants.imported_names import module_name
 from mutator.mutants.probe import parts_of, probe_path, tag_of
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
@@ -43,10 +44,13 @@ class CodeSwap:
     """All that turns a loaded pristine program into the mutant.
 
     The parts of `probe` run one after the other; `own` is the source of the first (`probe.parts_of`).
-    `imports` are modules that injected lines import; they may be loaded beforehand.
+    `imports` are modules that injected lines import; they may be loaded beforehand. `settings` are modules,
+    and the code of their lines that tell the probe what to set; they must be loaded already, since a module
+    that is being loaded reads its own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
+    settings: tuple[tuple[str, CodeType], ...]
     probe: tuple[CodeType, CodeType]
     own: str
     imports: tuple[str, ...]
@@ -58,6 +62,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
     NotSwappable when the result might differ from the mutant started on its own.
     """
     functions: list[FunctionSwap] = []
+    settings: list[tuple[str, CodeType]] = []
     imports: dict[str, None] = {}
     probe_file = probe_path(manifest.package)
     for path, data in files.items():
@@ -69,6 +74,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
             raise NotSwappable(f"{path} is a new file")
         found, needed = _in_file(path, manifest.tree.files[path], data, f"{tree}/{path}")
         functions += found
+        settings += _settings(path, data, f"{tree}/{path}")
         imports |= dict.fromkeys(needed)
     if probe_file not in files:
         raise NotSwappable("there is no probe")
@@ -76,7 +82,9 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
     name = f"{tree}/{probe_file}"
     # the shared part takes ten times as long to compile, and is compiled once
     probe = (compile(own, name, "exec", dont_inherit=True), _compiled(common.encode(), name))
-    return CodeSwap(functions=tuple(functions), probe=probe, own=own, imports=tuple(imports))
+    return CodeSwap(
+        functions=tuple(functions), settings=tuple(settings), probe=probe, own=own, imports=tuple(imports)
+    )
 
 
 @lru_cache(maxsize=256)  # every mutant changes the file that observes, most of them in no other way
@@ -87,13 +95,29 @@ def _in_file(
     if unsplice(mutated) != pristine:
         raise NotSwappable(f"{path} differs by more than inserted lines")
     imports = _guarded_imports(path, mutated.splitlines())
-    module = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-    old, new = _compiled(pristine, filename), _compiled(mutated, filename)
+    old, new = _compiled(pristine, filename), _compiled(_only(mutated, sets=False), filename)
     functions = [
-        FunctionSwap(module=module, path=names, old=before, new=after)
+        FunctionSwap(module=module_name(path), path=names, old=before, new=after)
         for names, before, after in changed_functions(old, new, path)
     ]
     return tuple(functions), imports
+
+
+def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
+    """The module of a file and the code of its lines that tell the probe what to set, if it has any."""
+    lines = _only(mutated, sets=True)
+    return [(module_name(path), _compiled(lines, filename))] if lines.strip() else []
+
+
+def _only(mutated: bytes, *, sets: bool) -> bytes:
+    """A file's lines that tell the probe what to set, or the others, each where it was."""
+    lines = mutated.splitlines(keepends=True)
+    chosen = [((tag := tag_of(line)) is not None and tag.sets) is sets for line in lines]
+    if all(chosen):
+        return mutated
+    return b"".join(
+        (line.lstrip() if sets else line) if keep else b"\n" for line, keep in zip(lines, chosen, strict=True)
+    )
 
 
 @lru_cache(maxsize=64)
@@ -110,7 +134,7 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
         raise NotSwappable(f"{path} has a changed value that does not ask the probe first")
     for line in lines:
         tag = tag_of(line)
-        if tag and tag.of_fault and tag.was is None:
+        if tag and tag.of_fault and tag.was is None and not tag.sets:
             indent = len(tag.code) - len(tag.code.lstrip())
             if tag.id != before or indent <= margin:
                 margin = indent

@@ -182,6 +182,7 @@ class ForkEngine:
             "probe_name": probe_module(self._manifest.package),
             "probe": swap.probe,
             "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
+            "settings": swap.settings,
             "probe_state": state_after(start.observed, start.began, start.t),
             "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,

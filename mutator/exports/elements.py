@@ -69,7 +69,7 @@ def _mutant(
 ) -> dict[str, Any]:
     first, *others = fault.injections
     file = parsed(manifest.tree, first.location.path)
-    edits = in_lines(file, [injection_edit(file, models, first, injection_id(0, first))])
+    edits = in_lines(file, [injection_edit(file, models, first, injection_id(0, first), manifest.tree)])
     also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
     description = f"{fault.label}, aims at {fault.aim}" + (f"; also at {', '.join(also)}" if also else "")
     return {

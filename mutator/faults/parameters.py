@@ -9,9 +9,10 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
 from mutator.faults.specs import Draw
-from mutator.model import VALUE_ANCHORS, AnchorKind, Injection, Value
+from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
 
 _NAMED = {"variable": "a name as in the source", "import": "a module of the target and a name in it"}
+_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
 _WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
@@ -40,7 +41,7 @@ def resolve(
             params[schema.name] = int(generator(seed, f"{key}/{schema.name}").random() * 2**53)
         elif schema.name == "target" and spec.location.anchor.kind in _WITH_DEFAULT_TARGET:
             params.setdefault("target", spec.location.anchor.name)
-        at_value = schema.name == "target" and spec.location.anchor.kind in VALUE_ANCHORS
+        at_value = schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET
         if schema.name not in params and not (schema.optional or at_value):
             raise source.error(
                 (*spec.keys, "params"),

@@ -12,9 +12,10 @@ from pathlib import Path
 from mutator._common.interrupts import held
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
-from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
+from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 from mutator.mutants.expression_choice import as_written, choose_expression
 from mutator.mutants.expressions import Expression, expressions_of
+from mutator.mutants.fixed_values import FixedValue, choose_fixed, find_fixed
 from mutator.mutants.parsing import import_line, libcst_module, python_tree, reading, refuse_unfit
 from mutator.mutants.places import Place, places_by_ast
 from mutator.mutants.scopes import as_compiled, function_names
@@ -53,6 +54,7 @@ class ParsedFile:
     functions: Mapping[str, tuple[Function, ...]]
     places: frozenset[Place]  # as `ast` sees them
     expressions: Mapping[str, tuple[Expression, ...]]  # by function
+    fixed: tuple[FixedValue, ...]
     where: Path
     sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
@@ -63,11 +65,20 @@ class ParsedFile:
         name = as_compiled(location.function.replace(".<locals>", ""))
         return choose_expression(self.expressions.get(name, ()), location, self.where, functions[0].line)
 
+    def resolve_fixed(self, location: FaultLocation) -> FixedValue:
+        """The constant or default that `location` names; MutatorError with candidates if there is none."""
+        if location.function:
+            _functions(self, location)
+        return choose_fixed(self.fixed, location, self.where)
+
     def span(self, location: FaultLocation) -> tuple[int, int]:
         """The lines that what the location names is on: the first (from 0), and the one after the last."""
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1
+        if location.anchor.kind in FIXED_ANCHORS:
+            fixed = self.resolve_fixed(location)
+            return fixed.first, fixed.last
         site = self.resolve(location)
         return site.first, site.last
 
@@ -106,6 +117,7 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             import_line=import_line(module, positions),
             functions=collect(module, positions, function_names(data)),
             expressions=expressions_of(data, module, positions),
+            fixed=find_fixed(data, tree),
             places=places_by_ast(tree),
             where=where,
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 from mutator._common.hashing import content_id
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
-from mutator.model import Fault, Hold, Injection, Trigger
+from mutator.model import FIXED_ANCHORS, Fault, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.normalized_source import compiles, normalized
@@ -86,7 +86,8 @@ def _build(
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
     edits = _edits(manifest, models, injections, ids)
     probe_file = probe_path(manifest.package)
-    probe = _probe(manifest, models, mutant_id, trigger, hold, ids)
+    sets = any(one.location.anchor.kind in FIXED_ANCHORS for one in injections)
+    probe = _probe(manifest, models, mutant_id, trigger, hold, ids, sets)
     splicer.check_probe(probe, (mutant_id, *ids), models.folder / PROBE_TEMPLATE)
     files = {probe_file: probe.encode()}
     patches = {probe_file: new_file(probe_file, probe)}
@@ -111,7 +112,7 @@ def _edits(
     for name, injection in zip(ids, injections, strict=True):
         check_location(manifest, injection.location)
         file = parsed(manifest.tree, injection.location.path)
-        edits.setdefault(file.path, []).append(injection_edit(file, models, injection, name))
+        edits.setdefault(file.path, []).append(injection_edit(file, models, injection, name, manifest.tree))
     return {path: in_lines(parsed(manifest.tree, path), own) for path, own in edits.items()}
 
 
@@ -129,6 +130,7 @@ def _probe(
     trigger: Trigger,
     hold: Hold,
     ids: tuple[str, ...],
+    sets: bool,
 ) -> str:
     own = probe_path(manifest.package).removesuffix("py")
     if taken := [path for path in manifest.tree.files if path.startswith((own, f"{own[:-1]}/"))]:
@@ -138,7 +140,8 @@ def _probe(
             expected="that name free for the probe",
             remedy="rename the target's file, or point the manifest at the original tree",
         )
-    values = template_values(mutant_id, trigger, hold, ids, manifest.observation, manifest.step_s)
+    observation, step_s = manifest.observation, manifest.step_s
+    values = template_values(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
     return render(models.probe, values, models.folder / PROBE_TEMPLATE)
 
 

@@ -150,11 +150,12 @@ def _of_scope(body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool)
         if inside:
             name = ".".join(scope)
             yield from ((name, node, roles) for node, roles in _of_statement(statement))
-        for block in _blocks(statement):
+        for block in blocks(statement):
             yield from _of_scope(block, scope, inside=inside)
 
 
-def _blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
+def blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
+    """The blocks of a statement: its body, what it does otherwise, its cases."""
     for name in _BLOCKS:
         yield getattr(statement, name, [])
     for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
@@ -283,6 +284,9 @@ def _comprehension(node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.Dic
             yield from _condition(test)
 
 
+NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arguments": []}
+
+
 def parts_of(expression: Expression) -> dict[str, object]:
     """What templates may use beside the whole: the two sides of an operator (`left`, `right`), what a call
     calls (`called`) and its arguments (`arguments`); None, or empty, where there is no such thing."""
@@ -304,3 +308,9 @@ def parts_of(expression: Expression) -> dict[str, object]:
 def _enclosed(node: ast.expr) -> str:
     text = ast.unparse(node)
     return text if isinstance(node, _ATOMS) else f"({text})"
+
+
+def enclosed(text: str) -> str:
+    """An expression's source, in parentheses if a comma beside it could tear it apart."""
+    node = ast.parse(text, mode="eval").body
+    return f"({text})" if isinstance(node, ast.Tuple | ast.NamedExpr | ast.Lambda) else text

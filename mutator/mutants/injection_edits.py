@@ -6,9 +6,11 @@ from collections.abc import Iterator, Sequence
 from mutator.config.locations import base_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
-from mutator.model import VALUE_ANCHORS, Injection
+from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site
-from mutator.mutants.expressions import parts_of
+from mutator.mutants.expressions import NO_PARTS, enclosed, parts_of
+from mutator.mutants.imported_names import importers
+from mutator.mutants.probe import ORIGINAL, set_constant, set_default
 from mutator.mutants.rendering import changed_value, snippet
 from mutator.mutants.reusable_changes import reuse_key
 from mutator.mutants.scopes import as_compiled, moved_names
@@ -19,14 +21,21 @@ from mutator.mutants.splicing import (
     guard,
     insertion,
     joined,
+    setting,
     value_change,
 )
+from mutator.targets.source_tree import SourceTree
 
 
 def injection_edit(
-    file: ParsedFile, models: FaultModels, injection: Injection, name: str
+    file: ParsedFile,
+    models: FaultModels,
+    injection: Injection,
+    name: str,
+    tree: SourceTree | None = None,
 ) -> Edit | ValueEdit:
-    """The edit of one injection in its file; `name` tags its lines.
+    """The edit of one injection in its file; `name` tags its lines. `tree` has the files that may import a
+    constant from it; None: there are none.
 
     MutatorError for an anchor that is not found, a name that the function does not know, and for lines that
     would change what the target's names mean while the fault is not active.
@@ -34,6 +43,8 @@ def injection_edit(
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
         return _value_edit(file, model, injection, name)
+    if injection.location.anchor.kind in FIXED_ANCHORS:
+        return _setting(file, model, injection, name, tree)
     site = file.resolve(injection.location)
     variables = _variables(file, site.names, site.first, model, injection)
     code = snippet(model, dict(injection.params), name)
@@ -53,6 +64,30 @@ def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name:
     params = dict(injection.params)
     changed = changed_value(model, params, name, expression.written, parts_of(expression))
     return value_change(file, expression, changed, name)
+
+
+def _setting(
+    file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
+) -> Edit:
+    value, params = file.resolve_fixed(injection.location), dict(injection.params)
+    for param in model.params:
+        if param.type == "variable" and params.get(param.name) is not None:
+            raise MutatorError(
+                f"'{params[param.name]}' for `{param.name}` at a {value.kind.value}",
+                where=file.where,
+                line=value.first + 1,
+                expected="no variable: what the probe sets is in no function",
+                remedy=f"leave `{param.name}` out, or anchor in a function",
+            )
+    changed = enclosed(changed_value(model, params, name, ORIGINAL, NO_PARTS))
+    if value.kind is AnchorKind.CONSTANT:
+        of_module = "." not in value.name
+        imported = importers(tree, file.path, value.name) if tree and of_module else ()
+        code = set_constant(name, value.path, changed, imported)
+    else:
+        function, _, parameter = value.path.rpartition(".")
+        code = set_default(name, function, parameter, changed)
+    return setting(file, value, code, name)
 
 
 def _variables(

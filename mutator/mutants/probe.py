@@ -24,6 +24,7 @@ from mutator.triggers.conditions import TIME, check_condition, to_code
 
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
+ORIGINAL = "original"  # what a line that sets a value calls it as the program has it
 # in quotes, in a name or in a tag: a number of eight digits is none
 INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
 
@@ -35,6 +36,7 @@ _GUARD = re.compile(
     rf'\s*if (not )?{PROBE_NAME}\.active\("[0-9a-z]+"\)( or {PROBE_NAME}\.steps\(\))?:\Z'.encode()
 )
 _ASKED = re.compile(rf' if {PROBE_NAME}\.active\("([0-9a-z]+)"\) else '.encode())
+_SETS = re.compile(rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode())
 _TAGGED_ADDITION = re.compile(rf"^\+.*{_TAG}\r?$", re.MULTILINE)
 _FAULT_ADDITION = re.compile(rf"^\+.*{_MARK}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
 _SETTING = re.compile(
@@ -81,9 +83,13 @@ def template_values(
     injections: Sequence[str],
     observation: Observation,
     step_s: float,
+    *,
+    sets: bool = False,
 ) -> dict[str, object]:
-    """What the probe's template is rendered with; MutatorError for a hold time that is missing, and for a
-    condition over what the target does not observe."""
+    """What the probe's template is rendered with; `sets`: the probe is to set constants or defaults.
+
+    MutatorError for a hold time that is missing, and for a condition over what the target does not observe.
+    """
     if hold is Hold.FOR and trigger.hold_s is None:
         raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
     names = [value.name for value in observation.values]
@@ -100,6 +106,7 @@ def template_values(
         "hold_s": float(trigger.hold_s or 0.0),
         "armed_after_s": float(trigger.armed_after_s),
         "injections": injections,
+        "sets": sets,
     }
 
 
@@ -139,6 +146,11 @@ class Tag:
     def asked_for(self) -> list[str]:
         """The injections whose values a changed line takes only if the probe says so."""
         return [found.decode() for found in _ASKED.findall(self.code)]
+
+    @property
+    def sets(self) -> bool:
+        """Whether the line tells the probe of a value that it is to set while the fault is active."""
+        return _SETS.match(self.code) is not None
 
     @property
     def changed_parts(self) -> list[tuple[int, int]]:
@@ -181,6 +193,19 @@ def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
 def changed_value(tag: str, changed: str) -> str:
     """What goes before an expression so that it is worth `changed` while the fault is active."""
     return f'({changed} if {PROBE_NAME}.active("{tag}") else '
+
+
+def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:
+    """The line that has the probe set a constant: the one at `path` in its module, `Class.NAME` for one of a
+    class, and what other modules imported of it. `changed` is its value then, of the `original` one."""
+    more = "".join(f', "{name}"' for name in imported)
+    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{more})'
+
+
+def set_default(tag: str, function: str, parameter: str, changed: str) -> str:
+    """The same for the default of a parameter."""
+    where = f'globals(), "{function}", "{parameter}"'
+    return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL}: {changed})'
 
 
 def tag_words() -> dict[str, Any]:

@@ -40,6 +40,22 @@ def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[in
         yield from _function_names(child, private)
 
 
+def set_by_functions(data: bytes) -> frozenset[str]:
+    """The names of a module that its functions or classes set, declared `global` there."""
+    return frozenset(
+        symbol.get_name()
+        for table in _below(_table(data))
+        for symbol in table.get_symbols()
+        if symbol.is_declared_global() and (symbol.is_assigned() or symbol.is_imported())
+    )
+
+
+def _below(table: SymbolTable) -> Iterator[SymbolTable]:
+    for child in table.get_children():
+        yield child
+        yield from _below(child)
+
+
 def as_compiled(name: str) -> str:
     """An identifier as the compiler takes it: `µ` has two code points, which are one to it."""
     return unicodedata.normalize("NFKC", name)

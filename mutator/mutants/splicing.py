@@ -15,17 +15,20 @@ from itertools import pairwise
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import ParsedFile, Site
 from mutator.mutants.expressions import Expression
+from mutator.mutants.fixed_values import FixedValue
 from mutator.mutants.probe import changed_value, import_statement, tag_instead, tag_of, tagged
 
 
 class Rank(IntEnum):
     """Order of edits between the same two lines: first what follows the upper one, then what precedes the
-    lower one, then what changes that: a guard around it, a line in its place."""
+    lower one, then what changes that: a guard around it, a line in its place. What follows a whole function
+    comes after what follows the last line in it."""
 
     AFTER = 0
-    BEFORE = 1
-    GUARD = 2
-    INSTEAD = 3
+    AFTER_WHOLE = 1
+    BEFORE = 2
+    GUARD = 3
+    INSTEAD = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +90,12 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
         reindent=site.reindent,
         unit=_unit(file, site.indent),
     )
+
+
+def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
+    """The edit that inserts the line `code` after the statement that makes a fixed value."""
+    line = value.indent + _encoded(file, tagged(code, tag), value.first) + file.newline
+    return Edit(index=value.index, rank=Rank.AFTER_WHOLE, lines=(line,))
 
 
 def value_change(file: ParsedFile, expression: Expression, changed: str, tag: str) -> ValueEdit:
@@ -177,8 +186,13 @@ def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
 
 
 def in_order(edits: Iterable[Edit]) -> list[Edit]:
-    """Edits from the top of the file to its end; those at one index and rank keep their order."""
-    return sorted(edits, key=lambda e: (e.index, e.rank))
+    """Edits from the top of the file to its end; those at one index and rank keep their order, but what
+    follows a whole class comes after what follows the last function in it."""
+    return sorted(edits, key=lambda e: (e.index, e.rank, -_depth(e)))
+
+
+def _depth(edit: Edit) -> int:
+    return len(_margin(edit.lines[0])) if edit.rank is Rank.AFTER_WHOLE else 0
 
 
 def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:

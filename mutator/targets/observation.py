@@ -11,7 +11,7 @@ from pydantic import Field
 from mutator._common.text import shown
 from mutator.config.locations import PROBE_NAME, AtModel, dotted_name
 from mutator.config.yaml_files import Source, StrictModel
-from mutator.model import FaultLocation
+from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, FaultLocation
 from mutator.targets.paths import inside
 from mutator.triggers.conditions import RESERVED, TIME, check_formula, names_in
 
@@ -108,6 +108,12 @@ class ObservationModel(StrictModel, title="The observation"):
 def read_observation(model: ObservationModel, source: Source) -> Observation:
     """The observation of a manifest; errors point into `source`."""
     location = model.at.location(source, ("observation", "at"))
+    if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
+        raise source.error(
+            ("observation", "at", location.anchor.kind.value),
+            f"an observation at a {location.anchor.kind.value}",
+            expected="a statement, such as `after_assign: gap`",
+        )
     with source.placing(("observation", "at", "file")):
         inside(location.path)
     _check_names(model, source)

@@ -142,7 +142,7 @@ def _unbuildable(
         for i, injection in enumerate(fault.injections):
             keys = (*variant.keys, fault.reading, "injections", i, "at")
             file = parsed(manifest.tree, injection.location.path)
-            injection_edit(file, models, injection, EXAMPLE_TAG)
+            injection_edit(file, models, injection, EXAMPLE_TAG, manifest.tree)
         keys = (*variant.keys, fault.reading)
         build(manifest, models, fault, always())
     except MutatorError as error:

@@ -211,6 +211,7 @@ class Process:
         try:
             probe = swap.install(job["probe_name"], job["probe"])
             swap.swap_code(job["functions"], probe)
+            swap.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
             child.note_activation(probe, job["inactive"])
             holder, state = job["probe_state"]  # what it would know had it been there from the beginning

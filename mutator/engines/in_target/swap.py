@@ -39,6 +39,17 @@ def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> No
         function.__globals__[name] = probe
 
 
+def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
+    """Run lines of modules (module, code) that tell the probe what to set, each in its module."""
+    name = probe.__name__.rpartition(".")[2]
+    for module, code in settings:
+        if module not in sys.modules:
+            raise SwapRefused(f"{module} is not loaded")
+        names = vars(sys.modules[module])
+        names[name] = probe
+        exec(code, names)
+
+
 def live_function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
     """The function at `path` that alone has this code; SwapRefused if there is none, or if it is at work."""
     where = ".".join((module, *path))

@@ -1,0 +1,115 @@
+"""Which modules of a tree import a constant of another one by name, so that it is set there, too."""
+
+import ast
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from symtable import symtable
+
+from mutator.errors import MutatorError
+from mutator.mutants.expressions import blocks
+from mutator.mutants.scopes import set_by_functions
+from mutator.targets.source_tree import SourceTree
+
+_ALL = "*"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Import:
+    """`from module import name as known`, on a line (from 1), in a module or (`inside`) in a class of it."""
+
+    module: str
+    name: str
+    known: str
+    line: int
+    inside: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Imports:
+    """What a file imports by name, and which names it sets in another way, too."""
+
+    path: str
+    module: str
+    names: tuple[_Import, ...]
+    set: frozenset[str]
+
+
+def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
+    """Where else in the tree the constant `name` of the module at `path` is known, `module.NAME` each.
+
+    MutatorError that lists the places where it cannot be set: those that import everything, or into a class,
+    and those that set the name in another way, too.
+    """
+    files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
+    found, refused = [(module_name(path), name)], set[str]()
+    for known in found:  # which grows on the way: what is imported may be imported again
+        for file in files:
+            for one in file.names:
+                if (one.module, one.name) not in (known, (known[0], _ALL)):
+                    continue
+                reason = _refused(one, file, known[1])
+                if reason:
+                    refused.add(f"{file.path}:{one.line} {reason}")
+                elif one.name != _ALL and (file.module, one.known) not in found:
+                    found.append((file.module, one.known))
+    if refused:
+        raise MutatorError(
+            f"the constant '{name}' cannot be set everywhere: {'; '.join(sorted(refused))}",
+            where=tree.root / path,
+            expected="modules that import it by its name, and leave that alone",
+            remedy="anchor where the constant is used",
+        )
+    return tuple(".".join(one) for one in found[1:])
+
+
+def _refused(one: _Import, file: _Imports, name: str) -> str | None:
+    """Why what this imports cannot be set there."""
+    if one.name == _ALL:
+        return None if name.startswith("_") else "imports *"
+    if one.inside:
+        return "imports it into a class"
+    return f"imports it, and sets {one.known} in another way" if one.known in file.set else None
+
+
+def module_name(path: str) -> str:
+    """The dotted name of the module at a path of the tree."""
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+def _imports(path: str, data: bytes, root: Path) -> _Imports:
+    try:
+        tree, table = ast.parse(data), symtable(data, path, "exec")  # type: ignore[arg-type]  # as `compile`
+    except (SyntaxError, ValueError, RecursionError):
+        return _Imports(path=path, module=module_name(path), names=(), set=frozenset())
+    names = tuple(_of_body(tree.body, path, inside=False))
+    known = Counter(one.known for one in names if not one.inside)
+    assigned = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned()}
+    several = {name for name, count in known.items() if count > 1}
+    return _Imports(
+        path=path, module=module_name(path), names=names, set=set_by_functions(data) | assigned | several
+    )
+
+
+def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
+    """Imports at the level of a module or of its classes: what a function imports is there for one call."""
+    for statement in body:
+        match statement:
+            case ast.ImportFrom(module=module, names=names, level=level, lineno=line):
+                source = ".".join(filter(None, (_package(path, level), module)))
+                for alias in names:
+                    known = alias.asname or alias.name
+                    yield _Import(module=source, name=alias.name, known=known, line=line, inside=inside)
+            case ast.ClassDef(body=inner):
+                yield from _of_body(inner, path, inside=True)
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                pass
+            case _:
+                for block in blocks(statement):
+                    yield from _of_body(block, path, inside=inside)
+
+
+def _package(path: str, level: int) -> str:
+    """The package from which a relative import of this level starts; empty for an absolute one."""
+    return ".".join(path.split("/")[:-level]) if level else ""

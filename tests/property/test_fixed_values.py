@@ -1,0 +1,167 @@
+"""Constants and defaults that the probe sets, in modules of Python's own library: each is a case."""
+
+import ast
+import inspect
+import random
+import sys
+import types
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import pytest
+
+from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.fixed_values import FixedValue
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.probe import template_values
+from mutator.mutants.rendering import render
+from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
+from mutator.targets.observation import Observation
+
+from .test_value_anchors import MANY, models, module
+
+FEW = ("colorsys", "shlex", "textwrap", "calendar", "fractions", "string", "csv", "gettext", "argparse")
+TOGETHER = 40  # values that one mutant sets
+MORE = ("smtpd", "imaplib", "poplib", "socketserver", "xdrlib", "wave", "aifc", "cgi", "codecs", "copyreg")
+MORE += ("dataclasses", "enum", "functools", "glob", "gzip", "logging", "numbers", "operator", "opcode")
+MORE += ("os", "platform", "posixpath", "pydoc", "queue", "quopri", "re", "reprlib", "selectors", "shutil")
+MORE += ("signal", "sndhdr", "socket", "ssl", "stat", "statistics", "stringprep", "subprocess", "tempfile")
+MORE += ("threading", "token", "types", "warnings", "weakref", "webbrowser", "xmlrpc.client", "zipimport")
+MORE += ("asyncio.streams", "concurrent.futures.process", "curses.ascii", "distutils.dist", "idlelib.config")
+MORE += (
+    "importlib.metadata",
+    "lib2to3.pgen2.tokenize",
+    "logging.handlers",
+    "multiprocessing.pool",
+    "nturl2path",
+)
+MORE += (
+    "tkinter.ttk",
+    "tkinter.constants",
+    "sqlite3.dbapi2",
+    "unittest.main",
+    "wsgiref.handlers",
+    "xml.sax.handler",
+)
+
+
+def locations(file: ParsedFile) -> list[tuple[FixedValue, FaultLocation]]:
+    """Every value of a file that can be set, and the anchor that leads to it."""
+    found = []
+    for one in file.fixed:
+        if one.reason is None:
+            anchor = Anchor(kind=one.kind, name=one.name)
+            found.append((one, FaultLocation(path=file.path, function=one.function, anchor=anchor)))
+    return found
+
+
+def mutant(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]]) -> bytes:
+    edits = [probe_import(file, None)]
+    for number, (one, location) in enumerate(cases):
+        assert file.resolve_fixed(location) is one
+        injection = Injection(location=location, model="stuck", params=(("value", "another"),))
+        edits.append(injection_edit(file, models(), injection, f"{number:08x}"))  # type: ignore[arg-type]
+    data = joined(apply_edits(file, in_lines(file, edits)))
+    assert unsplice(data) == file.data, cases
+    return data
+
+
+class WithoutProbe(ast.NodeTransformer):
+    """A module without the lines that import the probe and tell it what to set."""
+
+    def visit_Import(self, node: ast.Import) -> ast.AST | None:
+        return None if node.names[0].name == "_fi" else node
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        return None if ast.unparse(node).startswith(("_fi.constant(", "_fi.default(")) else node
+
+
+def probe(ids: Sequence[str]) -> Any:
+    """A probe that is active from time 1 on, until 2."""
+    nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
+    observation = Observation(location=nowhere, time="t", values=(), derived=())
+    trigger = Trigger(name="test", condition="t >= 1 and t < 2")
+    values = template_values("m", trigger, Hold.WHILE, ids, observation, 1.0, sets=True)
+    made = types.ModuleType("_fi")
+    exec(render(models().probe, values, models().folder / "_fi.py.j2"), vars(made))
+    return made
+
+
+def read(names: types.ModuleType, one: FixedValue) -> Any:
+    """The value as the program has it: what lies under the name, or what Python says of the signature."""
+    *path, last = one.path.split(".")
+    found: Any = names
+    for name in path:
+        found = vars(found)[name]
+    if one.kind is AnchorKind.CONSTANT:
+        return vars(found)[last]
+    found = found.fget if isinstance(found, property) else getattr(found, "__func__", found)
+    return inspect.signature(inspect.unwrap(found)).parameters[last].default
+
+
+def readable(
+    names: types.ModuleType, cases: Sequence[tuple[FixedValue, FaultLocation]]
+) -> Iterator[FixedValue]:
+    """Those that the program made: some are made on other systems alone."""
+    for one, _ in cases:
+        try:
+            read(names, one)
+        except (KeyError, AttributeError, TypeError, ValueError):
+            continue
+        yield one
+
+
+def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *, run: bool) -> None:
+    """A mutant compiles, un-splices, and is the module but for the lines that tell the probe what to set; if
+    it is `run`, each value is another in an active step alone, and afterwards what it was."""
+    data = mutant(file, cases)
+    tree = ast.parse(data)
+    compile(tree, "<mutant>", "exec", dont_inherit=True)
+    assert ast.dump(WithoutProbe().visit(tree)) == ast.dump(ast.parse(file.data)), cases
+    if not run:
+        return
+    names, fi = types.ModuleType(f"set_{file.path[:-3]}"), probe([f"{i:08x}" for i in range(len(cases))])
+    sys.modules |= {"_fi": fi, names.__name__: names}
+    try:
+        exec(compile(data, file.path, "exec", dont_inherit=True), vars(names))
+        known = list(readable(names, cases))
+        before = [read(names, one) for one in known]
+        seen = []
+        for t in (0.0, 1.0, 2.0):
+            fi.observe(t=t)
+            seen.append([read(names, one) for one in known])
+    finally:
+        del sys.modules["_fi"], sys.modules[names.__name__]
+    assert all(one is other for at in (0, 2) for one, other in zip(before, seen[at], strict=True)), cases
+    assert seen[1] == ["another"] * len(known), [
+        c for c, v in zip(known, seen[1], strict=True) if v != "another"
+    ]
+    counts = [told["count"] for told in fi.report()["injections"].values()]
+    assert sum(counts) >= len(known)
+    assert set(counts) <= {0, 1}
+
+
+def checked(names: Sequence[str], count: int, *, run: bool) -> int:
+    """Check so many cases drawn from the modules of these names; how many they were."""
+    files = [file for name in names if (file := module(name))]
+    cases = [(file, pair) for file in files for pair in locations(file)]
+    chosen = random.Random(1).sample(cases, min(count, len(cases)))
+    for file in files:
+        own = [pair for one, pair in chosen if one is file]
+        for at in range(0, len(own), TOGETHER):
+            check(file, own[at : at + TOGETHER], run=run)
+    return len(chosen)
+
+
+def test_what_the_probe_sets_is_put_back() -> None:
+    """A mutant compiles, un-splices to every byte, and differs by lines that tell the probe what to set; each
+    value is another while the fault is active, and the same object again afterwards."""
+    assert checked(FEW, 200, run=True) == 200
+
+
+@pytest.mark.slow
+def test_what_the_probe_sets_is_put_back_at_large() -> None:
+    """The same of thousands of values; those of modules that do things when they are loaded are not run."""
+    assert checked(FEW, 2000, run=True) > 250
+    assert checked((*MANY, *MORE), 5000, run=False) > 4000
