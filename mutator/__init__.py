@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     )
     from mutator.api.mutant_files import MutantSet
     from mutator.api.mutants import BuiltMutant, build_mutant
+    from mutator.api.operator_mutants import OperatorChoice
     from mutator.api.plans import plan
     from mutator.api.reviews import ReviewedGroups, load_review
     from mutator.api.run_experiments import RunExperiment
@@ -63,6 +64,7 @@ _HOMES = {
         "upgrade_manifest",
     ),
     "mutator.api.mutant_files": ("MutantSet",),
+    "mutator.api.operator_mutants": ("OperatorChoice",),
     "mutator.api.mutants": ("BuiltMutant", "build_mutant"),
     "mutator.api.plans": ("plan",),
     "mutator.api.reviews": ("ReviewedGroups", "load_review"),
@@ -96,6 +98,7 @@ __all__ = [
     "MutantSet",
     "MutatorError",
     "MutatorWarning",
+    "OperatorChoice",
     "Outcome",
     "Plan",
     "Progress",

@@ -3,6 +3,7 @@
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
       runs/<digest>.json   finished runs that were verified: what was found
+      lines/<digest>.json  the lines that a golden run executes
       targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
 
 Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-CHECKS, RUNS, TARGETS = "checks", "runs", "targets"
+CHECKS, RUNS, LINES, TARGETS = "checks", "runs", "lines", "targets"
 TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with many seeds
 
 
@@ -24,8 +25,8 @@ TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with m
 class Entry:
     """Something in the cache that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `runs`, `target openpilot`. `size` is what it takes on the disk, in
-    bytes, and `used` when it was last read or written, in seconds since the epoch.
+    `what` says whose it is: `checks`, `runs`, `lines`, `target openpilot`. `size` is what it takes on the
+    disk, in bytes, and `used` when it was last read or written, in seconds since the epoch.
     """
 
     what: str
@@ -62,6 +63,11 @@ def of_runs() -> Path:
     return folder() / RUNS
 
 
+def of_lines() -> Path:
+    """Where it is kept which lines golden runs execute."""
+    return folder() / LINES
+
+
 def of_target(name: str) -> Path:
     """Where the target of that name keeps what its runs share; any name is one folder there."""
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
@@ -71,6 +77,7 @@ def entries() -> list[Entry]:
     """All that is cached: each campaign's checks, each verified run, and each file that a target keeps."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
     found += [_entry(RUNS, path) for path in _children(of_runs())]
+    found += [_entry(LINES, path) for path in _children(of_lines())]
     for target in _children(folder() / TARGETS):
         found += [_entry(f"target {target.name}", path) for path in _files(target)]
     return sorted(found, key=lambda entry: (entry.what, entry.path))

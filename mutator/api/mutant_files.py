@@ -9,6 +9,7 @@ from pathlib import Path
 from mutator._common.files import make_folder
 from mutator._common.text import counted
 from mutator.api.mutants import BuiltMutant, built
+from mutator.api.operator_mutants import OperatorChoice, operator_faults
 from mutator.api.selection import Bench, FaultChoice, WorkspaceLike, context_tables, open_workspace
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
@@ -75,6 +76,7 @@ class MutantSet:
 
     bench: Bench
     pairs: tuple[Pair, ...]
+    told: str = ""  # of mutants of operators: how many there are, and what was left out
 
     def __repr__(self) -> str:
         return f"<MutantSet: {counted(len(self), 'mutant')} of {self.bench.manifest.name}>"
@@ -96,6 +98,21 @@ class MutantSet:
         """Every fault of the specs (names, globs, files) under every trigger; default: all contexts."""
         bench = Bench.of(workspace, target)
         return cls(bench, tuple(pairs_of_specs(bench, specs, triggers, seed=seed, reading=reading)))
+
+    @classmethod
+    def of_operators(
+        cls,
+        choice: OperatorChoice,
+        triggers: Sequence[str] = (),
+        *,
+        target: str | None = None,
+        workspace: WorkspaceLike = None,
+    ) -> "MutantSet":
+        """What mutation operators make of places in the source, under every trigger; default: `always`."""
+        bench = Bench.of(workspace, target)
+        faults, told = operator_faults(bench, choice)
+        made = [bench.trigger(text) for text in triggers or ("always",)]
+        return cls(bench, tuple((fault, trigger) for fault in faults for trigger in made), told)
 
     @classmethod
     def of_campaign(

@@ -13,6 +13,7 @@ from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.readable_diffs import readable
+from mutator.operators.names import Operator
 
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
 
@@ -174,11 +175,15 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
             terminal.note(note)
 
 
+OPERATORS = ", ".join(one.value for one in Operator)
+
 GENERATE_EXAMPLES = """\b
 Examples:
   mutator generate radar/chaff --out mutants                     patches under every context
   mutator generate 'radar/*' --out mutants --trees --trigger C2  whole trees too
   mutator generate --campaign quickstart --out mutants           the mutants of a campaign
+  mutator generate --operators arithmetic,constant --in 'pkg/**::Car.*' -s S1 --out mutants
+                                                                 no spec: of these operators
 """
 
 
@@ -201,6 +206,36 @@ def generate(
             "--trigger", metavar="WHEN", help="As for `try`; may be given again. Default: every context."
         ),
     ] = None,
+    operators: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES", help=f"The mutants of these operators, without a spec: {OPERATORS}; or all."
+        ),
+    ] = None,
+    places: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--in",
+            metavar="PLACE",
+            help="Where, with --operators: PATH::FUNCTION or PATH, with `*` and `**`; may be given again.",
+        ),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            "--scenario",
+            "-s",
+            help="With --operators: only lines that its golden run executes.",
+            autocompletion=completion.scenarios,
+        ),
+    ] = None,
+    all_lines: Annotated[
+        bool, typer.Option("--all-lines", help="With --operators: lines that no run executes, too.")
+    ] = False,
+    sample: Annotated[
+        int | None,
+        typer.Option(min=1, help="With --operators: draw so many, by operator and function, from --seed."),
+    ] = None,
     seed: Seed = None,
     reading: Reading = None,
     manifest: Manifest = None,
@@ -211,6 +246,7 @@ def generate(
     """Write mutants as patches or trees, with an index."""
     terminal = Terminal(as_json)
     workspace = place.workspace()
+    choice = _operator_choice(operators, places, scenario, all_lines, sample, seed, bool(specs or campaign))
     if campaign and (specs or triggers):
         raise MutatorError(
             "--campaign together with specs or --trigger", expected="one or the other", where="generate"
@@ -218,6 +254,9 @@ def generate(
     if campaign:
         choices = mutator.Choices(seed=seed, reading=reading)
         mutants = mutator.MutantSet.of_campaign(campaign, choices=choices, workspace=workspace)
+    elif choice:
+        mutants = mutator.MutantSet.of_operators(choice, triggers or (), target=manifest, workspace=workspace)
+        terminal.note(mutants.told)
     else:
         mutants = mutator.MutantSet.of_specs(
             specs or (),
@@ -236,3 +275,38 @@ def generate(
     root = mutants.bench.manifest.root
     if mutants.bench.manifest.overlay is None:  # else a patch is of two folders
         terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}", whole=True)
+
+
+def _operator_choice(
+    operators: str | None,
+    places: list[str] | None,
+    scenario: str | None,
+    all_lines: bool,
+    sample: int | None,
+    seed: int | None,
+    others: bool,
+) -> "mutator.OperatorChoice | None":
+    """What the options of operators ask for, if anything; `others` says that specs or a campaign are named,
+    too."""
+    if operators is None:
+        if places or scenario or all_lines or sample is not None:
+            raise MutatorError(
+                "--in, --scenario, --all-lines or --sample without --operators",
+                where="generate",
+                remedy=f"add --operators with some of {OPERATORS}, or `all`",
+            )
+        return None
+    if others or not places or (scenario is None) is not all_lines:
+        raise MutatorError(
+            "--operators",
+            where="generate",
+            expected="no specs and no campaign, at least one --in, and either --scenario or --all-lines",
+        )
+    names = [one.value for one in Operator] if operators == "all" else operators.split(",")
+    return mutator.OperatorChoice(
+        operators=[name.strip() for name in names],
+        places=places,
+        scenario=scenario,
+        sample=sample,
+        seed=seed or 0,
+    )

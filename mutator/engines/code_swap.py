@@ -196,14 +196,16 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 def same(one: CodeType, other: CodeType) -> bool:
     """Whether two functions do the same, on whatever lines they are."""
-    if _essence(one) != _essence(other):
-        return False
-    before, after = _inner(one), _inner(other)
-    return len(before) == len(after) and all(map(same, before, after))
+    return essence(one) == essence(other)
+
+
+def essence(code: CodeType) -> tuple[object, ...]:
+    """What a function's code and those in it do, equal for functions that do the same."""
+    return (*_essence(code), *map(essence, _inner(code)))
 
 
 def _essence(code: CodeType) -> tuple[object, ...]:
     """What a function's code does, without its line numbers and the functions in it."""
-    values = [(type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts]
+    values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

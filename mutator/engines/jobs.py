@@ -41,6 +41,7 @@ class Job:
     stop: bool = False  # end it at its first terminal hazard
     golden_ends: bool = False  # one is in its golden run, too
     watch: bool = False  # the same as `observe`, and note calls that keep a target from being deterministic
+    lines: bool = False  # note which lines of the tree are executed, from the first observation on
 
     def problem_of(self, report: object) -> str:
         """What is wrong with what its probe reported; empty if nothing is, or if it has no probe."""
@@ -87,7 +88,8 @@ class Execution:
     and `why` another engine did it than the one that was asked; `start` is the step before which the golden
     run did its work. `stopped` says that a terminal hazard ended it before its time. `modules` are the top-
     level modules that the run imported from neither its package nor the standard library, `watched` what a
-    watched one noted, and what its probe observed (`seen`), of the reference engine alone.
+    watched one noted, and what its probe observed (`seen`), of the reference engine alone; so are `lines`,
+    the lines (from 1) of each file that were executed.
     """
 
     status: Status
@@ -105,6 +107,7 @@ class Execution:
     stopped: bool = False
     modules: tuple[str, ...] = ()
     watched: Mapping[str, Any] = field(default_factory=dict)
+    lines: Mapping[str, list[int]] = field(default_factory=dict)
 
 
 class Engine(Protocol):

@@ -33,6 +33,7 @@ from mutator.engines.processes import (
     was_active,
 )
 from mutator.model import Limits, Status
+from mutator.mutants.anchors import parsed
 from mutator.mutants.probe import probe_module, state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stopping import stop_source
@@ -108,6 +109,7 @@ class ReferenceEngine:
             stopped=bool(report and report.get("stopped")),
             modules=tuple(report["modules"]) if report else (),
             watched=report.get("watched", {}) if report else {},
+            lines=report.get("lines", {}) if report else {},
         )
 
     def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
@@ -143,10 +145,17 @@ class ReferenceEngine:
             "stepwise": self.manifest.stepwise,
             "watch": job.watch,
             "observe": self._observed() if job.watch or job.observe else None,
+            "lines": self._observation() if job.lines else None,
         }
         path = folder / "job.json"
         path.write_text(json.dumps(request), encoding="utf-8")
         return path
+
+    def _observation(self) -> tuple[str, list[int]]:
+        """The file that observes, and the lines (from 1) of its statement that does."""
+        location = self.manifest.observation.location
+        first, last = parsed(self.manifest.tree, location.path).span(location)
+        return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
     def _observed(self) -> tuple[str, list[str]]:
         """Where a probe keeps what it observes, and the names of the observed values."""

@@ -21,8 +21,8 @@ SCHEMA = "fault_model/1"
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
-# A `constant` is a number, a truth value, a text or None.
-ParamType = Literal["variable", "import", "number", "integer", "boolean", "constant", "seed"]
+# A `constant` is a number, a truth value, a text or None; a `choice` one of the model's own words.
+ParamType = Literal["variable", "import", "number", "integer", "boolean", "constant", "choice", "seed"]
 NAMES = ("variable", "import")
 
 
@@ -42,7 +42,8 @@ class ParamSchema:
 
     `unit` is None (a plain number), 'target' (the unit of the changed variable), or the unit that the
     template wants (`s`). `min` and `max` are inclusive, in that unit. `neutral` is the value with which the
-    model changes nothing.
+    model changes nothing. `choices` are the words that a `choice` may be, which the template writes as they
+    are.
     """
 
     name: str
@@ -53,6 +54,7 @@ class ParamSchema:
     min: float | None = None
     max: float | None = None
     neutral: float | None = None
+    choices: tuple[str, ...] = ()
 
 
 _TARGET = ParamSchema(
@@ -132,8 +134,8 @@ class _ParamModel(StrictModel, title="A parameter"):
 
     type: ParamType = Field(
         description="What a value is: a name in the function (`variable`), a dotted name to be imported "
-        "(`import`), a number, a `constant` (a number, truth value, text or null), or a `seed`, which no "
-        "spec gives and expansion draws."
+        "(`import`), a number, a `constant` (a number, truth value, text or null), a `choice` (one of the "
+        "words in `choices`), or a `seed`, which no spec gives and expansion draws."
     )
     about: str = Field(description="What it is.")
     unit: str | None = Field(
@@ -146,6 +148,9 @@ class _ParamModel(StrictModel, title="A parameter"):
     max: float | None = Field(None, description="The greatest value, in that unit.")
     neutral: float | None = Field(
         None, description="The value with which a fault changes nothing; plans and `try` warn of it."
+    )
+    choices: list[str] = Field(
+        [], description="The words that a `choice` may be; the template writes them as they are."
     )
 
 
@@ -241,7 +246,9 @@ def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
     if model.unit not in (None, TARGET_UNIT, *units.UNITS):
         raise source.error((*keys, "unit"), f"'{model.unit}'", expected=f"target or one of {units.KNOWN}")
-    return ParamSchema(name=name, **model.model_dump())
+    if (model.type == "choice") != bool(model.choices):
+        raise source.error(keys, f"parameter '{name}'", expected="`choices` for a choice, and for no other")
+    return ParamSchema(name=name, **model.model_dump() | {"choices": tuple(model.choices)})
 
 
 def _text(path: Path) -> str:

@@ -136,6 +136,10 @@ class _Resolver:
             if not isinstance(param.value, str) or not fits(param.value):
                 raise self._wrong(param, _NAMED[schema.type])
             return param.value
+        if schema.type == "choice":
+            if param.value not in schema.choices:
+                raise self._wrong(param, f"one of {', '.join(schema.choices)}")
+            return param.value
         if schema.type == "boolean":
             if not isinstance(param.value, bool):
                 raise self._wrong(param, "true or false")

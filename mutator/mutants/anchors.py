@@ -16,6 +16,7 @@ from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, Faul
 from mutator.mutants.expression_choice import as_written, choose_expression
 from mutator.mutants.expressions import Expression, expressions_of
 from mutator.mutants.fixed_values import FixedValue, choose_fixed, find_fixed
+from mutator.mutants.functions_alone import outer_functions
 from mutator.mutants.parsing import import_line, libcst_module, python_tree, reading, refuse_unfit
 from mutator.mutants.places import Place, places_by_ast
 from mutator.mutants.scopes import as_compiled, function_names
@@ -55,6 +56,7 @@ class ParsedFile:
     places: frozenset[Place]  # as `ast` sees them
     expressions: Mapping[str, tuple[Expression, ...]]  # by function
     fixed: tuple[FixedValue, ...]
+    outer: tuple[range, ...]  # the lines of each function that is in no other one
     where: Path
     sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
@@ -81,6 +83,10 @@ class ParsedFile:
             return fixed.first, fixed.last
         site = self.resolve(location)
         return site.first, site.last
+
+    def outer_function(self, line: int) -> range | None:
+        """The lines of the outermost function that this line (from 0) is in."""
+        return next((lines for lines in self.outer if line in lines), None)
 
     def names(self, location: FaultLocation) -> frozenset[str]:
         """The names that the functions of the location's name use."""
@@ -118,6 +124,7 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
             functions=collect(module, positions, function_names(data)),
             expressions=expressions_of(data, module, positions),
             fixed=find_fixed(data, tree),
+            outer=tuple(outer_functions(tree)),
             places=places_by_ast(tree),
             where=where,
         )

@@ -295,8 +295,9 @@ def parts_of(expression: Expression) -> dict[str, object]:
         left, right = node.left, node.right
     elif isinstance(node, ast.Compare) and len(node.comparators) == 1:
         left, right = node.left, node.comparators[0]
-    elif isinstance(node, ast.BoolOp) and len(node.values) == 2:
-        left, right = node.values
+    elif isinstance(node, ast.BoolOp):
+        *before, right = node.values
+        left = before[0] if len(before) == 1 else ast.BoolOp(node.op, before)
     called, arguments = None, list[str]()
     if isinstance(node, ast.Call):
         called = ast.unparse(node.func)

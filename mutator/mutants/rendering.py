@@ -139,6 +139,10 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     if param.type == "constant":
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return value if number or param.name not in params else repr(value)
+    if param.type == "choice":
+        if value is not None and value not in param.choices:
+            raise MutatorError(f"{value!r} for '{param.name}'", expected=f"one of {', '.join(param.choices)}")
+        return value
     fits = assignable if param.type == "variable" else dotted_name
     is_name = isinstance(value, str) and fits(value)
     if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):

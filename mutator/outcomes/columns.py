@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
 
-from mutator.model import Experiment
+from mutator.model import Experiment, fault_label
 from mutator.targets.manifest import TargetManifest
 
 ColumnType = Literal["text", "flag", "count", "number"]
@@ -78,7 +78,7 @@ OF_PATHS = (
     ),
 )
 EXTRA = (
-    Column("variant", "text", "", "the variant of the spec"),
+    Column("variant", "text", "", "the variant of the spec; of an operator's mutant, place and change"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
     Column("condition", "text", "", "the condition that the trigger waits for"),
     Column("detail", "text", "", "why the status is not `ok`"),
@@ -218,21 +218,24 @@ def check_names(manifest: TargetManifest) -> None:
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:
-    """`PLAN_COLUMNS` of one experiment: `variant` of the spec, `condition` that the trigger waits for."""
+    """`PLAN_COLUMNS` of one experiment: `variant` of the spec, with a value that is a text, and the
+    `condition` that the trigger waits for."""
     fault, trigger = experiment.fault, experiment.trigger
+    variant = fault.spec.split("/", 2)[-1]
+    is_text = isinstance(fault.value, str)
     return {
         "experiment_id": experiment.id,
         "fault_id": fault.id,
         "module": fault.module,
         "fault_type": fault.fault_type,
         "reading": fault.reading,
-        "value": fault.value,
+        "value": None if is_text else fault.value,
         "unit": fault.unit,
         "scenario": experiment.scenario,
         "method": experiment.method.value,
         "trigger": trigger.name,
         "seed": experiment.seed,
-        "variant": fault.spec.rpartition("/")[2],
+        "variant": fault_label(variant, fault.value, fault.unit) if is_text else variant,
         "aim": fault.aim,
         "condition": trigger.condition,
     }

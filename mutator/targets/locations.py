@@ -9,10 +9,15 @@ from mutator.targets.source_tree import matches
 
 def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
     """MutatorError (without place) unless a fault may be injected into the location's file."""
-    path = inside(location.path)
-    if path != location.path or not path.endswith(".py") or path not in manifest.tree.files:
+    check_file(manifest, location.path)
+
+
+def check_file(manifest: TargetManifest, named: str) -> None:
+    """MutatorError (without place) unless faults may be injected into the file of that name."""
+    path = inside(named)
+    if path != named or not path.endswith(".py") or path not in manifest.tree.files:
         raise MutatorError(
-            f"no Python file '{location.path}' in target {manifest.name}",
+            f"no Python file '{named}' in target {manifest.name}",
             expected="a path relative to the target's root, among the manifest's files",
             remedy=f"correct the path, or the `files` of {manifest.path.name}",
         )

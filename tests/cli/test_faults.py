@@ -106,6 +106,19 @@ def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
         shutil.rmtree("tree")
 
 
+def test_generate_makes_mutants_of_operators(cli: Cli, root: Path) -> None:
+    """Without a spec: a sample of the mutants that operators make of a function, in executed lines."""
+    words = ("--operators", "arithmetic,branch", "--in", "toycar/*.py::Driver.drive", "--scenario", "A")
+    answer = cli("generate", *words, "--sample", 5, "--seed", 3, "--out", "m")
+    assert answer.code == 0 and "5 draws of " in answer.err
+    index = read_index(Path("m"))
+    assert len(index) == 5
+    assert {line["spec"] for line in index} == {
+        f"operators/{name}/toycar/driver.py::Driver.drive" for name in ("arithmetic", "branch")
+    }
+    assert all(" -> " in line["value"] for line in index)
+
+
 def test_the_index_tells_what_each_mutant_is(cli: Cli, root: Path) -> None:
     """`--json` gives the index: ids, fault, value, trigger, files."""
     [near] = cli("generate", "sensor/distance", "--out", "m", "--trigger", "near", "--json").json[:1]
@@ -128,6 +141,10 @@ def test_ids_are_stable(cli: Cli, root: Path) -> None:
         ([], "no spec named"),
         (["nothing*"], "no spec matches"),
         (["sensor/distance", "--campaign", "x"], "one or the other"),
+        (["--in", "toycar/driver.py"], "without --operators"),
+        (["--operators", "branch", "--in", "toycar/driver.py"], "either --scenario or --all-lines"),
+        (["--operators", "branch", "--in", "toycar/none.py", "--all-lines"], "no Python file"),
+        (["--operators", "branches", "--in", "toycar/driver.py", "--all-lines"], "did you mean 'branch'"),
     ],
 )
 def test_generate_refuses_what_it_cannot_do(cli: Cli, root: Path, words: list[str], said: str) -> None:

@@ -81,10 +81,13 @@ def run(job: dict[str, Any]) -> None:
     probe = None
     known = set(sys.modules)
     watcher = beside("watch").Watcher(job["tree"]) if job["watch"] else None
+    lines = beside("lines").Lines(job["tree"], *job["lines"]) if job["lines"] else None
     seen: list[Any] = []
     try:
         if watcher:
             watcher.begin()
+        if lines:
+            lines.begin()
         if job["probe"]:
             probe = importlib.import_module(job["probe"])
             probe.limit(job["steps"])
@@ -101,6 +104,8 @@ def run(job: dict[str, Any]) -> None:
         report |= describe(err, job["tree"], job["probe"])
     if job["observe"]:
         report["watched"] = {**(watcher.found() if watcher else {}), "seen": seen}
+    if lines:
+        report["lines"] = lines.found()
     report |= asked(probe, job["tree"], job["probe"]) if probe else {"probe": None}
     report["outside"] = imported_elsewhere(job["packages"], job["tree"], sys.modules)
     report["modules"] = third_party(known, job["packages"])

@@ -1,0 +1,58 @@
+"""Mutants without a spec: what mutation operators make of places in a target's source."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mutator._common.arguments import check_whole
+from mutator._common.text import counted
+from mutator.api.selection import Bench
+from mutator.errors import MutatorError
+from mutator.model import Fault, Limits
+from mutator.operators.chosen import find_mutations, sampled
+from mutator.operators.executed import GoldenDrive, lines_of
+from mutator.operators.names import operators_named
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OperatorChoice:
+    """Which mutants of operators are meant.
+
+    `places` are `PATH::FUNCTION` or `PATH`, either with `*`, and `**` over folders. The golden run of
+    `scenario` with `seed` decides which lines count; without one all do. `sample` is how many are drawn, from
+    `seed`, of each operator in each function in proportion; without it, all.
+    """
+
+    operators: Sequence[str]
+    places: Sequence[str]
+    scenario: str | None = None
+    sample: int | None = None
+    seed: int = 0
+
+
+def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, ...], str]:
+    """The faults, in the order of files and lines, and in words how many there are and what was left out.
+
+    MutatorError for an unknown operator or place, and when nothing is left.
+    """
+    check_whole("seed", choice.seed)
+    if choice.sample is not None:
+        check_whole("sample", choice.sample, least=1)
+    executed = None
+    if choice.scenario is not None:
+        scenario = bench.workspace.scenario(choice.scenario)
+        drive = GoldenDrive(scenario=scenario, changes=(), seed=choice.seed)
+        [executed] = lines_of(bench.manifest, [drive], Limits())
+    operators = operators_named(choice.operators)
+    found = find_mutations(bench.manifest, bench.models, operators, choice.places, executed)
+    if not found.mutations:
+        raise MutatorError(
+            f"no mutant in {', '.join(choice.places)} ({found.told})",
+            argument="in",
+            remedy="name other places or operators, or take lines that are not executed, too",
+        )
+    drawn = sampled(found, choice.sample, choice.seed)
+    told = (
+        found.told if len(drawn) == len(found.mutations) else f"{counted(len(drawn), 'draw')} of {found.told}"
+    )
+    reading = bench.workspace.readings().default
+    return tuple(one.fault(reading) for one in drawn), told

@@ -1,0 +1,29 @@
+"""Functions as pieces of source that compile by themselves: a change in one is checked without its file."""
+
+import ast
+from collections.abc import Iterator, Sequence
+from types import CodeType
+
+
+def outer_functions(tree: ast.AST) -> Iterator[range]:
+    """The lines (from 0) of each function that is in no other one, decorators included."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            first = min(one.lineno for one in (node, *node.decorator_list)) - 1
+            yield range(first, node.end_lineno or node.lineno)
+        elif not isinstance(node, ast.expr):
+            yield from outer_functions(node)
+
+
+def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
+    """The code of a module that has these lines of a function alone; None where they do not compile.
+
+    A function compiles in its file if and only if it does by itself: names of functions around it are what
+    it could miss, and it has none.
+    """
+    text = b"".join(lines).decode(encoding)
+    indented = text[:1] in (" ", "\t", "\f")
+    try:
+        return compile(f"if 1:\n{text}" if indented else text, "<function>", "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None

@@ -1,0 +1,100 @@
+"""All mutations of a function, in the order of its source."""
+
+from collections import Counter
+from collections.abc import Collection, Iterator
+
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.expressions import parts_of
+from mutator.mutants.rendering import changed_value
+from mutator.mutants.statements import Statement
+from mutator.operators.facts import Facts, extent
+from mutator.operators.mutations import Mutation
+from mutator.operators.names import Operator
+from mutator.operators.rules import rules_for
+
+LEFT_OUT = "left out"
+_ID = "ffffffff"  # no template of an operator writes it
+
+
+def mutations_of(
+    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[Operator]
+) -> list[Mutation]:
+    """What the operators make of the functions of that qualified name, in the order of the source and, at
+    one place, of the operators."""
+    found = list(_of_values(file, facts, function, models, operators))
+    if Operator.OMISSION in operators:
+        found += _omissions(file, facts, function)
+    order = list(Operator)
+    return sorted(found, key=lambda one: (one.line, order.index(one.operator)))
+
+
+def _of_values(
+    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[Operator]
+) -> Iterator[Mutation]:
+    expressions = file.expressions.get(function, ())
+    total = Counter(one.text for one in expressions)
+    seen: Counter[str] = Counter()
+    for expression in expressions:
+        text = expression.text
+        seen[text] += 1
+        nth = seen[text] if total[text] > 1 else None
+        anchor = Anchor(kind=AnchorKind.VALUE, name=text, nth=nth)
+        location = FaultLocation(path=file.path, function=function, anchor=anchor)
+        parts = None
+        for rule in rules_for(expression, facts.augmented.get(extent(expression.node))):
+            if rule.operator not in operators:
+                continue
+            parts = parts_of(expression) if parts is None else parts
+            model = models.get(rule.model)
+            yield Mutation(
+                operator=rule.operator,
+                location=location,
+                model=rule.model,
+                params=rule.params,
+                place=expression,
+                was=text,
+                now=changed_value(model, dict(rule.params), _ID, expression.written, parts),
+            )
+
+
+def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
+    """Assignments, augmented ones and calls that stand alone on their lines, each left out."""
+    statements = [one for f in file.functions.get(function, ()) for one in f.statements if not one.reason]
+    seen: Counter[tuple[str, str]] = Counter()
+    for statement in statements:
+        anchored = None
+        for verb in ("assign", "call"):
+            for name in statement.names(verb):
+                seen[verb, name] += 1
+                anchored = anchored or (verb, name, seen[verb, name])
+        if anchored is None or not _can_be_left_out(statement, facts, function):
+            continue
+        verb, name, number = anchored
+        several = sum(name in one.names(verb) for one in statements) > 1
+        kind = AnchorKind.BEFORE_ASSIGN if verb == "assign" else AnchorKind.BEFORE_CALL
+        anchor = Anchor(kind=kind, name=name, nth=number if several else None)
+        location = FaultLocation(path=file.path, function=function, anchor=anchor)
+        try:
+            file.resolve(location)
+        except MutatorError:
+            continue  # LibCST and `ast` see it in different places
+        yield Mutation(
+            operator=Operator.OMISSION,
+            location=location,
+            model="omission",
+            params=(),
+            place=statement,
+            was=facts.texts.get(statement.first + 1, name),
+            now=LEFT_OUT,
+        )
+
+
+def _can_be_left_out(statement: Statement, facts: Facts, function: str) -> bool:
+    """Not the statement that binds a local name first: without it every later use of the name fails."""
+    if not statement.alone or statement.opens is not None or statement.is_return:
+        return False
+    names = [name for name in statement.assigns if name.isidentifier()]
+    return all(facts.bound.get((function, name), 0) < statement.first + 1 for name in names)

@@ -1,0 +1,96 @@
+"""The lines that golden runs execute: measured once for each, in a process of its own, and kept in the cache.
+
+Noted are lines from the first observation on. What runs before it, like a constructor, is over before a fault
+can be active.
+"""
+
+import json
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common import caches
+from mutator._common.files import ScratchFolder, json_bytes, no_pipe, write_atomic
+from mutator._common.hashing import digest
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.errors import MutatorError
+from mutator.model import Limits, Status
+from mutator.targets.manifest import TargetManifest
+
+_SCHEMA = "lines/1"
+Executed = dict[str, frozenset[int]]  # lines (from 1) by file
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoldenDrive:
+    """A run without a fault: its scenario's file, what that is made with, its seed."""
+
+    scenario: Path
+    changes: tuple[str, ...]
+    seed: int
+
+
+def lines_of(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
+    """The lines of each drive, measured unless they are known. MutatorError for a drive that does not end
+    well."""
+    found = [_recalled(_key(manifest, drive)) for drive in drives]
+    if any(lines is None for lines in found):
+        with ScratchFolder("mutator-lines-") as scratch:
+            (scratch / "work").mkdir()
+            base = prepare_base(manifest, scratch / "base")
+            engine = ReferenceEngine(manifest, base, scratch / "work", limits)
+            for i, drive in enumerate(drives):
+                if found[i] is None:
+                    found[i] = _measured(engine, drive, scratch / "work" / f"lines-{i}")
+                    _remember(_key(manifest, drive), found[i] or {})
+    return [lines or {} for lines in found]
+
+
+def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Executed:
+    job = Job(name=folder.name, scenario=drive.scenario, seed=drive.seed, changes=drive.changes, lines=True)
+    execution = engine.execute(job, folder)
+    if execution.status is not Status.OK:
+        raise MutatorError(
+            f"the golden run of {drive.scenario.stem}, which tells the executed lines: {execution.detail}",
+            where=engine.manifest.path,
+            expected="a run without a fault that ends well",
+            remedy="see `mutator check --drive`",
+        )
+    return {file: frozenset(lines) for file, lines in execution.lines.items()}
+
+
+def _key(manifest: TargetManifest, drive: GoldenDrive) -> str:
+    """What stands for the run of a drive."""
+    arguments = manifest.arguments(
+        scenario=Path("scenario"), seed=drive.seed, out=Path("out"), changes=drive.changes
+    )
+    at = manifest.observation.location
+    entry = [manifest.entry_module, arguments, sorted(manifest.env.items()), at]
+    scenario = digest(drive.scenario.read_bytes())
+    return digest([_SCHEMA, platform.python_version(), manifest.tree.digest, scenario, drive.seed, entry])
+
+
+def _recalled(key: str) -> Executed | None:
+    path = caches.of_lines() / f"{key}.json"
+    try:
+        data: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
+        if data["sum"] == digest([key, data["lines"]]):
+            os.utime(path)  # used now
+            return {file: frozenset(lines) for file, lines in data["lines"].items()}
+    except (OSError, MutatorError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    return None
+
+
+def _remember(key: str, executed: Executed) -> None:
+    lines = {file: sorted(numbers) for file, numbers in executed.items()}
+    path = caches.of_lines() / f"{key}.json"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, json_bytes({"sum": digest([key, lines]), "lines": lines}))
+    except (OSError, MutatorError):
+        return  # an unwritable cache is ignored

@@ -1,0 +1,100 @@
+"""What operators need to know of a file beside its expressions: of its statements, as `ast` sees them."""
+
+import ast
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mutator.targets.source_tree import SourceTree
+
+Extent = tuple[int, int, int | None, int | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """Statements of a file's functions.
+
+    `augmented` has the operator of the augmented assignment that an expression, by its extent, is the value
+    of; `texts` the source of each statement that begins on a line; `bound` the line of the first statement
+    that binds a name of a function. `own` are the lines of each statement without those of the statements in
+    it. Lines count from 1.
+    """
+
+    augmented: dict[Extent, ast.operator] = field(default_factory=dict)
+    texts: dict[int, str] = field(default_factory=dict)
+    bound: dict[tuple[str, str], int] = field(default_factory=dict)
+    own: list[range] = field(default_factory=list)
+
+    def executed(self, lines: Collection[int]) -> frozenset[int]:
+        """All lines of the statements of which one of these lines is: a statement over several lines is
+        executed as one."""
+        ran = [own for own in self.own if any(line in lines for line in own)]
+        return frozenset(lines).union(*ran)
+
+
+def extent(node: ast.expr) -> Extent:
+    return node.lineno, node.col_offset, node.end_lineno, node.end_col_offset
+
+
+def facts_of(tree: SourceTree, path: str) -> Facts:
+    """The facts of a file of the target, found once."""
+    return tree.derived(path, _facts)
+
+
+def _facts(path: str, data: bytes, root: Path) -> Facts:
+    facts = Facts()
+    _scope(ast.parse(data).body, (), facts, inside=False)
+    return facts
+
+
+def _scope(body: list[ast.stmt], scope: tuple[str, ...], facts: Facts, *, inside: bool) -> None:
+    for statement in body:
+        if inside:
+            _statement(statement, ".".join(scope), facts)
+        if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
+            name = ".".join((*scope, statement.name))
+            for argument in _arguments(statement.args):
+                facts.bound.setdefault((name, argument.arg), statement.lineno)
+            _scope(statement.body, (*scope, statement.name), facts, inside=True)
+        elif isinstance(statement, ast.ClassDef):
+            _scope(statement.body, (*scope, statement.name), facts, inside=False)
+        else:
+            for block in _blocks(statement):
+                _scope(block, scope, facts, inside=inside)
+
+
+def _arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
+    yield from (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
+    yield from (one for one in (arguments.vararg, arguments.kwarg) if one)
+
+
+def _blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
+    for name in ("body", "orelse", "finalbody"):
+        yield getattr(statement, name, [])
+    for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
+        yield part.body
+
+
+def _statement(statement: ast.stmt, function: str, facts: Facts) -> None:
+    inner = [block[0].lineno for block in _blocks(statement) if block]
+    last = statement.end_lineno or statement.lineno
+    facts.own.append(range(statement.lineno, max(statement.lineno, min([last, *(n - 1 for n in inner)])) + 1))
+    if not inner:
+        facts.texts.setdefault(statement.lineno, ast.unparse(statement))
+    if isinstance(statement, ast.AugAssign):
+        facts.augmented[extent(statement.value)] = statement.op
+    if isinstance(statement, ast.Global | ast.Nonlocal):
+        for name in statement.names:
+            facts.bound[function, name] = 0
+    for node in _own_nodes(statement):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            facts.bound.setdefault((function, node.id), statement.lineno)
+
+
+def _own_nodes(statement: ast.stmt) -> Iterator[ast.AST]:
+    """The nodes of a statement without those of the statements in it."""
+    todo: list[ast.AST] = [statement]
+    while todo:
+        node = todo.pop()
+        yield node
+        todo += [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]

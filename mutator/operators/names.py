@@ -1,0 +1,37 @@
+"""The mutation operators by name."""
+
+from collections.abc import Iterable
+from enum import StrEnum
+
+from mutator._common.text import suggestion
+from mutator.errors import MutatorError
+
+
+class Operator(StrEnum):
+    """The mutation operators, in the order in which they claim a change that two of them make."""
+
+    ARITHMETIC = "arithmetic"
+    COMPARISON = "comparison"
+    CONSTANT = "constant"
+    BRANCH = "branch"
+    OMISSION = "omission"
+    RETURN = "return"
+    ARGUMENT = "argument"
+
+
+def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
+    """The operators of these names, each once; MutatorError for an unknown one, and for none."""
+    known = [one.value for one in Operator]
+    found: dict[Operator, None] = {}
+    for name in names:
+        if name not in known:
+            raise MutatorError(
+                f"no operator '{name}'",
+                argument="operators",
+                expected=f"some of {', '.join(known)}",
+                remedy="correct the name" + suggestion(name, known),
+            )
+        found[Operator(name)] = None
+    if not found:
+        raise MutatorError("no operator", argument="operators", expected=f"some of {', '.join(known)}")
+    return tuple(found)
