@@ -58,8 +58,8 @@ def test_examples_hold(clone: Workspace, name: str) -> None:
 
 
 def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> None:
-    """Verdicts depend on which models are there to raise, so the digest does, too; of those that ship the models
-    of operators are."""
+    """Verdicts depend on which models are there to raise, so the digest does, too: of those that ship, the
+    models of operators."""
     known = clone.fault_models()
     assert all(model.name.startswith("operator_") for model in known if model.raises)
     path = folder / "scale.yaml"
