@@ -12,6 +12,8 @@ from mutator._common.hashing import added, added_values, content_id, plain
 
 Value = int | float | str | bool | None
 
+OPERATORS = "operators"  # the module of faults that mutation operators make, without a spec
+
 
 class AnchorKind(StrEnum):
     """Where, relative to a statement of the target, a snippet goes; of VALUE_ANCHORS, whose value changes."""

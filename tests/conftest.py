@@ -1,5 +1,6 @@
 """Fixtures that several kinds of tests share."""
 
+import ast
 import dataclasses
 import json
 import shutil
@@ -11,7 +12,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import Choices, Plan, make_plan
 from mutator.campaigns.provenance import add_stretch
 from mutator.model import (
     Activation,
@@ -28,6 +29,7 @@ from mutator.model import (
     Status,
     Trigger,
 )
+from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.store import digests
 from mutator.store.digests import Digest
 from mutator.store.lines import LineWriter, read_segment
@@ -35,6 +37,7 @@ from mutator.store.patches import Patches, PatchWriter, rewrite
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import Stretch
+from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
@@ -213,10 +216,12 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         out: Path,
         became: Callable[[Experiment], dict[str, Any] | None] = lambda experiment: {},
         campaign: str = "toy",
+        changed: Callable[[Plan], Plan] = lambda plan: plan,
         **choices: Any,
     ) -> Path:
-        """`became` says what a record has of its own; None: the experiment was not run."""
-        plan = make_plan(workspace, campaign, Choices(**choices))
+        """`became` says what a record has of its own; None: the experiment was not run. `changed` makes
+        another plan of that of the campaign."""
+        plan = changed(make_plan(workspace, campaign, Choices(**choices)))
         freeze(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared
         unchanged = {"max_dev": tuple((channel.name, 0.0) for channel in compared)}
@@ -229,6 +234,49 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         return out
 
     return write
+
+
+@pytest.fixture(scope="session")
+def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
+    """Makes a plan one of operators' mutants: each operation of a file with its sign changed, in the drives
+    of the plan's first experiments (the second of them with a permanent fault)."""
+
+    def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
+        def changed(plan: Plan) -> Plan:
+            tree = workspace.manifest(plan.campaign.target).tree
+            faults = list(operator_faults(parsed(tree, path)))
+            some = [
+                dataclasses.replace(drive, fault=fault, **({"trigger": always()} if number == 1 else {}))
+                for fault in faults
+                for number, drive in enumerate(plan.experiments[:drives])
+            ]
+            return dataclasses.replace(plan, experiments=some, chunks=(len(some),), runs=len(some))
+
+        return changed
+
+    return of
+
+
+def operator_faults(file: ParsedFile) -> Iterator[Fault]:
+    """A mutant for each operation with two sides."""
+    for function, known in file.expressions.items():
+        seen: list[str] = []
+        for expression in known:
+            seen.append(expression.text)
+            if not isinstance(expression.node, ast.BinOp):
+                continue
+            anchor = Anchor(kind=AnchorKind.VALUE, name=expression.text, nth=seen.count(expression.text))
+            place = FaultLocation(path=file.path, function=function, anchor=anchor)
+            yield Fault(
+                spec=f"operators/arithmetic/{file.path}::{function}",
+                module="operators",
+                fault_type="arithmetic",
+                reading="as_described",
+                value=f"{expression.text} -> -({expression.text})",
+                unit="-",
+                aim="H3",
+                injections=(Injection(location=place, model="scale", params=(("factor", -1),)),),
+            )
 
 
 @pytest.fixture(scope="session")

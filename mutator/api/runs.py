@@ -22,13 +22,17 @@ from mutator.execution.session import Notify, Summary
 from mutator.exports import Format
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import Parts, export
+from mutator.model import OPERATORS
 from mutator.outcomes import counting
 from mutator.outcomes import results as results_table
-from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs, own_alerts
+from mutator.outcomes.fault_free import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
 from mutator.outcomes.golden import load_trace
 from mutator.outcomes.rows import count_table
 from mutator.report import building
 from mutator.report.stills import take_stills
+from mutator.statistics.frame import prepare
+from mutator.statistics.mutation_score import score_sheet, totals
+from mutator.statistics.sheet import Sheet
 from mutator.store import cleaning
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.verification import equivalence
@@ -102,6 +106,22 @@ class Run(RunContents):
         hazards, counts = counting.hazard_names(texts), counting.counts_by(texts, counting.kinds(texts))
         heads, rows = count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
+
+    def mutation_score(self) -> Sheet:
+        """What mutants of operators changed: shares of them with an actuator changed, a new alert, a hazard,
+        in total, by operator and by function. No lines for a run without such mutants."""
+        texts = self._texts
+        if not (texts["module"] == OPERATORS).any():
+            return score_sheet(prepare(texts), {}, None)
+        try:
+            alerts = alerts_by_drive(self.fault_free())
+        except (MutatorError, KeyError):  # no target or golden runs here: no alert can be compared
+            alerts = None
+        return score_sheet(prepare(texts), self.faults, alerts)
+
+    def mutation_totals(self) -> Table:
+        """The score in total, in few columns. No rows for a run without mutants of operators."""
+        return totals(self.mutation_score())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """What the golden runs do by themselves: alerts, hazards, and how far each plotted channel goes."""

@@ -31,6 +31,9 @@ def show_counts(terminal: Terminal, run: "Run") -> None:
     """The table of results by fault type, and how the experiments ended."""
     counts = run.counts()
     terminal.table(counts.heads, counts.rows, right=tuple(counts.right), total=True)
+    score = run.mutation_totals()
+    if score.rows:
+        terminal.table(score.heads, score.rows, right=tuple(score.right))
     with suppress(MutatorError):  # without a library nobody knows which alerts count
         if note := run.alerts_note():
             terminal.say(note)

@@ -71,6 +71,16 @@ def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
     return f"Not every alert is a fault's doing: fault-free runs raise {told}."
 
 
+def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
+    """The names of the alerts that fault-free runs raise, by scenario and seed ('': that of the run folder);
+    those of a scenario with and without changes together."""
+    names: dict[tuple[str, str], frozenset[str]] = {}
+    for run in runs:
+        key = (run.scenario, "" if run.seed is None else str(run.seed))
+        names[key] = names.get(key, frozenset()) | {name for name, _ in run.alerts}
+    return names
+
+
 def _range(values: np.ndarray) -> tuple[float, float]:
     known = values[np.isfinite(values)]
     return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)

@@ -26,11 +26,14 @@ from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
 from mutator.report.series import sample_kept_traces, series_facts
+from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
 from mutator.report.whole_map import map_of
 from mutator.review.groups import Shape, shapes
+from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
+from mutator.triggers.kinds import ALWAYS
 from mutator.web import embedded
 
 if TYPE_CHECKING:
@@ -119,7 +122,7 @@ def _tables(
         ids, places = run.texts["experiment_id"], run.seen.courses_of
         some = (run.seen.places < LISTED) & (places >= 0)
         paths = replace(paths, course_of=dict(zip(ids[some], places[some].tolist(), strict=True)))
-    made = table(rows, lines, paths, alerts=run.folder.has_alerts)
+    made = table(rows, lines, paths, alerts=run.folder.has_alerts, source=run.source)
     if len(rows) < len(run.texts):
         made |= {"of": len(run.texts), "map": map_of(run)}
     return made, details(planned, shapes(_patches(run, rows)), rows)
@@ -135,10 +138,11 @@ def table(
     paths: FoundPaths | None = None,
     *,
     alerts: bool = True,
+    source: SourceLines | None = None,
 ) -> dict[str, Any]:
     """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
     `warning`, `rank` (1: the worst), `t_hazard`, `through`. Those of alerts only for a target that has
-    `alerts`. `labels` are those of components."""
+    `alerts`, `line` (of its fault) and `lasting` only with a `source`. `labels` are those of components."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -154,6 +158,9 @@ def table(
     columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
     if paths:
         columns["through"] = [paths.through(r.experiment_id) for r in rows]
+    if source:
+        columns["line"] = [source.places.get(line["fault_id"], "") for line in lines]
+        columns["lasting"] = [PERMANENT if r.trigger == ALWAYS else TRANSIENT for r in rows]
     checked = sorted({name for r in rows for name in r.checked})
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]
     labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}

@@ -91,7 +91,10 @@ def page_html(content: Content) -> str:
         content=content,
         tags=Markup(plainly_embedded(tag_words(), "tags")),
         outcome_names=[outcome.value for outcome in Outcome],
-        styles=[Markup(asset(name)) for name in STYLES],
+        styles=[
+            Markup(asset(name))
+            for name in (*STYLES, *dict.fromkeys(p.style for p in content.panels if p.style))
+        ],
         scripts=[Markup(asset(name)) for name in SCRIPTS],
     )
     return str(html)

@@ -17,7 +17,7 @@ class Panel:
     """One part of a report with its headings: `##` in Markdown, `<h2>` in HTML.
 
     `anchor` is its id in the page, `link` its name in the page's bar; `summary` is what the command line
-    shows of it, if anything.
+    shows of it, if anything, `style` a file of CSS that only pages with it need.
     """
 
     anchor: str
@@ -25,6 +25,7 @@ class Panel:
     markdown: str
     html: "Markup"
     summary: Table | None = None
+    style: str = ""
 
 
 def rendered(template: str, **values: Any) -> "Markup":

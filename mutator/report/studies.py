@@ -18,6 +18,7 @@ from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import FOLDER, Panel
 from mutator.report.paths import FoundPaths
 from mutator.report.seen import COURSE, PLACE, Seen
+from mutator.report.source_lines import SourceLines
 from mutator.statistics.frame import prepare
 from mutator.statistics.published import Published
 from mutator.store.planned import Planned
@@ -48,6 +49,7 @@ class ReportedRun:
     engines: EngineSummary | None = None
     compared: bool = False
     paths: FoundPaths | None = None
+    source: SourceLines | None = None
     experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all that are planned
     records: Mapping[str, Record] = field(default_factory=dict)
 
@@ -66,6 +68,7 @@ class ReportedRun:
             study=_study(folder) if workspace else None,
             seen=seen,
             paths=FoundPaths.of(folder, ways, experiments, records, seen.courses) if ways else None,
+            source=SourceLines.of(folder, workspace, texts),
             experiments=experiments,
             records=records,
         )

@@ -9,7 +9,7 @@ _DIGITS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """`count` of `of`, with the Wilson interval of the rate (NaN when there was nothing to count)."""
+    """`count` of `of`, with the interval of the rate (NaN where there is none: nothing was counted, say)."""
 
     count: int
     of: int
@@ -24,6 +24,8 @@ class Share:
         """`35.8 % (1316/3678; 34.2 to 37.3)`; `- (0/0)` of nothing."""
         if not self.of:
             return "- (0/0)"
+        if math.isnan(self.low):
+            return f"{100 * self.rate:.1f} % ({self.count}/{self.of})"
         interval = f"{100 * self.low:.1f} to {100 * self.high:.1f}"
         return f"{100 * self.rate:.1f} % ({self.count}/{self.of}; {interval})"
 

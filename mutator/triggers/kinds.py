@@ -11,10 +11,12 @@ from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.triggers.conditions import check_condition
 
+ALWAYS = "always"  # the name of the trigger of a permanent fault
+
 
 def always(*, armed_after_s: float = 0.0) -> Trigger:
     """Fires at the first observation after arming and stays."""
-    return Trigger(name="always", condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
+    return Trigger(name=ALWAYS, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
 def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
@@ -47,7 +49,7 @@ def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: flo
 
 
 def _read_always(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
-    return always(armed_after_s=armed_after_s) if text == "always" else None
+    return always(armed_after_s=armed_after_s) if text == ALWAYS else None
 
 
 def _read_time(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:

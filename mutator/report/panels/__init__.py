@@ -6,10 +6,12 @@ A panel is made by a function from `ReportedRun` to `Panel`, or to None where th
 from collections.abc import Callable
 
 from mutator.report.panel import Panel
-from mutator.report.panels import failed, figures, origin, paths, seeds, tables
+from mutator.report.panels import failed, figures, mutation_score, origin, paths, seeds, source, tables
 from mutator.report.studies import ReportedRun
 
 PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
+    mutation_score.score_panel,
+    source.source_panel,
     paths.paths_panel,
     tables.tables_panel,
     seeds.seeds_panel,

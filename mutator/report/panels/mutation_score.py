@@ -1,0 +1,42 @@
+"""The mutation score: what operators' mutants change in the closed loop; nothing of a run without them."""
+
+from dataclasses import replace
+
+from mutator.model import OPERATORS
+from mutator.outcomes.fault_free import alerts_by_drive
+from mutator.report.panel import Panel, rendered
+from mutator.report.panels.tables import write_sheets
+from mutator.report.studies import ReportedRun
+from mutator.statistics.mutation_score import score_sheet
+from mutator.statistics.sheet import Sheet
+from mutator.store import plan_file
+
+_HTML = """\
+<h2>{{ score.title }}</h2>
+<p>{{ score.note | marked }}</p>
+{{ general.table().as_html("score") }}
+<details class="table">
+<summary><h3>By function</h3></summary>
+{{ functions.table().as_html("score") }}
+</details>
+"""
+
+
+def score_panel(run: ReportedRun) -> Panel | None:
+    """The shares in total and by operator, those by function folded, with tables/mutation_score.csv."""
+    if not (run.texts["module"] == OPERATORS).any():
+        return None
+    runs = run.fault_free()
+    score = score_sheet(
+        run.frame, plan_file.read_faults(run.folder.path), alerts_by_drive(runs) if runs else None
+    )
+    write_sheets([score], run.out)
+    html = rendered(_HTML, score=score, general=_part(score, False), functions=_part(score, True))
+    return Panel(
+        anchor="score", link="Score", markdown=score.markdown().rstrip(), html=html, style="source.css"
+    )
+
+
+def _part(score: Sheet, of_functions: bool) -> Sheet:
+    """The lines of functions, or those of everything else."""
+    return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

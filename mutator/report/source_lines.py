@@ -1,0 +1,171 @@
+"""The source of a run's target, line by line, with what came of the faults injected there.
+
+Lines are those of the tree that was run: where the target has changed since, there is no telling which line
+a fault was on, so nothing is shown.
+"""
+
+import ast
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mutator.errors import MutatorError
+from mutator.model import OPERATORS, Fault, Outcome, Status
+from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.outcomes.counting import endings
+from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import ALWAYS
+from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+# From the worst to the most harmless; harness errors and mutants that could not be made are none of these.
+ENDINGS = (
+    Outcome.HAZARD.value,
+    Status.CRASHED.value,
+    Status.TIMEOUT.value,
+    Outcome.SDC.value,
+    Outcome.MASKED.value,
+    Outcome.NOT_ACTIVATED.value,
+)
+LASTING = (PERMANENT, TRANSIENT)
+_AROUND = 2  # lines shown before and after one that is in no function
+_JOINED = 3  # lines between two shown parts that are shown, too
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """What came of the `mutants` of a line: `worst` of them ended in `ending`, the others less badly."""
+
+    ending: str
+    worst: int
+    mutants: int
+
+
+Marks = Mapping[int, Mapping[str, Mark]]  # line, from 1 -> permanent or transient -> its mark
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkedFile:
+    """A file with faults: its lines, those `shown` (functions with faults, from 1), and their marks."""
+
+    path: str
+    data: bytes
+    lines: Sequence[str]
+    shown: tuple[range, ...]
+    marks: Marks
+
+    def worst_lines(self) -> dict[str, int]:
+        """How many lines have which ending as their worst."""
+        worst = [min((m.ending for m in here.values()), key=ENDINGS.index) for here in self.marks.values()]
+        return {ending: worst.count(ending) for ending in ENDINGS if ending in worst}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceLines:
+    """The files of a run, the worst one first, and the line of each fault by its id: `pkg/plan.py:42`.
+    Without files `why` says why there are none."""
+
+    files: tuple[MarkedFile, ...] = ()
+    places: Mapping[str, str]
+    why: str = ""
+
+    @classmethod
+    def of(cls, folder: RunFolder, workspace: Workspace | None, texts: "DataFrame") -> "SourceLines | None":
+        """Of a run with these results; None where no fault is an operator's."""
+        if not (texts["module"] == OPERATORS).any():
+            return None
+        try:
+            manifest = workspace.manifest(folder.head["target"]) if workspace else None
+        except (MutatorError, KeyError):
+            manifest = None
+        if manifest is None:
+            return cls(places={}, why="The target is not found here, so its source is not shown.")
+        if manifest.tree.digest != folder.head["sources"]["target"]:
+            return cls(
+                places={},
+                why="The target has changed since this run was planned, so its source is not shown: lines "
+                "would be other ones. Put it back and write the report again (`mutator report`).",
+            )
+        faults = plan_file.read_faults(folder.path)
+        known = {name: faults[name] for name in texts["fault_id"].unique() if name in faults}
+        return cls.marked(manifest, known, texts)
+
+    @classmethod
+    def marked(
+        cls, manifest: TargetManifest, faults: Mapping[str, Fault], texts: "DataFrame"
+    ) -> "SourceLines":
+        """Of a target, and of faults with their results."""
+        at = {name: _place(manifest, fault) for name, fault in faults.items()}
+        marks: dict[str, dict[int, dict[str, Mark]]] = {path: {} for path, _ in at.values()}
+        for (path, line), lasting, mark in _marks(at, texts):
+            marks[path].setdefault(line, {})[lasting] = mark
+        files = (_file(parsed(manifest.tree, path), found) for path, found in marks.items() if found)
+        return cls(
+            files=tuple(sorted(files, key=_badness)),
+            places={name: f"{path}:{line}" for name, (path, line) in at.items()},
+        )
+
+
+def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
+    """File and line (from 1) of a fault's first location."""
+    location = fault.injections[0].location
+    return location.path, parsed(manifest.tree, location.path).span(location)[0] + 1
+
+
+def _marks(
+    at: Mapping[str, tuple[str, int]], texts: "DataFrame"
+) -> Iterator[tuple[tuple[str, int], str, Mark]]:
+    """The mark of each line and of permanent and transient faults there; each fault counts by its worst
+    drive."""
+    found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
+    for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):
+        if name in at and ending in ENDINGS:
+            ranks = found.setdefault((at[name], PERMANENT if trigger == ALWAYS else TRANSIENT), {})
+            ranks[name] = min(ENDINGS.index(ending), ranks.get(name, len(ENDINGS)))
+    for (place, lasting), ranks in sorted(found.items()):
+        worst = min(ranks.values())
+        many = sum(rank == worst for rank in ranks.values())
+        yield place, lasting, Mark(ending=ENDINGS[worst], worst=many, mutants=len(ranks))
+
+
+def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
+    text = file.data.decode(file.encoding)
+    lines = [line.rstrip("\r\n") for line in text.splitlines(keepends=True)]
+    shown = _joined(_around(ast.parse(file.data), line, len(file.lines)) for line in marks)
+    return MarkedFile(path=file.path, data=file.data, lines=lines, shown=shown, marks=marks)
+
+
+def _around(node: ast.AST, line: int, count: int) -> range:
+    """The lines of the outermost function around a line; of one in no function a few around it."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.stmt) or child.end_lineno is None:
+            continue
+        decorators = getattr(child, "decorator_list", ())
+        first = min(part.lineno for part in (child, *decorators))
+        if first <= line <= child.end_lineno:
+            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+                return range(first, child.end_lineno + 1)
+            return _around(child, line, count)
+    return range(max(1, line - _AROUND), min(count, line + _AROUND) + 1)
+
+
+def _joined(parts: Iterable[range]) -> tuple[range, ...]:
+    """The parts in their order, those that (almost) touch as one."""
+    found: list[range] = []
+    for part in sorted(parts, key=lambda part: (part.start, part.stop)):
+        if found and part.start <= found[-1].stop + _JOINED:
+            found[-1] = range(found[-1].start, max(found[-1].stop, part.stop))
+        else:
+            found.append(part)
+    return tuple(found)
+
+
+def _badness(file: MarkedFile) -> tuple[object, ...]:
+    """The file with most lines of the worst ending first."""
+    counts = file.worst_lines()
+    return (*(-counts.get(ending, 0) for ending in ENDINGS), file.path)

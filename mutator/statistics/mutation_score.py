@@ -1,0 +1,160 @@
+"""The mutation score of a closed loop: what the mutants of operators change in the drives.
+
+A mutant counts once, however many drives it is put to: it changes something if any of its drives does. Shares
+are of the mutants that were activated; the others are told apart. Experiments whose harness failed, or whose
+mutant could not be made, are in no count (`frame.load` has left them out).
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mutator._common.tables import Table
+from mutator.model import OPERATORS, Fault, Status
+from mutator.statistics.paired import resampled_interval
+from mutator.statistics.shares import Share, share
+from mutator.statistics.sheet import Cell, Sheet, text_of
+from mutator.triggers.kinds import ALWAYS
+
+GoldenAlerts = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed, '' for any) -> names
+
+PERMANENT, TRANSIENT, EITHER = "permanent", "transient", "either"
+ALL, MUTANTS, DRIVES = "all", "mutants", "drives"
+_EFFECTS = ("actuator changed", "new alert", "hazard", "crash or timeout")
+_ALERT, _ACTIVE = _EFFECTS[1], "active"
+_HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECTS, "no effect")
+_NOTE = (
+    "What the mutants of operators do to the closed loop. *Permanent* mutants are active in the whole "
+    "drive, *transient* ones while their trigger holds. Shares are of the *activated* ones; a mutant counts "
+    "once, if any of its drives shows it. Intervals are 95 % Wilson intervals; where drives are counted, "
+    "whole mutants are drawn anew (bootstrap). *New alert*: one of a name that the fault-free run of the "
+    "scenario does not raise. *No effect*: none of the four; mutants that are equivalent to the original are "
+    "among these."
+)
+_UNKNOWN_ALERTS = " The fault-free runs cannot be read here, so no alert is compared with theirs."
+
+
+def drives_of(
+    frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
+) -> pd.DataFrame:
+    """A row for each usable experiment of an operator's mutant, by what the score counts.
+
+    `mutant` (its fault's id), `operator`, `function` (`path::name`), `fault` (permanent or transient), then a
+    flag for `active` and each effect. A drive that crashed or timed out was active. Without `golden_alerts`
+    there is no flag of alerts.
+    """
+    found = frame[frame["module"] == OPERATORS]
+    broken = found["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
+    flags = {
+        _ACTIVE: found["is_activated"] | broken,
+        **dict(zip(_EFFECTS, (found["is_manifested"], False, found["is_hazard"], broken), strict=True)),
+    }
+    if golden_alerts is None:
+        del flags[_ALERT]
+    else:
+        flags[_ALERT] = _new_alerts(found, golden_alerts)
+    permanent = found["trigger"] == ALWAYS
+    return pd.DataFrame(
+        {
+            "mutant": found["fault_id"],
+            "operator": found["fault_type"],
+            "function": found["fault_id"].map({name: function_of(fault) for name, fault in faults.items()}),
+            "fault": np.where(permanent, PERMANENT, TRANSIENT),
+            **flags,
+        }
+    )
+
+
+def function_of(fault: Fault) -> str:
+    """Where a fault is injected first: `path::function`."""
+    place = fault.injections[0].location
+    return f"{place.path}::{place.function}"
+
+
+def _new_alerts(found: pd.DataFrame, golden_alerts: GoldenAlerts) -> list[bool]:
+    rows = zip(found["scenario"], found["seed"].astype(str), found["alerts"], strict=True)
+    return [
+        not golden_alerts.get((scenario, seed), golden_alerts.get((scenario, ""), frozenset())).issuperset(
+            filter(None, str(alerts).split(";"))
+        )
+        for scenario, seed, alerts in rows
+    ]
+
+
+def score_sheet(
+    frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
+) -> Sheet:
+    """The score in total, by operator and by function, permanent faults beside transient ones; no lines where
+    no operator's mutant has a result. `faults` are those of the plan, `golden_alerts` the names of the alerts
+    that the golden runs raise (None: they are not known)."""
+    drives = drives_of(frame, faults, golden_alerts)
+    planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
+    missing = len(planned - set(drives["mutant"]))
+    without = f" {missing} of {len(planned)} mutants have no result and are in no count." if missing else ""
+    return Sheet(
+        name="mutation_score",
+        title="Mutation score",
+        note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS) + without,
+        heads=_HEADS,
+        lines=tuple(_lines(drives)),
+    )
+
+
+def totals(sheet: Sheet) -> Table:
+    """The lines of the score that are of all mutants."""
+    rows = [
+        (f"{lasting} {counted}", *map(text_of, cells))
+        for name, counted, lasting, *cells in sheet.lines
+        if name == ALL
+    ]
+    return Table(heads=("mutation score", *_HEADS[3:]), rows=rows, right=range(1, len(_HEADS) - 2))
+
+
+def _lines(drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
+    if drives.empty:
+        return
+    yield from _of_mutants(ALL, drives)
+    if drives["fault"].nunique() > 1:
+        yield _line(ALL, MUTANTS, EITHER, _any_drive(drives))
+    if drives.duplicated(["mutant", "fault"]).any():
+        for lasting, some in drives.groupby("fault"):
+            yield _line(ALL, DRIVES, str(lasting), some.set_index("mutant"))
+    for groups in ("operator", "function"):
+        for name, some in drives.groupby(groups):
+            yield from _of_mutants(str(name), some)
+
+
+def _of_mutants(name: str, drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
+    for lasting, some in drives.groupby("fault"):
+        yield _line(name, MUTANTS, str(lasting), _any_drive(some))
+
+
+def _any_drive(drives: pd.DataFrame) -> pd.DataFrame:
+    """The flags of each mutant."""
+    flags = [name for name in (_ACTIVE, *_EFFECTS) if name in drives]
+    return drives.groupby("mutant")[flags].any()
+
+
+def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[Cell, ...]:
+    """A line of the sheet; `flags` have a row for whatever is counted, by the mutant."""
+    active = flags[flags[_ACTIVE]]
+    known = [effect for effect in _EFFECTS if effect in active]
+    cells = [_share(active[effect]) if effect in active else None for effect in _EFFECTS]
+    no_effect = int((~active[known].any(axis=1)).sum())
+    return (name, counted, lasting, len(flags), len(flags) - len(active), *cells, no_effect)
+
+
+def _share(flag: "pd.Series[bool]") -> Share:
+    """The share of a flag, its interval between mutants where some have several rows."""
+    count, of = int(flag.sum()), len(flag)
+    if flag.index.is_unique:
+        return share(count, of)
+    sums = flag.groupby(level=0).agg(["sum", "count"])
+    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _rate)
+    return Share(count=count, of=of, low=low, high=high)
+
+
+def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:
+    return np.sum(counts, axis=axis) / np.sum(wholes, axis=axis)

@@ -1,0 +1,109 @@
+"""The source of a run with operators' mutants: marks of lines, and the page's parts that are made of them."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.model import Experiment, Outcome, Status
+from mutator.outcomes import results
+from mutator.report.browse import _listed, _tables
+from mutator.report.panels.mutation_score import score_panel
+from mutator.report.panels.source import source_panel
+from mutator.report.source_lines import Mark
+from mutator.report.studies import ReportedRun
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from .made_run import Page
+
+DRIVER = "toycar/driver.py"
+HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.5}
+IDLE = {"outcome": Outcome.NOT_ACTIVATED, "activation": None}
+FAILED = {"status": Status.HARNESS_ERROR, "outcome": None, "detail": "the disk is gone"}
+
+
+def at(text: str) -> int:
+    """The line (from 1) of the driver that begins with a text."""
+    lines = (Path(__file__).parents[3] / "toy" / "tree" / DRIVER).read_text().splitlines()
+    return next(number for number, line in enumerate(lines, 1) if line.strip().startswith(text))
+
+
+def became(experiment: Experiment) -> dict[str, Any]:
+    """Permanent mutants of the line of `wanted` harm, one of them was not active; transient ones are masked;
+    of the pedals nothing is known."""
+    place = str(experiment.fault.value)
+    if "3.0" in place or "6.0" in place:
+        return FAILED
+    if experiment.trigger.name != "always":
+        return {}
+    return IDLE if place.startswith("1.2 * closing") else HAZARD
+
+
+@pytest.fixture
+def run(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
+) -> Path:
+    """A run folder of such mutants of the toy's driver."""
+    out = write_run(toycar, tmp_path / "run", became, changed=of_operators(toycar, DRIVER))
+    results.build(out)
+    (out / "report").mkdir()
+    return out
+
+
+def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: Path) -> None:
+    """By line, permanent beside transient, each mutant once; a harness error is no outcome."""
+    source = ReportedRun.open(RunFolder.open(run), toycar).source
+    assert source is not None
+    (file,) = source.files
+    wanted = file.marks[at("wanted =")]
+    assert wanted["permanent"] == Mark(ending="hazard", worst=5, mutants=6)
+    assert wanted["transient"] == Mark(ending="masked", worst=6, mutants=6)
+    assert at("gas =") not in file.marks and at("brake =") not in file.marks
+    assert file.worst_lines() == {"hazard": 2}
+    assert file.shown == (range(at("def drive"), len(file.lines) + 1),)
+
+
+def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
+    """The panel's links search columns that the page's table has, with values that some row has."""
+    reported = ReportedRun.open(RunFolder.open(run), toycar)
+    panel = source_panel(reported)
+    assert panel is not None
+    page = Page(str(panel.html))
+    assert not page.open
+    line = at("wanted =")
+    wanted = f"#q=line%3Dtoycar%2Fdriver.py%3A{line}"
+    assert {wanted, f"{wanted}%20lasting%3Dpermanent", f"{wanted}%20lasting%3Dtransient"} <= set(page.links)
+    assert "H 5/6" in page.texts
+    assert f"| {DRIVER}:{line} |" in panel.markdown
+    rows, lines = _listed(reported)
+    columns = {c["name"]: c for c in _tables(reported, rows, lines)[0]["columns"]}
+    assert f"{DRIVER}:{line}" in columns["line"]["words"]
+    assert columns["lasting"]["words"] == ["permanent", "transient"]
+
+
+def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) -> None:
+    """Lines of another source would be wrong ones; the score stands all the same."""
+    path = toycar.library.parent / "tree" / DRIVER
+    path.write_text("# one more line\n" + path.read_text())
+    reported = ReportedRun.open(
+        RunFolder.open(run), Workspace(library=toycar.library, templates=toycar.templates)
+    )
+    panel, score = source_panel(reported), score_panel(reported)
+    assert panel is not None and score is not None
+    assert "has changed since this run was planned" in panel.markdown
+    assert "wanted" not in str(panel.html)
+    assert "| arithmetic | mutants | permanent |" in score.markdown
+
+
+def test_a_run_without_operators_has_neither_panel(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
+    """Its report is as it was: no panel, no column of lines."""
+    out = write_run(toycar, tmp_path / "run")
+    results.build(out)
+    reported = ReportedRun.open(RunFolder.open(out), toycar)
+    assert source_panel(reported) is None and score_panel(reported) is None
+    rows, lines = _listed(reported)
+    assert not {"line", "lasting"} & {c["name"] for c in _tables(reported, rows, lines)[0]["columns"]}

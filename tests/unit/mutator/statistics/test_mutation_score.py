@@ -1,0 +1,125 @@
+"""The mutation score of a closed loop, counted by hand."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from mutator.model import OPERATORS, Experiment, Fault
+from mutator.statistics.mutation_score import drives_of, score_sheet
+from mutator.statistics.shares import share
+
+from .results_frame import results
+
+ACTIVE = {"t_activation": 1.0}
+CHANGED = ACTIVE | {"t_manifest": 1.1}
+HIT = CHANGED | {"h1": 1, "t_h1": 3.0}
+GOLDEN = {("S1", ""): frozenset({"own"})}
+HEADS = ("of", "counted", "fault", "number", "not activated", "actuator changed", "new alert", "hazard")
+
+
+def drive(mutant: str, became: dict[str, Any], **given: str) -> dict[str, Any]:
+    """A permanent drive of an operator's mutant, but for what is given."""
+    told = {"module": OPERATORS, "fault_type": "arithmetic", "trigger": "always", "fault_id": mutant}
+    return told | became | given
+
+
+@pytest.fixture
+def faults(experiment: Callable[..., Experiment]) -> dict[str, Fault]:
+    """Four mutants: the first two in one function."""
+    one = experiment().fault
+    (injection,) = one.injections
+    found = {}
+    for name, function in (("a", "f"), ("b", "f"), ("c", "g"), ("d", "g")):
+        place = replace(injection, location=replace(injection.location, function=function))
+        found[name] = replace(one, module=OPERATORS, injections=(place,))
+    return found
+
+
+def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
+    """The lines by what they are of, what they count and how long their faults last."""
+    assert sheet.heads[: len(HEADS)] == HEADS
+    return {line[:3]: dict(zip(sheet.heads, line, strict=True)) for line in sheet.lines}
+
+
+def test_a_mutant_counts_once_and_for_any_of_its_drives(faults: dict[str, Fault]) -> None:
+    """Two drives of a mutant, of which one ends in a hazard, are one mutant with a hazard, and two drives
+    with one."""
+    frame = results(drive("a", HIT), drive("a", ACTIVE), drive("b", CHANGED), drive("c", {}))
+    found = lines(score_sheet(frame, faults, GOLDEN))
+    total = found["all", "mutants", "permanent"]
+    assert (total["number"], total["not activated"], total["no effect"]) == (3, 1, 0)
+    assert total["actuator changed"] == share(2, 2)
+    assert total["hazard"] == share(1, 2)
+    drives = found["all", "drives", "permanent"]
+    assert (drives["number"], drives["not activated"], drives["no effect"]) == (4, 1, 1)
+    assert (drives["hazard"].count, drives["hazard"].of) == (1, 3)
+    assert found["pkg/radar.py::f", "mutants", "permanent"]["hazard"] == share(1, 2)
+    assert found["pkg/radar.py::g", "mutants", "permanent"]["hazard"] == share(0, 0)
+
+
+def test_permanent_mutants_stand_beside_transient_ones(faults: dict[str, Fault]) -> None:
+    """A mutant that harms only while it is always active is harmless as a transient one, and counts once in
+    the total."""
+    frame = results(drive("a", HIT), drive("a", ACTIVE, trigger="C1"), drive("b", ACTIVE, trigger="C1"))
+    found = lines(score_sheet(frame, faults, GOLDEN))
+    assert found["all", "mutants", "permanent"]["hazard"] == share(1, 1)
+    assert found["all", "mutants", "transient"]["hazard"] == share(0, 2)
+    assert found["all", "mutants", "either"]["hazard"] == share(1, 2)
+    assert not any(counted == "drives" for _, counted, _ in found)
+
+
+def test_an_alert_counts_if_golden_does_not_raise_it(faults: dict[str, Fault]) -> None:
+    """The fault-free run's own alerts are no mutant's doing; where they are not known, no share is told."""
+    frame = results(
+        drive("a", ACTIVE, alerts="own", t_alert="2.0"), drive("b", ACTIVE, alerts="own;brake", t_alert="2.0")
+    )
+    found = lines(score_sheet(frame, faults, GOLDEN))
+    assert found["all", "mutants", "permanent"]["new alert"] == share(1, 2)
+    assert found["all", "mutants", "permanent"]["no effect"] == 1
+    unknown = score_sheet(frame, faults, None)
+    assert lines(unknown)["all", "mutants", "permanent"]["new alert"] is None
+    assert "no alert is compared" in unknown.note
+    of_a_seed = {("S1", "1"): frozenset({"own", "brake"})}
+    assert not drives_of(frame, faults, of_a_seed)["new alert"].any()
+
+
+def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
+    """A mutant of which nothing is known is told in the note alone; a crash was active, and is no hazard."""
+    frame = results(
+        drive("a", CHANGED),
+        drive("b", {}, status="crashed"),
+        drive("c", {}, status="harness_error"),
+        drive("d", {}, status="invalid_mutant"),
+    )
+    sheet = score_sheet(frame, faults, GOLDEN)
+    total = lines(sheet)["all", "mutants", "permanent"]
+    assert (total["number"], total["not activated"]) == (2, 0)
+    assert total["crash or timeout"] == share(1, 2)
+    assert total["hazard"] == share(0, 2)
+    assert "2 of 4 mutants have no result" in sheet.note
+
+
+def test_by_operator(faults: dict[str, Fault]) -> None:
+    """Each operator has its own line; faults of specs are none of them."""
+    frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
+    found = lines(score_sheet(frame, faults, GOLDEN))
+    assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)
+    assert found["branch", "mutants", "permanent"]["hazard"] == share(0, 1)
+    assert found["all", "mutants", "permanent"]["number"] == 2
+
+
+def test_a_run_without_operators_has_no_score(faults: dict[str, Fault]) -> None:
+    """No line, so no table: what reports were stays as it was."""
+    assert not score_sheet(results(HIT), {"a": replace(faults["a"], module="radar")}, GOLDEN).lines
+
+
+def test_intervals_of_drives_are_between_mutants(faults: dict[str, Fault]) -> None:
+    """Drives of one mutant are alike: 20 drives of two mutants say less than 20 independent ones would."""
+    frame = results(*(drive(name, HIT if name == "a" else ACTIVE) for name in "ab" for _ in range(10)))
+    found = lines(score_sheet(frame, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
+    assert (found.low, found.high) == (0.0, 1.0)
+    alike = results(*(drive(name, HIT) for name in "ab" for _ in range(2)))
+    told = lines(score_sheet(alike, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
+    assert str(told) == "100.0 % (4/4)"
