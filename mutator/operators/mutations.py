@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 
-from mutator.model import Fault, FaultLocation, Injection, Value
+from mutator.model import OPERATORS, Fault, FaultLocation, Injection, Value
 from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
 from mutator.operators.names import Operator
 
-MODULE = "operators"  # of these faults
 _LONGEST = 60  # characters of either side of a change
 _AROUND = 20  # of what stays the same at either end of what differs
 
@@ -55,8 +54,8 @@ class Mutation:
         """The fault that is this change."""
         injection = Injection(location=self.location, model=self.model, params=self.params)
         return Fault(
-            spec=f"{MODULE}/{self.operator}/{self.location.path}::{self.location.function}",
-            module=MODULE,
+            spec=f"{OPERATORS}/{self.operator}/{self.location.path}::{self.location.function}",
+            module=OPERATORS,
             fault_type=self.operator.value,
             reading=reading,
             value=self.text,
