@@ -10,12 +10,18 @@ from pathlib import Path
 
 import pytest
 
+from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, load_fault_models
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.expressions import Expression
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import ValueEdit, apply_edits, in_lines, joined, unsplice
+from mutator.mutants.splicing import Edit, ValueEdit, apply_edits, in_lines, joined, unsplice
+from mutator.operators.enumeration import mutations_of
+from mutator.operators.facts import facts_of
+from mutator.operators.mutations import Mutation
+from mutator.operators.names import Operator
+from mutator.targets.source_tree import SourceTree
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
 FEW = ("colorsys", "bisect", "shlex")
@@ -72,13 +78,22 @@ def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
                 yield expression, FaultLocation(path=file.path, function=function, anchor=anchor)
 
 
+def active(node: ast.expr) -> bool:
+    """Whether it asks the probe if a fault is active."""
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == "_fi.active"
+
+
 class Inactive(ast.NodeTransformer):
     """What a module does while no fault is active."""
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         self.generic_visit(node)
-        asks = isinstance(node.test, ast.Call) and ast.unparse(node.test.func) == "_fi.active"
-        return node.orelse if asks else node
+        return node.orelse if active(node.test) else node
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
+        self.generic_visit(node)
+        left_out = isinstance(node.test, ast.UnaryOp) and active(node.test.operand)
+        return node.body if left_out else node
 
 
 Case = tuple[Expression, FaultLocation]
@@ -112,13 +127,16 @@ def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
 def check(file: ParsedFile, cases: Sequence[Case]) -> None:
     """A mutant with these values changed compiles, un-splices, asks the probe once for each, and does
     what the file does while nothing is active."""
-    edits = [edit_of(file, case, number) for number, case in enumerate(cases)]
+    check_edits(file, [edit_of(file, case, number) for number, case in enumerate(cases)], cases)
+
+
+def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: object) -> None:
     data = joined(apply_edits(file, in_lines(file, edits)))
     assert unsplice(data) == file.data, cases
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)
-    asked = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and ast.unparse(n.func) == "_fi.active"]
-    assert len(asked) == len(cases), cases
+    asked = [node for node in ast.walk(tree) if isinstance(node, ast.expr) and active(node)]
+    assert len(asked) == len(edits), cases
     assert ast.dump(Inactive().visit(tree)) == ast.dump(ast.parse(file.data)), cases
 
 
@@ -143,3 +161,44 @@ def test_a_changed_value_is_all_that_differs() -> None:
 def test_a_changed_value_is_all_that_differs_at_large() -> None:
     """The same of 20,000 cases in some fifty modules."""
     assert checked(MANY, 20_000) == 20_000
+
+
+def mutations(file: ParsedFile) -> Iterator[Mutation]:
+    """What all operators make of a module."""
+    tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
+    facts = facts_of(tree, file.path)
+    for function in file.functions:
+        yield from mutations_of(file, facts, function, models(), list(Operator))
+
+
+def checked_mutations(names: Sequence[str], count: int) -> int:
+    """Check so many mutants of operators, drawn from the modules of these names; how many they were."""
+    files = [file for name in names if (file := module(name))]
+    drawn = [(file, mutation) for file in files for mutation in mutations(file)]
+    chosen = random.Random(2).sample(drawn, min(count, len(drawn)))
+    for file in files:
+        own = [mutation for one, mutation in chosen if one is file]
+        for first in range(0, len(own), TOGETHER):
+            edits: list[Edit | ValueEdit] = []
+            for number, mutation in enumerate(own[first : first + TOGETHER]):
+                injection = mutation.fault("as_is").injections[0]
+                edit = injection_edit(file, models(), injection, f"{number:08x}")
+                try:
+                    apply_edits(file, in_lines(file, [*edits, edit]))
+                except MutatorError:  # it lies in another one, or this one in it
+                    check_edits(file, [edit], mutation)
+                else:
+                    edits.append(edit)
+            check_edits(file, edits, own)
+    return len(chosen)
+
+
+def test_a_mutation_is_all_that_differs() -> None:
+    """The same holds for what operators make, statements that are left out included."""
+    assert checked_mutations(FEW, 150) == 150
+
+
+@pytest.mark.slow
+def test_a_mutation_is_all_that_differs_at_large() -> None:
+    """The same of 20,000 mutants of operators."""
+    assert checked_mutations(MANY, 20_000) == 20_000
