@@ -1,6 +1,7 @@
 """A run as a mutation testing report (the mutation-testing-elements schema, version 2).
 
-A mutant is a fault at its first location, with its value; the tests it is put to are drives: a scenario and a
+A mutant is a fault at its first location, with its value; one that changes the value of an expression
+replaces that alone. The tests it is put to are drives: a scenario and a
 trigger. *Killed* means that a drive ended in a hazard: the hazard checks are what a fault-free drive passes.
 A high score therefore speaks against the controller, not for it; thresholds are set so that none is green.
 """
@@ -12,10 +13,10 @@ from typing import Any
 from mutator._common.text import counted
 from mutator._common.version import VERSION
 from mutator.execution import single_run
-from mutator.faults.fault_models import FaultModels
-from mutator.model import Experiment, Fault, Injection, Outcome, Record, Status
+from mutator.faults.fault_models import FaultModels, SnippetKind
+from mutator.model import OPERATORS, VALUE_ANCHORS, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed
-from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.injection_edits import injection_edit, replaced_value
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import Edit, Rank, in_lines, in_order
 from mutator.store import plan_file
@@ -68,21 +69,47 @@ def _mutant(
     records: Mapping[str, Record],
 ) -> dict[str, Any]:
     first, *others = fault.injections
-    file = parsed(manifest.tree, first.location.path)
-    edits = in_lines(file, [injection_edit(file, models, first, injection_id(0, first), manifest.tree)])
     also = [f"{i.location.path}:{_line(manifest, i)}" for i in others]
-    description = f"{fault.label}, aims at {fault.aim}" + (f"; also at {', '.join(also)}" if also else "")
+    description = ", aims at ".join(filter(None, (fault.label, fault.aim)))
+    description += f"; also at {', '.join(also)}" if also else ""
     return {
         "id": fault.id,
-        "mutatorName": first.model,
+        "mutatorName": fault.fault_type if fault.module == OPERATORS else first.model,
         "description": description,
-        **_splice(file, file.span(first.location), edits),
+        **_change(manifest, models, fault),
         **verdict(experiments, records),
     }
 
 
 def _line(manifest: TargetManifest, injection: Injection) -> int:
     return parsed(manifest.tree, injection.location.path).span(injection.location)[0] + 1
+
+
+def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
+    """What the fault's first injection replaces, and by what."""
+    first = fault.injections[0]
+    file, model = parsed(manifest.tree, first.location.path), models.get(first.model)
+    name, span = injection_id(0, first), file.span(first.location)
+    if first.location.anchor.kind in VALUE_ANCHORS:
+        expression, changed = replaced_value(file, model, first, name)
+        return _located(file, expression.start, expression.end, changed)
+    if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the statement is left out
+        line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
+        start = len(line) - len(line.lstrip())
+        return _located(file, (span[0], start), (span[1] - 1, len(last)), "pass")
+    return _splice(file, span, in_lines(file, [injection_edit(file, models, first, name, manifest.tree)]))
+
+
+def _located(
+    file: ParsedFile, start: tuple[int, int], end: tuple[int, int], replacement: str
+) -> dict[str, Any]:
+    """A replacement for what stands from `start` to `end` (line and byte, from 0), in the schema's places:
+    lines and characters, from 1, the end excluded."""
+    first, last = (
+        {"line": line + 1, "column": len(file.lines[line][:column].decode(file.encoding)) + 1}
+        for line, column in (start, end)
+    )
+    return {"location": {"start": first, "end": last}, "replacement": replacement}
 
 
 def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
@@ -96,14 +123,8 @@ def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> d
         new += [*lines[done:at], *edit.lines, *(edit.unit + line for line in lines[at : at + edit.reindent])]
         done = gone
     new += lines[done:]
-    end = lines[-1].rstrip(b"\r\n").decode(file.encoding)
-    return {
-        "location": {
-            "start": {"line": first + 1, "column": 1},
-            "end": {"line": last, "column": len(end) + 1},
-        },
-        "replacement": b"".join(new).rstrip(b"\r\n").decode(file.encoding),
-    }
+    replacement = b"".join(new).rstrip(b"\r\n").decode(file.encoding)
+    return _located(file, (first, 0), (last - 1, len(lines[-1].rstrip(b"\r\n"))), replacement)
 
 
 def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site
-from mutator.mutants.expressions import NO_PARTS, enclosed, parts_of
+from mutator.mutants.expressions import NO_PARTS, Expression, enclosed, parts_of
 from mutator.mutants.imported_names import importers
 from mutator.mutants.probe import ORIGINAL, set_constant, set_default
 from mutator.mutants.rendering import changed_value, snippet
@@ -58,11 +58,18 @@ def injection_edit(
     return edit
 
 
-def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
+def replaced_value(
+    file: ParsedFile, model: FaultModel, injection: Injection, name: str
+) -> tuple[Expression, str]:
+    """The expression whose value an injection changes, and the source that stands for it then."""
     expression = file.resolve_value(injection.location)
-    _variables(file, file.names(injection.location), expression.start[0], model, injection)
     params = dict(injection.params)
-    changed = changed_value(model, params, name, expression.written, parts_of(expression))
+    return expression, changed_value(model, params, name, expression.written, parts_of(expression))
+
+
+def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
+    expression, changed = replaced_value(file, model, injection, name)
+    _variables(file, file.names(injection.location), expression.start[0], model, injection)
     return value_change(file, expression, changed, name)
 
 

@@ -3,16 +3,18 @@
 import json
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from mutator.campaigns.plans import Plan
 from mutator.errors import MutatorError
 from mutator.exports import Format
 from mutator.exports.elements import verdict
 from mutator.exports.write import export
-from mutator.model import Experiment, Outcome, Record, Status
+from mutator.model import Anchor, AnchorKind, Experiment, Injection, Outcome, Record, Status
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]
@@ -92,6 +94,45 @@ def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
         replacement = [line.strip() for line in mutant["replacement"].splitlines()]
         assert [line for line in replacement if "# fi:" not in line] == statement
         assert any("# fi:" in line for line in replacement)
+
+
+def test_a_mutant_of_an_operator_replaces_its_expression(
+    toycar: Workspace, tmp_path: Path, write_run: Write, of_operators: Callable[..., Any]
+) -> None:
+    """It has the operator's name, the exact columns of the expression, and what stands there instead; a
+    statement that is left out gives way to `pass`."""
+
+    def changed(plan: Plan) -> Plan:
+        mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
+        first = mutants.experiments[0]
+        place = replace(
+            first.fault.injections[0].location, anchor=Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="gas")
+        )
+        left_out = replace(
+            first.fault, fault_type="omission", injections=(Injection(location=place, model="omission"),)
+        )
+        experiments = [*mutants.experiments, replace(first, fault=left_out)]
+        return replace(mutants, experiments=experiments, chunks=(len(experiments),))
+
+    run = write_run(toycar, tmp_path / "run", lambda e: HAZARD, changed=changed)
+    made = json.loads(export(run, Format.MUTATION_ELEMENTS, workspace=toycar).read_text())
+    *changes, omission = mutants(made)
+    assert len(changes) == 9  # operations with two sides in the file
+    found = set()
+    for source, mutant in changes:
+        start, end = mutant["location"]["start"], mutant["location"]["end"]
+        assert start["line"] == end["line"]
+        text = source.splitlines()[start["line"] - 1][start["column"] - 1 : end["column"] - 1]
+        assert mutant["mutatorName"] == "arithmetic" and mutant["status"] == "Killed"
+        assert mutant["replacement"] == f"_fi.scaled(({text}), -1)"
+        assert f"{text} -> -({text})" in mutant["description"]
+        found.add(text)
+    assert {"1.2 * closing", "wanted / 3.0", "-wanted / 6.0"} <= found
+    source, mutant = omission
+    line = source.splitlines()[mutant["location"]["start"]["line"] - 1]
+    assert line[mutant["location"]["start"]["column"] - 1 :].startswith("gas = ")
+    assert mutant["location"]["end"]["column"] == len(line) + 1
+    assert (mutant["mutatorName"], mutant["replacement"]) == ("omission", "pass")
 
 
 def test_killed_means_hazard(report: dict[str, Any]) -> None:
