@@ -136,6 +136,9 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
         tag = tag_of(line)
         if tag and tag.of_fault and tag.was is None and not tag.sets:
             indent = len(tag.code) - len(tag.code.lstrip())
+            if tag.id == before and indent == margin and tag.opens_original:
+                before = ""  # what else is injected must ask again
+                continue
             if tag.id != before or indent <= margin:
                 margin = indent
                 if not tag.asks_probe:

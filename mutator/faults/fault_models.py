@@ -21,8 +21,11 @@ SCHEMA = "fault_model/1"
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
-# A `constant` is a number, a truth value, a text or None; a `choice` one of the model's own words.
-ParamType = Literal["variable", "import", "number", "integer", "boolean", "constant", "choice", "seed"]
+# A `constant` is a number, a truth value, a text or None; a `choice` one of a few words; a `unit` the suffix
+# of one.
+ParamType = Literal[
+    "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
+]
 NAMES = ("variable", "import")
 
 
@@ -34,6 +37,14 @@ class SnippetKind(StrEnum):
     VALUE = (
         "value"  # another value: of the expression that is anchored, or of the variable that is assigned to
     )
+
+
+class Needs(StrEnum):
+    """What a template asks for beside its parameters."""
+
+    CALL = "call"  # the anchored expression is one: `called`, `arguments`
+    STATEMENT = "statement"  # the anchor is a statement: `statement`, its text
+    NEXT_STATEMENT = "next_statement"  # that, and the text of the one after it, `next_statement`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +71,6 @@ class ParamSchema:
 _TARGET = ParamSchema(
     name="target",
     type="variable",
-    optional=True,
     about="the variable that is changed, where that is not what the anchor names",
 )
 
@@ -82,12 +92,14 @@ class FaultModel:
 
     `raises`: an exception of its injected lines is what it is for, and counts as a crash of the target.
     `expression` is the template of a changed value; None for a model that cannot change an expression's.
+    `needs` is what the templates ask for, of whichever kind of anchor has it.
     """
 
     name: str
     kind: SnippetKind
     about: str
     raises: bool = False
+    needs: Needs | None = None
     params: tuple[ParamSchema, ...]
     examples: tuple[Example, ...]
     template: str
@@ -135,7 +147,7 @@ class _ParamModel(StrictModel, title="A parameter"):
     type: ParamType = Field(
         description="What a value is: a name in the function (`variable`), a dotted name to be imported "
         "(`import`), a number, a `constant` (a number, truth value, text or null), a `choice` (one of the "
-        "words in `choices`), or a `seed`, which no spec gives and expansion draws."
+        "words in `choices`), the suffix of a `unit`, or a `seed`, which no spec gives and expansion draws."
     )
     about: str = Field(description="What it is.")
     unit: str | None = Field(
@@ -181,6 +193,12 @@ class FaultModelModel(StrictModel, title="The file"):
         description="Whether an exception in its lines is what it is for. It then counts as a crash of the "
         "target; otherwise it makes an invalid mutant.",
     )
+    needs: Literal["call", "statement", "next_statement"] | None = Field(
+        None,
+        description="What the template asks for beside its parameters: `call`, an anchored expression that "
+        "is a call, as `called` and its `arguments`; `statement`, the anchored statement on one line; "
+        "`next_statement`, also the statement after it, and a guard then wraps both.",
+    )
     params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
     examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
 
@@ -222,6 +240,7 @@ def _load(path: Path) -> FaultModel:
         kind=kind,
         about=model.about,
         raises=model.raises,
+        needs=Needs(model.needs) if model.needs else None,
         params=(*params, _TARGET) if kind is SnippetKind.VALUE else params,
         examples=tuple(
             Example(

@@ -136,14 +136,15 @@ class _Resolver:
             if not isinstance(param.value, str) or not fits(param.value):
                 raise self._wrong(param, _NAMED[schema.type])
             return param.value
-        if schema.type == "choice":
-            if param.value not in schema.choices:
-                raise self._wrong(param, f"one of {', '.join(schema.choices)}")
-            return param.value
         if schema.type == "boolean":
             if not isinstance(param.value, bool):
                 raise self._wrong(param, "true or false")
             return param.value
+        if schema.type in ("choice", "unit"):
+            words = schema.choices if schema.type == "choice" else tuple(units.UNITS)
+            if param.value not in words:
+                raise self._wrong(param, f"one of {', '.join(words)}")
+            return str(param.value)
         if self.is_plain(param, schema):
             return self._constant(param)
         number = self._number(param, schema)

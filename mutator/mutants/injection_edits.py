@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from mutator.config.locations import base_name
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
+from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site
 from mutator.mutants.expressions import NO_PARTS, Expression, enclosed, parts_of
@@ -24,6 +24,7 @@ from mutator.mutants.splicing import (
     setting,
     value_change,
 )
+from mutator.mutants.statement_texts import written_out
 from mutator.targets.source_tree import SourceTree
 
 
@@ -47,12 +48,17 @@ def injection_edit(
         return _setting(file, model, injection, name, tree)
     site = file.resolve(injection.location)
     variables = _variables(file, site.names, site.first, model, injection)
-    code = snippet(model, dict(injection.params), name)
+    texts: dict[str, str] = {}
+    if model.needs is Needs.CALL:
+        raise _needs_more(file, model, site.first)
+    if model.needs is not None:
+        site, texts = written_out(file, site, model.needs)
+    code = snippet(model, dict(injection.params), name, texts)
     make = guard if model.kind is SnippetKind.GUARD else insertion
     edit = make(file, site, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
     if key not in file.sound:
-        _check_own_names(file, site, model, code, variables)
+        _check_own_names(file, site, model, code, variables.union(*map(_bound, texts.values())))
         _check_scopes(file, site, edit)
         file.sound.add(key)
     return edit
@@ -63,8 +69,10 @@ def replaced_value(
 ) -> tuple[Expression, str]:
     """The expression whose value an injection changes, and the source that stands for it then."""
     expression = file.resolve_value(injection.location)
-    params = dict(injection.params)
-    return expression, changed_value(model, params, name, expression.written, parts_of(expression))
+    params, parts = dict(injection.params), parts_of(expression)
+    if model.needs is Needs.CALL and not parts["called"]:
+        raise _needs_more(file, model, expression.start[0])
+    return expression, changed_value(model, params, name, expression.written, parts)
 
 
 def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
@@ -73,10 +81,28 @@ def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name:
     return value_change(file, expression, changed, name)
 
 
+def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
+    wanted = {
+        Needs.CALL: "a call: an anchor `result`, or another whose expression is a call",
+        Needs.STATEMENT: "a statement, or an expression in a function",
+        Needs.NEXT_STATEMENT: "a statement, and another one after it",
+    }
+    assert model.needs is not None
+    return MutatorError(
+        f"model {model.name} needs more than this anchor has",
+        where=file.where,
+        line=line + 1,
+        expected=wanted[model.needs],
+        remedy="anchor elsewhere, or take another model",
+    )
+
+
 def _setting(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
 ) -> Edit:
     value, params = file.resolve_fixed(injection.location), dict(injection.params)
+    if model.needs is not None:
+        raise _needs_more(file, model, value.first)
     for param in model.params:
         if param.type == "variable" and params.get(param.name) is not None:
             raise MutatorError(

@@ -143,6 +143,11 @@ class Tag:
         return self.id.split("+")
 
     @property
+    def opens_original(self) -> bool:
+        """Whether it is the `else:` beneath which a guard keeps the target's statements."""
+        return self.guarded > 0 and self.code.strip() == b"else:"
+
+    @property
     def asked_for(self) -> list[str]:
         """The injections whose values a changed line takes only if the probe says so."""
         return [found.decode() for found in _ASKED.findall(self.code)]

@@ -7,17 +7,19 @@ literal or a checked name, so it cannot become other code.
 import ast
 import io
 import math
+import re
 import tokenize
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from jinja2 import StrictUndefined, TemplateError, TemplateSyntaxError, Undefined
 from jinja2.exceptions import SecurityError
 from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
+from mutator.config import units
 from mutator.config.locations import PROBE_NAME, assignable, dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
@@ -25,6 +27,7 @@ from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 
 _EXACT = 2.0**53  # up to it every whole number is a double
+_ARGUMENT = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast.unparse` writes it
 
 
 def literal(value: object) -> str:
@@ -49,6 +52,39 @@ def signed(value: int | float) -> str:
     return f"{'-' if negative else '+'} {literal(int(size) if whole else size)}"
 
 
+def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
+    """The arguments of a call with the values of two exchanged, counted from 1; keywords stay in place."""
+    parts = [_ARGUMENT.fullmatch(text) for text in arguments]
+    for place in (first, second):
+        part = parts[place - 1] if 0 < place <= len(parts) else None
+        if part is None or first == second or part["value"].startswith("*"):
+            raise MutatorError(
+                f"arguments {first} and {second} of {len(parts)}: {', '.join(arguments) or 'none'}",
+                expected="two different ones, counted from 1, without stars",
+                remedy="correct the numbers",
+            )
+    values = [part["value"] for part in parts if part]
+    values[first - 1], values[second - 1] = values[second - 1], values[first - 1]
+    return [(part["keyword"] or "") + value for part, value in zip(parts, values, strict=True) if part]
+
+
+def taken_for(written: str, read: str) -> float:
+    """What a number is multiplied by if it is written in one unit and read as if it were in another."""
+    one, other = units.UNITS[written], units.UNITS[read]
+    if one.dimension != other.dimension or one == other:
+        raise MutatorError(
+            f"written in {written}, read as {read}",
+            expected=f"two units of {one.dimension}",
+            remedy="correct one of them",
+        )
+    return units.convert(1.0, other, one)
+
+
+def refuse(why: str) -> NoReturn:
+    """How a template says that parameters do not go together."""
+    raise MutatorError(why, remedy="correct the parameters, or anchor elsewhere")
+
+
 class _Sandbox(ImmutableSandboxedEnvironment):
     """Jinja2's sandbox without powers: 9 ** 9 ** 9 never ends."""
 
@@ -65,13 +101,17 @@ _ENVIRONMENT = _Sandbox(
     keep_trailing_newline=True,
     finalize=literal,
 )
-_ENVIRONMENT.filters["signed"] = signed
+_ENVIRONMENT.filters |= {"signed": signed, "exchanged": exchanged, "taken_for": taken_for}
+_ENVIRONMENT.globals["refuse"] = refuse
 _compiled = lru_cache(maxsize=256)(_ENVIRONMENT.from_string)
 _FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError, RecursionError, MemoryError)
 
 
-def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[str, ...]:
-    """The model's lines for these parameters, untagged, 4 spaces a level. `fi` is the injection's id.
+def snippet(
+    model: FaultModel, params: Mapping[str, Value], fi: str, statements: Mapping[str, str] | None = None
+) -> tuple[str, ...]:
+    """The model's lines for these parameters, untagged, 4 spaces a level. `fi` is the injection's id,
+    `statements` what the model needs of the source.
 
     MutatorError when the template fails or its result is not whole lines of Python.
     """
@@ -82,7 +122,7 @@ def snippet(model: FaultModel, params: Mapping[str, Value], fi: str) -> tuple[st
             f"    {target} = {changed_value(model, params, fi, target)}",
         )
     names = {param.name: _checked(param, params) for param in model.params}
-    text = render(model.template, {"fi": fi, **names}, model.template_path)
+    text = render(model.template, {"fi": fi, **names, **(statements or {})}, model.template_path)
     text = text.removesuffix("\n")
     if not _are_lines(normalized(text, (fi,)), model.kind):
         _check_lines(text, model.kind, model.template_path)
@@ -139,9 +179,10 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     if param.type == "constant":
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return value if number or param.name not in params else repr(value)
-    if param.type == "choice":
-        if value is not None and value not in param.choices:
-            raise MutatorError(f"{value!r} for '{param.name}'", expected=f"one of {', '.join(param.choices)}")
+    words = {"choice": param.choices, "unit": units.UNITS}.get(param.type)
+    if words is not None:
+        if value not in words and not (value is None and param.optional):
+            raise MutatorError(f"{value!r} for '{param.name}'", expected=f"one of {', '.join(words)}")
         return value
     fits = assignable if param.type == "variable" else dotted_name
     is_name = isinstance(value, str) and fits(value)

@@ -5,19 +5,22 @@ from collections.abc import Iterator
 
 from mutator._common.tables import Table
 from mutator.faults import fault_models
-from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema
+from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
 from mutator.reference.tables import generated, sections
 from mutator.workspace import Workspace
 
 INTRODUCTION = """\
 What a fault does to a statement. A model is two files in `templates/`: `<name>.py.j2`, the template, and
 `<name>.yaml`, its parameters and examples ([add one](../how-to/add-a-fault-model.md)). A model that inserts
-puts lines before or after the anchored statement; one that guards wraps the statement itself.
+puts lines before or after the anchored statement; one that guards wraps the statement itself. One that
+changes a value is an expression: while the fault is active, its value takes the place of the anchored
+expression's or, at a statement, of a variable's.
 
 A parameter in *the variable's unit* may be given in any unit of the same dimension. `target` may be left out
 where the anchor names the variable. A *variable* is a name that the function of the anchor knows; an *import*
 is the dotted name of a module of the target and of something defined in it, which the injected lines import.
-A *constant* is a number, `true`, `false`, `null` or a text.
+A *constant* is a number, `true`, `false`, `null` or a text; a *unit* is a suffix of
+[the table of units](fault-spec.md#units).
 
 A variable keeps its kind: an integer stays an integer where the parameters are whole numbers.
 
@@ -25,6 +28,12 @@ In the examples, lines with `+` are what the model adds to a source. `_fi` is
 [the probe](../explanation/concepts.md#proof-before-counting): `active` asks whether the trigger holds, and
 `like` gives a number as the variable's kind.
 """
+
+_DOES = {
+    SnippetKind.INSERT: "Inserts.",
+    SnippetKind.GUARD: "Guards.",
+    SnippetKind.VALUE: "Changes a value.",
+}
 
 
 def fault_models_page(workspace: Workspace) -> str:
@@ -45,7 +54,7 @@ def fault_models_page(workspace: Workspace) -> str:
 
 def _model(model: FaultModel) -> Iterator[str]:
     yield f"## {model.name}\n"
-    does = "Inserts." if model.kind.value == "insert" else "Guards."
+    does = _DOES[model.kind] + (" Its exceptions are the target's." if model.raises else "")
     yield f"{' '.join(model.about.split())} {does}\n"
     params = [param for param in model.params if param.type != "seed"]
     if params:
@@ -61,7 +70,8 @@ def _param(param: ParamSchema) -> tuple[str, str, str, str]:
     unit = "the variable's" if param.unit == TARGET_UNIT else param.unit or "-"
     low = [] if param.min is None else [f"at least {param.min:g}"]
     high = [] if param.max is None else [f"at most {param.max:g}"]
-    kind = param.type + (f" ({', '.join(low + high)})" if low or high else "")
+    more = low + high + [f"`{word}`".replace("|", "\\|") for word in param.choices]
+    kind = param.type + (f" ({', '.join(more)})" if more else "")
     about = param.about + (" (may be left out)" if param.optional else "")
     return f"`{param.name}`", kind, unit, about
 

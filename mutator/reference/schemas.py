@@ -175,5 +175,7 @@ def _value(param: ParamSchema) -> dict[str, Any]:
         return {"type": "string"}
     if param.type == "boolean":
         return {"type": "boolean"}
+    if param.type in ("choice", "unit"):
+        return {"enum": list(param.choices or units.UNITS)}
     more = [{"type": "boolean"}, {"type": "null"}] if param.type == "constant" else []
     return {"anyOf": [{"type": "number"}, {"type": "string"}, _DRAWN, *more]}

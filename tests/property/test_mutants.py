@@ -99,6 +99,8 @@ def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
         "integer": st.integers(0, 63),
         "boolean": st.booleans(),
         "constant": NUMBERS | st.booleans() | st.none() | st.text(),
+        "choice": st.sampled_from(param.choices or ("",)),
+        "unit": st.sampled_from(("m", "km", "mps", "kph", "rad", "deg")),
         "seed": st.integers(0, 2**53),
     }[param.type]
 

@@ -100,6 +100,25 @@ def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: 
         changes((before, lines))
 
 
+@pytest.mark.parametrize(("kept", "swappable"), [(1, True), (0, False)])
+def test_a_guard_with_another_branch(kept: int, swappable: bool) -> None:
+    """What a guard keeps whole beneath `else:` asks the probe as the other branch does."""
+    guarded = "".join(
+        f"        {line}  # fi:abc guard:1\n" for line in ('if _fi.active("abc"):', "    y = x", "else:")
+    )
+    line = "        y = x * math.pi\n"
+    added = "" if kept else "            y = 0.0  # fi:abc guard:1\n"
+    text = "from car import _fi  # fi:probe\n" + PRISTINE.replace(line, f"{guarded}{added}    {line}")
+    tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
+    manifest = SimpleNamespace(package="car", reads_itself=(), tree=tree)
+    files = {"car/car.py": text.encode(), "car/_fi.py": PROBE}
+    if swappable:
+        assert [f.path for f in plan_swap(manifest, files, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
+        return
+    with pytest.raises(NotSwappable):
+        plan_swap(manifest, files, "/tree")  # type: ignore[arg-type]
+
+
 def test_files_that_are_read_by_the_run(changes: Changes) -> None:
     """A mutant of a file that the run digests must be on the disk."""
     with pytest.raises(NotSwappable, match="read by the run itself"):

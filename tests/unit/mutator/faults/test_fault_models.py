@@ -12,17 +12,33 @@ from mutator.workspace import Workspace
 
 NAMES = [
     "bit_flip",
+    "byte_corruption",
+    "clamp",
     "delay",
     "drift",
+    "exception",
     "ghost_object",
     "image_effect",
+    "infinity",
+    "nan",
     "noise",
+    "none",
     "offset",
     "omission",
+    "quantise",
+    "reordering",
+    "repetition",
     "scale",
+    "sign_flip",
+    "slow_call",
+    "stale",
     "stuck",
+    "swapped_arguments",
+    "unit_mix_up",
+    "wrong_branch",
 ]
 OF_OPERATORS = [f"operator_{name}" for name in ("constant", "drop", "empty", "infix", "prefix", "swap")]
+RAISING = ["exception", "reordering", "repetition", "slow_call", "swapped_arguments", *OF_OPERATORS]
 
 
 @pytest.fixture
@@ -41,10 +57,10 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
 
 
 def test_the_models_that_ship(clone: Workspace) -> None:
-    """These models, one of them a guard, and those of operators, each with at least one example."""
+    """These models, two of which wrap statements, and those of operators, each with at least one example."""
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
-    assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission"]
+    assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]
     assert all(m.examples and m.about for m in models)
 
 
@@ -58,16 +74,16 @@ def test_examples_hold(clone: Workspace, name: str) -> None:
 
 
 def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> None:
-    """Verdicts depend on which models are there to raise, so the digest does, too: of those that ship, the
-    models of operators."""
+    """Verdicts depend on which models are there to raise, so the digest does, too. Those that carry out
+    the target's own code in another way than it stands are."""
     known = clone.fault_models()
-    assert all(model.name.startswith("operator_") for model in known if model.raises)
+    assert [model.name for model in known if model.raises] == sorted(RAISING)
     path = folder / "scale.yaml"
     path.write_text(path.read_text().replace("kind: insert\n", "kind: insert\nraises: false\n"))
     assert load_fault_models(folder).digest == known.digest
     path.write_text(path.read_text().replace("raises: false\n", "raises: true\n"))
     models = load_fault_models(folder)
-    assert "scale" in [model.name for model in models if model.raises]
+    assert [model.name for model in models if model.raises] == sorted([*RAISING, "scale"])
     assert models.digest != known.digest
 
 
@@ -111,6 +127,13 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
         ),
         ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
         ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
+        (
+            "wrong_branch.yaml",
+            "choices: [inverted, always, never], ",
+            "",
+            "7: parameter 'holds'; expected `choices` for a choice, and for no other",
+        ),
+        ("slow_call.yaml", "needs: call", "needs: rest", "4: 'rest' for 'needs'; expected one of 'call'"),
         ("offset.yaml", "unit: target", "unit: feet", "8: 'feet'; expected target or one of m, mm, cm"),
         ("scale.yaml", "examples:", "samples:", "10: unknown key 'samples'"),
         (

@@ -243,7 +243,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "model: offset",
             "model: ofset",
-            "unknown fault model 'ofset'; expected one of bit_flip, delay, drift, ghost_object, image",
+            "unknown fault model 'ofset'; expected one of bit_flip, byte_corruption, clamp",
         ),
         ("aim: H1", "aim: H9", "7: aim 'H9'; expected one of H1, as in toy.yaml; correct it"),
         (

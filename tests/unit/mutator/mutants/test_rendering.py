@@ -1,5 +1,7 @@
 """Rendering: values become literals, names are checked, templates cannot reach out."""
 
+import copy
+import math
 import types
 from dataclasses import replace
 from pathlib import Path
@@ -179,6 +181,43 @@ def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
         ("stuck", {"value": "reverse"}, "drive", "reverse"),
         ("stuck", {}, 40, 40),
         ("bit_flip", {"bit": 31.0}, np.float32(1.0), np.float32(-1.0)),
+        ("clamp", {"low": -3.0, "high": 3.0}, -5, -3),
+        ("clamp", {"low": None, "high": 3.0}, 5.5, 3.0),
+        ("clamp", {"low": None, "high": 3.0}, -5.5, -5.5),
+        ("clamp", {"low": 0.0, "high": 3.0}, np.array([-1, 2, 9], "i2"), np.array([0, 2, 3], "i2")),
+        ("clamp", {"low": 0.0, "high": None}, np.array([-1.0, 2.0]), np.array([0.0, 2.0])),
+        ("quantise", {"step": 4.0}, 7, 8),
+        ("quantise", {"step": 4.0}, 6.1, 8.0),
+        ("quantise", {"step": 4.0}, 6.0, 8.0),
+        ("quantise", {"step": 4.0}, 10.0, 8.0),
+        ("quantise", {"step": 0.5}, 7, 7.0),
+        ("quantise", {"step": 0.5}, math.inf, math.inf),
+        ("quantise", {"step": 4.0}, np.float32(6.5), np.float32(8.0)),
+        ("quantise", {"step": 10.0}, np.array([4, 16, 254], "u1"), np.array([0, 20, 250], "u1")),
+        ("quantise", {"step": 0.5}, np.array([0.3, math.nan]), np.array([0.5, math.nan])),
+        ("sign_flip", {}, 3, -3),
+        ("sign_flip", {}, 0.0, -0.0),
+        ("sign_flip", {}, np.array([1.5, -2.0]), np.array([-1.5, 2.0])),
+        ("unit_mix_up", {"written_in": "kph", "read_as": "mps"}, 10.0, 36.0),
+        ("unit_mix_up", {"written_in": "m", "read_as": "km"}, 3, 3000),
+        ("unit_mix_up", {"written_in": "mps", "read_as": "kph"}, 18, 5.0),
+        ("byte_corruption", {"index": 1, "mask": 129}, b"\x00\x01", b"\x00\x80"),
+        ("byte_corruption", {"index": -1, "mask": 1}, bytearray(b"ab"), bytearray(b"ac")),
+        (
+            "byte_corruption",
+            {"index": 3, "mask": 255},
+            np.array([[1, 2], [3, 4]], "u1"),
+            np.array([[1, 2], [3, 251]], "u1"),
+        ),
+        ("nan", {}, 3, math.nan),
+        ("nan", {}, np.array([1.0, math.inf], "f4"), np.array([math.nan, math.nan], "f4")),
+        ("infinity", {"negative": None}, -3.0, math.inf),
+        ("infinity", {"negative": True}, 3, -math.inf),
+        ("infinity", {"negative": False}, np.array([1.0, -2.0]), np.array([math.inf, math.inf])),
+        ("none", {}, 3, None),
+        ("wrong_branch", {"holds": "inverted"}, True, False),
+        ("wrong_branch", {"holds": "always"}, False, True),
+        ("wrong_branch", {"holds": "never"}, True, False),
     ],
 )
 def test_values_keep_their_kind(
@@ -188,6 +227,8 @@ def test_values_keep_their_kind(
     are whole numbers."""
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
+    given = {key: v for key, v in given.items() if v is not None or key == "value"}
+    before = copy.deepcopy(value)
     lines = snippet(models.get(name), given, "ab12")
     observation = clone.manifest("openpilot").observation
     settings = template_values("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
@@ -197,5 +238,6 @@ def test_values_keep_their_kind(
     names = {"_fi": probe, "x": value}
     exec("\n".join(lines), names)
     assert type(names["x"]) is type(result)
-    assert np.array_equal(names["x"], result)
+    assert repr(names["x"]) == repr(result)
+    assert repr(value) == repr(before)
     assert getattr(names["x"], "dtype", None) == getattr(result, "dtype", None)

@@ -1,0 +1,317 @@
+"""What fault models do to a small function that runs under the probe, step by step."""
+
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger, Value
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.probe import template_values
+from mutator.mutants.rendering import render
+from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
+from mutator.triggers.conditions import check_condition
+from mutator.workspace import Workspace
+
+STEP_S = 0.1
+Make = Callable[..., "Toy"]
+
+
+class Toy:
+    """The function `f` of a source with one injection; `names` are what it finds beside its arguments."""
+
+    def __init__(self, clone: Workspace, source: str, anchor: Anchor, model: str, **params: Value) -> None:
+        models = clone.fault_models()
+        file = parse_file("m.py", source.encode(), Path("root"))
+        place = FaultLocation(path="m.py", function="f", anchor=anchor)
+        injection = Injection(location=place, model=model, params=tuple(sorted(params.items())))
+        data = joined(apply_edits(file, in_lines(file, [injection_edit(file, models, injection, "ab12")])))
+        assert unsplice(data) == file.data
+        trigger = Trigger(name="test", condition=check_condition("rs > 0"))
+        observation = clone.manifest("openpilot").observation
+        values = template_values("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
+        self.text = data.decode()
+        self.probe: Any = types.ModuleType("_fi")
+        exec(render(models.probe, values, models.folder / "_fi.py.j2"), vars(self.probe))
+        self.names: dict[str, Any] = {"_fi": self.probe}
+        exec(self.text, self.names)
+        self.steps = 0
+
+    def run(self, marks: str, *arguments: Any) -> list[Any]:
+        """What `f` gives in each step; the fault is active where the mark is `x`. Each argument is called."""
+        found = []
+        for mark in marks:
+            lead = 15.0 if mark == "x" else 20.0
+            self.steps += 1
+            self.probe.observe(t=self.steps * STEP_S, d_rel=40.0, v_ego=20.0, v_lead=lead)
+            found.append(self.names["f"](*(argument() for argument in arguments)))
+        return found
+
+
+@pytest.fixture
+def toy(clone: Workspace) -> Make:
+    def make(source: str, kind: AnchorKind, name: str, model: str, **params: Value) -> Toy:
+        return Toy(clone, source, Anchor(kind=kind, name=name), model, **params)
+
+    return make
+
+
+def counting() -> Callable[[], int]:
+    """Counts its calls: 1, 2, ..."""
+    calls: list[None] = []
+
+    def count() -> int:
+        calls.append(None)
+        return len(calls)
+
+    return count
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(AnchorKind.AFTER_ASSIGN, "y"), (AnchorKind.ASSIGNED_VALUE, "y"), (AnchorKind.VALUE, "x")],
+)
+def test_a_stale_value(toy: Make, kind: AnchorKind, name: str) -> None:
+    """A value is that of two steps ago, the first one until then; each stretch of activity begins anew."""
+    params = {"target": "y"} if kind is AnchorKind.AFTER_ASSIGN else {}
+    made = toy("def f(x):\n    y = x\n    return y\n", kind, name, "stale", steps=2, **params)
+    assert made.run(".xxxx.xx", counting()) == [1, 2, 2, 2, 3, 6, 7, 7]
+
+
+def test_steps_are_counted_and_not_executions(toy: Make) -> None:
+    """Where a statement runs twice a step, the newest value of an older step counts."""
+    made = toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "x", "stale", steps=1)
+    count, f = counting(), made.names["f"]
+    made.names["f"] = lambda x: (f(x), f(count()))
+    assert made.run("xxx", count) == [(1, 1), (2, 2), (4, 4)]
+
+
+def test_a_slow_call(toy: Make) -> None:
+    """While a call is under way none is made; when it is over it gives its result, and the next begins."""
+    made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=2 * STEP_S)
+    count = counting()
+    assert made.run("..xxxxxx..xxx", lambda: count) == [1, 2, 3, 3, 3, 3, 4, 4, 6, 7, 8, 8, 8]
+
+
+def test_a_call_that_fails_is_none_that_was_made(toy: Make) -> None:
+    """What the call raises comes out, and the next step makes it again."""
+    made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=1.0)
+    with pytest.raises(ZeroDivisionError):
+        made.run("x", lambda: lambda: 1 / 0)
+    assert made.run("x", lambda: lambda: 3) == [3]
+
+
+@pytest.mark.parametrize("kind", [AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL])
+def test_a_message_sent_twice(toy: Make, kind: AnchorKind) -> None:
+    """The statement is carried out twice while the fault is active."""
+    sent: list[int] = []
+    made = toy("def f(x):\n    put(\n        x  # it\n    )\n", kind, "put", "repetition")
+    made.names["put"] = sent.append
+    made.run(".x.", counting())
+    assert sent == [1, 2, 2, 3]
+
+
+def test_a_statement_that_assigns_may_be_repeated(toy: Make) -> None:
+    """The names that it sets are its own."""
+    made = toy("def f(x):\n    x += 1\n    return x\n", AnchorKind.AFTER_ASSIGN, "x", "repetition")
+    assert made.run(".x", lambda: 0) == [1, 2]
+
+
+def test_a_value_that_is_calculated_twice(toy: Make) -> None:
+    """The second one counts."""
+    made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "repetition")
+    count = counting()
+    assert made.run(".x.", lambda: count) == [1, 3, 4]
+
+
+def test_a_message_that_is_dropped(toy: Make) -> None:
+    """A statement that is left out does nothing."""
+    sent: list[int] = []
+    made = toy("def f(x):\n    put(x)\n", AnchorKind.BEFORE_CALL, "put", "omission")
+    made.names["put"] = sent.append
+    made.run(".x.", counting())
+    assert sent == [1, 3]
+
+
+REORDERED = """def f(x):
+    try:
+        y = x
+
+        # the sum of a string
+        y = y + (
+            10
+        )
+    finally:
+        pass
+    return y
+"""
+
+
+def test_two_statements_exchanged(toy: Make) -> None:
+    """The next statement is carried out first while the fault is active; inactive, all is as it was."""
+    source = REORDERED.replace("y = x", "x = x * 2").replace("y = y +", "y = x +")
+    made = toy(source, AnchorKind.BEFORE_ASSIGN, "x", "reordering")
+    assert made.run(".x.", lambda: 1) == [12, 11, 12]
+    assert (
+        "            y = x + 10  # fi:ab12 guard:6\n            x = x * 2  # fi:ab12 guard:6\n" in made.text
+    )
+
+
+def test_the_target_raises_where_order_matters(toy: Make) -> None:
+    """What is not there yet is missed, as in any program that has its statements so."""
+    source = "def f(x):\n    y = x\n    z = y\n    return z\n"
+    made = toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
+    assert made.run(".", lambda: 1) == [1]
+    with pytest.raises(UnboundLocalError):
+        made.run(".x", lambda: 1)
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("def f(x):\n    y = x\n", "no other statement follows"),
+        ("def f(x):\n    y = x\n    if x:\n        pass\n", "no other statement follows"),
+        ("def f(x):\n    y = x\n    x += 1; x += 2\n", "no other statement follows"),
+        ("def f(x):\n    y = x; x += 1\n", "alone on its lines"),
+        ("def f(x):\n    y = x\n    return '''a\nb'''\n", "a string runs over the end of a line"),
+        ("def f(x):\n    y = '''a\nb'''\n    return x\n", "a string runs over the end of a line"),
+    ],
+)
+def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) -> None:
+    """They are refused with their line and the reason."""
+    with pytest.raises(MutatorError, match=rf"m.py:2: .*{said}"):
+        toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
+
+
+def test_no_statement_to_repeat(toy: Make) -> None:
+    """The beginning of a function is none."""
+    with pytest.raises(MutatorError, match="no statement that is alone on its lines"):
+        toy("def f(x):\n    return x\n", AnchorKind.ENTRY, "", "repetition")
+
+
+def test_arguments_that_are_swapped(toy: Make) -> None:
+    """Their values change places, whether or not they have keywords; the order of the others stays."""
+    source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"
+    made = toy(source, AnchorKind.RESULT, "dict", "swapped_arguments", first=1, second=3)
+    assert made.run(".x", lambda: 1) == [{"a": 1, "b": 2, "c": True}, {"a": True, "b": 2, "c": 1}]
+
+
+@pytest.mark.parametrize(
+    ("call", "first", "second"),
+    [("g(x)", 1, 2), ("g(x, y)", 2, 2), ("g(x, *y)", 1, 2), ("g(x, **y)", 2, 1), ("g()", 1, 2)],
+)
+def test_arguments_that_cannot_be_swapped(toy: Make, call: str, first: int, second: int) -> None:
+    """Two different ones without stars are needed."""
+    with pytest.raises(MutatorError, match="expected two different ones, counted from 1, without stars"):
+        toy(
+            f"def f(x, y):\n    return {call}\n",
+            AnchorKind.RESULT,
+            "g",
+            "swapped_arguments",
+            first=first,
+            second=second,
+        )
+
+
+@pytest.mark.parametrize("model", ["slow_call", "swapped_arguments"])
+@pytest.mark.parametrize(("kind", "name"), [(AnchorKind.VALUE, "x + 1"), (AnchorKind.AFTER_ASSIGN, "y")])
+def test_no_call(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
+    """A model that needs a call is refused elsewhere, with the anchor that it wants."""
+    params: dict[str, Value] = {"duration": 1.0} if model == "slow_call" else {"first": 1, "second": 2}
+    with pytest.raises(
+        MutatorError, match=rf"m.py:2: model {model} needs more than .*; expected a call: an anchor `result`"
+    ):
+        toy("def f(x):\n    y = x + 1\n    return y\n", kind, name, model, target="y", **params)
+
+
+@pytest.mark.parametrize(
+    ("holds", "taken"), [("inverted", [1, 2, 2]), ("always", [1, 1, 1]), ("never", [2, 2, 2])]
+)
+def test_a_wrong_branch(toy: Make, holds: str, taken: list[int]) -> None:
+    """A condition is the opposite, true or false while the fault is active, and is asked all the same."""
+    asked: list[int] = []
+    source = "def f(x):\n    if ask(x):\n        return 1\n    return 2\n"
+    made = toy(source, AnchorKind.CONDITION, "ask(x)", "wrong_branch", holds=holds)
+    made.names["ask"] = lambda x: asked.append(x) or x > 1
+    count = counting()
+    assert made.run("xxx", count) == taken and asked == [1, 2, 3]
+    assert made.run("..", counting()) == [2, 1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        (AnchorKind.ENTRY, ""),
+        (AnchorKind.BEFORE_RETURN, "x"),
+        (AnchorKind.RETURN_VALUE, ""),
+        (AnchorKind.VALUE, "x"),
+    ],
+)
+def test_an_exception(toy: Make, kind: AnchorKind, name: str) -> None:
+    """It is raised while the fault is active, at a statement and in an expression."""
+    made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
+    assert made.run(".", lambda: 1) == [1]
+    with pytest.raises(TimeoutError, match="injected fault"):
+        made.run(".x", lambda: 1)
+
+
+def test_none_is_what_a_call_gives(toy: Make) -> None:
+    """The call is made, and its result is lost."""
+    made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "none")
+    count = counting()
+    assert made.run(".x.", lambda: count) == [1, None, 3]
+
+
+def test_a_drift_of_an_expression(toy: Make) -> None:
+    """It grows with every active step; one that stays needs a statement."""
+    source = "def f(x):\n    return x\n"
+    made = toy(source, AnchorKind.RETURN_VALUE, "", "drift", per_step=0.5)
+    assert made.run(".xx.x", lambda: 1) == [1, 1.5, 2.0, 1, 2.5]
+    with pytest.raises(MutatorError, match="an error that stays needs a statement"):
+        toy(source, AnchorKind.RETURN_VALUE, "", "drift", per_step=0.5, stays=True)
+
+
+@pytest.mark.parametrize(
+    ("model", "params", "said"),
+    [
+        ("clamp", {}, "clamp without a bound"),
+        (
+            "unit_mix_up",
+            {"written_in": "m", "read_as": "mps"},
+            "written in m, read as mps; expected two units of length",
+        ),
+        ("unit_mix_up", {"written_in": "m", "read_as": "m"}, "expected two units of length"),
+        (
+            "unit_mix_up",
+            {"written_in": "m", "read_as": "feet"},
+            "'feet' for 'read_as'; expected one of m, mm",
+        ),
+        (
+            "wrong_branch",
+            {"holds": "perhaps"},
+            "'perhaps' for 'holds'; expected one of inverted, always, never",
+        ),
+    ],
+)
+def test_parameters_that_do_not_go_together(
+    toy: Make, model: str, params: dict[str, Value], said: str
+) -> None:
+    """They are refused in words of their own."""
+    with pytest.raises(MutatorError, match=said):
+        toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", model, **params)
+
+
+@pytest.mark.parametrize(
+    ("value", "index"), [(b"ab", 2), (b"ab", -3), (b"", 0), ("ab", 0), (3, 0), (bytearray(), 0)]
+)
+def test_bytes_that_are_not_there(toy: Make, value: Any, index: int) -> None:
+    """What has no such byte is not passed on as if it had been corrupted."""
+    made = toy(
+        "def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", "byte_corruption", index=index, mask=1
+    )
+    with pytest.raises(ValueError, match=f"has no byte {index} to corrupt"):
+        made.run("x", lambda: value)
