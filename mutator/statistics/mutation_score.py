@@ -5,6 +5,7 @@ are of the mutants that were activated; the others are told apart. Experiments w
 mutant could not be made, are in no count (`frame.load` has left them out).
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -103,13 +104,19 @@ def score_sheet(
 
 
 def totals(sheet: Sheet) -> Table:
-    """The lines of the score that are of all mutants."""
+    """The lines of the score that are of all mutants, in few columns."""
     rows = [
-        (f"{lasting} {counted}", *map(text_of, cells))
+        (f"{'all' if lasting == EITHER else lasting} {counted}", *map(_short, cells))
         for name, counted, lasting, *cells in sheet.lines
         if name == ALL
     ]
     return Table(heads=("mutation score", *_HEADS[3:]), rows=rows, right=range(1, len(_HEADS) - 2))
+
+
+def _short(cell: Cell) -> str:
+    if not isinstance(cell, Share) or math.isnan(cell.low):
+        return text_of(cell)
+    return f"{100 * cell.rate:.1f} % ({100 * cell.low:.0f} to {100 * cell.high:.0f})"
 
 
 def _lines(drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from mutator.api.runs import load_run
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes import results
 from mutator.report.browse import _listed, _tables
@@ -81,6 +82,22 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
     columns = {c["name"]: c for c in _tables(reported, rows, lines)[0]["columns"]}
     assert f"{DRIVER}:{line}" in columns["line"]["words"]
     assert columns["lasting"]["words"] == ["permanent", "transient"]
+
+
+def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> None:
+    """The totals are what the command line shows; without golden runs no alert is compared."""
+    loaded = load_run(run, workspace=toycar)
+    totals = loaded.mutation_totals()
+    assert totals.heads[:3] == ("mutation score", "number", "not activated")
+    assert totals.rows[0][5] == "100.0 % (61 to 100)"
+    assert [row[:3] for row in totals.rows] == [
+        ("permanent mutants", "7", "1"),
+        ("transient mutants", "7", "0"),
+        ("all mutants", "7", "0"),
+    ]
+    frame = loaded.mutation_score().frame()
+    line = frame[(frame["of"] == "arithmetic") & (frame["fault"] == "permanent")].iloc[0]
+    assert (line["hazard: count"], line["hazard: of"], line["new alert"]) == (6, 6, None)
 
 
 def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) -> None:

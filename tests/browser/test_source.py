@@ -1,0 +1,70 @@
+"""The source of a run with operators' mutants in the report's page: marks that lead to experiments."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from mutator.model import Experiment, Outcome
+from mutator.outcomes import results
+from mutator.report import building
+from mutator.report.panels import figures
+from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    from .conftest import Page
+
+HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.5}
+
+
+def became(experiment: Experiment) -> dict[str, Any]:
+    """Permanent mutants harm, transient ones are masked."""
+    return HAZARD if experiment.trigger.name == "always" else {}
+
+
+@pytest.fixture(scope="module")
+def report(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    write_run: Callable[..., Path],
+    of_operators: Callable[..., Any],
+) -> Path:
+    """The report of made-up records of mutants of the toy's driver."""
+    folder = tmp_path_factory.mktemp("source")
+    workspace = copy_toycar(folder)
+    out = write_run(workspace, folder / "run", became, changed=of_operators(workspace, "toycar/driver.py"))
+    results.build(out)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "drawings", lambda frame: ())
+        building.write(out, workspace)
+    return out
+
+
+def test_a_mark_lists_the_experiments_that_it_counts(
+    report: Path, open_report: "Callable[[Path], Page]", serious_faults: Callable[[Any], list[str]]
+) -> None:
+    """With the keyboard: the list has the experiments of the line, permanent or transient ones or, by the
+    line's number, both; nobody is shut out by colours or roles."""
+    page = open_report(report)
+    assert serious_faults(page.page) == []
+    line = page.page.locator(".source tr", has_text="gas = min")
+    assert line.locator(".mark").all_inner_texts() == ["H 1/1", "M 1/1"]
+    for link, ending in ((".mark.hazard a", "hazard"), (".mark.masked a", "masked")):
+        line.locator(link).focus()
+        page.page.keyboard.press("Enter")
+        page.wait_for_rows(1)
+        assert page.column("ending") == [ending]
+    line.locator(".no a").click()
+    page.wait_for_rows(2)
+    assert page.found == "2 of 18 experiments"
+
+
+def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:
+    """Long lines are scrolled in their own box, in the dark, too; the page is no wider than the screen."""
+    page = open_report(report).page
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.emulate_media(color_scheme="dark")
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    mark = page.locator(".source .mark.hazard a").first.bounding_box()
+    assert mark is not None and mark["x"] + mark["width"] < 200
