@@ -69,31 +69,44 @@ def expressions_of(
     """The expressions of each function of a file whose value can be changed, in the order of the source."""
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
-    seen, untaggable = _seen_by_libcst(positions), _untaggable(data)
+    tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
+    seen, untaggable, brackets = _seen_by_libcst(positions), _untaggable(data, tokens), _brackets(tokens)
     found = []
     for function, node, roles in _in_functions(ast.parse(data)):
         start, end = _extent(lines, node)
-        known = seen.issuperset(_extent(lines, one) for one in _known_by(node, lines, start))
-        if known and untaggable.isdisjoint((start[0], end[0])):
-            found.append(_expression(lines, encoding, (function, node, roles), start, end))
+        text, known = _text(node), all(_extent(lines, one) in seen for one in _known_by(node))
+        if text and known and untaggable.isdisjoint((start[0], end[0])):
+            bare = isinstance(node, ast.Tuple) and brackets.get(start) != end
+            roles = (*roles, (AnchorKind.VALUE, text, None))
+            found.append(_expression(lines, encoding, (function, node, roles), start, end, bare=bare))
     return _grouped(sorted(found, key=lambda one: (one.start, (-one.end[0], -one.end[1]))))
 
 
-def _expression(lines: Sequence[str], encoding: str, found: _Found, start: _Point, end: _Point) -> Expression:
+def _expression(
+    lines: Sequence[str], encoding: str, found: _Found, start: _Point, end: _Point, *, bare: bool
+) -> Expression:
     function, node, roles = found
-    text = ast.unparse(node)
-    written = lines[start[0]][start[1] : end[1]] if start[0] == end[0] else text
-    bare = isinstance(node, ast.Tuple) and not written.startswith("(")
-    alone = isinstance(node, _ATOMS) or (isinstance(node, ast.Tuple) and not bare)
+    one_line = start[0] == end[0]
+    written = lines[start[0]][start[1] : end[1]] if one_line else roles[-1][1]
+    alone = isinstance(node, _ATOMS) or (isinstance(node, ast.Tuple) and not (bare and one_line))
     return Expression(
         function=function,
         start=(start[0], len(lines[start[0]][: start[1]].encode(encoding))),
         end=(end[0], len(lines[end[0]][: end[1]].encode(encoding))),
-        roles=(*roles, (AnchorKind.VALUE, text, None)),
+        roles=roles,
         written=written if alone else f"({written})",
         bare=bare,
         node=node,
     )
+
+
+def _text(node: ast.AST) -> str:
+    """Its source; empty where `ast` cannot write it: an int of thousands of digits, an f-string that would
+    need a backslash inside braces."""
+    try:
+        return ast.unparse(node)
+    except ValueError:
+        return ""
 
 
 def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
@@ -107,11 +120,14 @@ def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
     return point(node.lineno, node.col_offset), point(node.end_lineno, node.end_col_offset)
 
 
-def _known_by(node: ast.expr, lines: Sequence[str], start: _Point) -> list[ast.expr]:
-    """The nodes by whose places LibCST must know it: a tuple in parentheses, which LibCST does not count to
-    it, by its elements."""
-    in_parentheses = isinstance(node, ast.Tuple) and lines[start[0]][start[1] :].startswith("(")
-    return node.elts if isinstance(node, ast.Tuple) and in_parentheses else [node]
+def _known_by(node: ast.expr) -> Iterator[ast.expr]:
+    """The nodes by whose places LibCST must know it: a tuple, to which LibCST counts no parentheses, by its
+    elements."""
+    if isinstance(node, ast.Tuple):
+        for element in node.elts:
+            yield from _known_by(element)
+    else:
+        yield node
 
 
 def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
@@ -122,11 +138,22 @@ def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
     )
 
 
-def _untaggable(data: bytes) -> frozenset[int]:
+def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
+    """Where each bracket that opens stands, and the end of the one that closes it: lines from 0."""
+    found, begun = {}, list[_Point]()
+    for token in tokens:
+        if token.type == tokenize.OP and token.string in "([{":
+            begun.append((token.start[0] - 1, token.start[1]))
+        elif token.type == tokenize.OP and token.string in ")]}":
+            found[begun.pop()] = (token.end[0] - 1, token.end[1])
+    return found
+
+
+def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
     """The lines (from 0) that cannot end in a comment."""
     found = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
     begun: list[int] = []  # lines in which f-strings began that have not ended
-    for token in tokenize.tokenize(io.BytesIO(data).readline):
+    for token in tokens:
         kind = tokenize.tok_name[token.type]
         if kind == "FSTRING_START":
             begun.append(token.start[0])
@@ -176,7 +203,7 @@ def _of_statement(statement: ast.stmt) -> _Pairs:
         ):
             yield from _assigned([target], value)
         case ast.Return(value=ast.expr() as value):
-            yield from _of(value, (AnchorKind.RETURN_VALUE, ast.unparse(value), None))
+            yield from _of(value, (AnchorKind.RETURN_VALUE, _text(value), None))
         case ast.If(test=test) | ast.While(test=test) | ast.Assert(test=test):
             yield from _condition(test)
         case ast.For(target=target, iter=value) | ast.AsyncFor(target=target, iter=value):
@@ -197,13 +224,13 @@ def _of_statement(statement: ast.stmt) -> _Pairs:
 
 
 def _assigned(targets: Sequence[ast.expr], value: ast.expr) -> _Pairs:
-    yield from _of(value, *((AnchorKind.ASSIGNED_VALUE, ast.unparse(target), None) for target in targets))
+    yield from _of(value, *((AnchorKind.ASSIGNED_VALUE, _text(target), None) for target in targets))
     for target in targets:
         yield from _in_target(target)
 
 
 def _condition(test: ast.expr) -> _Pairs:
-    yield from _of(test, (AnchorKind.CONDITION, ast.unparse(test), None))
+    yield from _of(test, (AnchorKind.CONDITION, _text(test), None))
 
 
 def _in_target(target: ast.expr) -> _Pairs:
@@ -234,7 +261,7 @@ def _of(node: ast.expr, *roles: _Role) -> _Pairs:
     if isinstance(node, ast.JoinedStr):
         return
     if isinstance(node, ast.Call):
-        roles = (*roles, (AnchorKind.RESULT, ast.unparse(node.func), None))
+        roles = (*roles, (AnchorKind.RESULT, _text(node.func), None))
     parts = node.elts if isinstance(node, ast.Tuple) else ()
     if not isinstance(node, _NOT_ALONE) and not any(isinstance(p, ast.Slice | ast.Starred) for p in parts):
         yield node, roles
@@ -251,7 +278,7 @@ def _of(node: ast.expr, *roles: _Role) -> _Pairs:
             yield from _condition(test)
             yield from _of(other)
         case ast.NamedExpr(target=target, value=value):
-            yield from _of(value, (AnchorKind.ASSIGNED_VALUE, ast.unparse(target), None))
+            yield from _of(value, (AnchorKind.ASSIGNED_VALUE, _text(target), None))
         case ast.Lambda(body=body):
             yield from _of(body)
         case ast.UnaryOp(operand=ast.Constant()):
@@ -265,7 +292,7 @@ def _of(node: ast.expr, *roles: _Role) -> _Pairs:
 
 
 def _call(node: ast.Call) -> _Pairs:
-    called = ast.unparse(node.func)
+    called = _text(node.func)
     yield from _base(node.func)
     for place, argument in enumerate(node.args, 1):
         yield from _of(argument, (AnchorKind.ARGUMENT, called, str(place)))
@@ -300,7 +327,7 @@ def parts_of(expression: Expression) -> dict[str, object]:
         left = before[0] if len(before) == 1 else ast.BoolOp(node.op, before)
     called, arguments = None, list[str]()
     if isinstance(node, ast.Call):
-        called = ast.unparse(node.func)
+        called = _enclosed(node.func)
         arguments = [ast.unparse(argument) for argument in (*node.args, *node.keywords)]
     sides = [side and _enclosed(side) for side in (left, right)]
     return {"left": sides[0], "right": sides[1], "called": called, "arguments": arguments}

@@ -84,11 +84,17 @@ def active(node: ast.expr) -> bool:
 
 
 class Inactive(ast.NodeTransformer):
-    """What a module does while no fault is active."""
+    """What a module does while no fault is active; `kept` are the expressions whose values are changed."""
+
+    def __init__(self) -> None:
+        self.kept: list[str] = []
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         self.generic_visit(node)
-        return node.orelse if active(node.test) else node
+        if not active(node.test):
+            return node
+        self.kept.append(ast.dump(node.orelse))
+        return node.orelse
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
         self.generic_visit(node)
@@ -125,19 +131,23 @@ def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
 
 
 def check(file: ParsedFile, cases: Sequence[Case]) -> None:
-    """A mutant with these values changed compiles, un-splices, asks the probe once for each, and does
-    what the file does while nothing is active."""
-    check_edits(file, [edit_of(file, case, number) for number, case in enumerate(cases)], cases)
+    """A mutant with these values changed compiles, un-splices, asks the probe once for each, changes the
+    whole of it and no more, and does what the file does while nothing is active."""
+    edits = [edit_of(file, case, number) for number, case in enumerate(cases)]
+    kept = check_edits(file, edits, cases)
+    assert sorted(kept) == sorted(ast.dump(expression.node) for expression, _ in cases), cases
 
 
-def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: object) -> None:
+def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: object) -> list[str]:
     data = joined(apply_edits(file, in_lines(file, edits)))
     assert unsplice(data) == file.data, cases
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)
     asked = [node for node in ast.walk(tree) if isinstance(node, ast.expr) and active(node)]
     assert len(asked) == len(edits), cases
-    assert ast.dump(Inactive().visit(tree)) == ast.dump(ast.parse(file.data)), cases
+    inactive = Inactive()
+    assert ast.dump(inactive.visit(tree)) == ast.dump(ast.parse(file.data)), cases
+    return inactive.kept
 
 
 def checked(names: Sequence[str], count: int) -> int:

@@ -153,6 +153,41 @@ def test_a_changed_line_keeps_the_old_one() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("value", "kept"),
+    [
+        ("(a), b", "((a), b)"),
+        ("(a), (b)", "((a), (b))"),
+        ("(a, b)", "(a, b)"),
+        ("((a), b)", "((a), b)"),
+        ("()", "()"),
+        ("a,", "(a,)"),
+        ("(a, b), a", "((a, b), a)"),
+        ("g(a)[0], (b)", "(g(a)[0], (b))"),
+    ],
+)
+def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
+    """Whatever parentheses its elements have, on one line or on several, and in an index, too."""
+    place = location("return_value", "", function="f")
+    line = changed(f"def f(a, b):\n    return {value}\n", (place, "0")).splitlines()[1]
+    assert line == f'    return (0 if _fi.active("a0") else {kept})  # fi:a0 was:    return {value}'
+    several = changed("def f(a, b):\n    return g(a,\n        1), b\n", (place, "0"))
+    assert ["else (g(a," in several, "1), b))" in several] == [True, True]
+    index = location("value", "(a, b)", function="f")
+    assert 'c[(0 if _fi.active("a0") else ((a), b))]' in changed(
+        "def f(a, b):\n    return c[(a), b]\n", (index, "0")
+    )
+
+
+def test_what_python_cannot_write_has_no_anchor() -> None:
+    """A number of thousands of digits has no text; the rest of its file can be changed."""
+    source = f"def f(a):\n    b = g(0x{'f' * 5000})\n    return a\n"
+    assert 'return (0 if _fi.active("a0") else a)' in changed(
+        source, (location("return_value", "a", function="f"), "0")
+    )
+    assert [one.text for one in parsed(source).expressions["f"]] == ["a"]
+
+
 def test_one_value_in_another_is_refused() -> None:
     """Of two injections into one expression it could not be said which acts on what."""
     with pytest.raises(MutatorError, match="two injections into one expression"):
