@@ -1,5 +1,6 @@
 """Work shared among processes, each a copy of this one; results come in the order of the work."""
 
+import gc
 import os
 import pickle
 import signal
@@ -8,10 +9,19 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from mutator._common.cores import usable_cores
 from mutator.errors import MutatorError
+
+_MOST = 2  # processes: each needs room
+_WORTH = 20_000  # experiments
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+
+def processes_for(experiments: int) -> int:
+    """How many processes are to share what there is to do for so many experiments."""
+    return min(_MOST, usable_cores()) if experiments >= _WORTH else 1
 
 
 def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
@@ -52,6 +62,7 @@ def _work(
     number: int,
 ) -> None:
     """Send what is made of each item, or what was raised, which is the last."""
+    gc.disable()  # what is made has no circles, and a search would copy what the processes share
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all: the first process ends the others
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for receiver, _ in pipes:  # else nobody would notice that the first process is gone

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 from math import inf
+from typing import NamedTuple
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Outcome, Record
@@ -111,6 +112,15 @@ class Course:
         return tuple(name for name, state in self.states.items() if state is State.INJECTED)
 
 
+class Sight(NamedTuple):
+    """All that a course follows from: where the fault was `injected`, the place of the time at which each
+    component left golden, of those that did, and whether it was masked."""
+
+    injected: frozenset[str]
+    order: tuple[tuple[str, int], ...]
+    masked: bool
+
+
 class Ways:
     """Paths of faults through a target.
 
@@ -175,6 +185,16 @@ class Ways:
     def course(self, fault: Fault, record: Record) -> Course | None:
         """The course of an experiment with that fault, the same object for all that have it; None as of
         `path`."""
+        sight = self.sight(fault, record)
+        return sight and self.course_of(sight)
+
+    def course_of(self, sight: Sight) -> Course | None:
+        """The course of experiments of which that was seen."""
+        return self._course(*sight)
+
+    def sight(self, fault: Fault, record: Record) -> Sight | None:
+        """What is seen of an experiment's course; None where the fault was not active, or ended without an
+        outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -183,12 +203,12 @@ class Ways:
             firsts[component] = min(first, firsts.get(component, inf))
         place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
         order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
-        return self._course(self._injected(fault), order, record.outcome is Outcome.MASKED)
+        return Sight(self._injected(fault), order, record.outcome is Outcome.MASKED)
 
     def _course_of(
         self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
     ) -> Course | None:
-        """`order` has the place of the time at which each component left golden, of those that did."""
+        """As `course_of`."""
         way = self._way_of(injected)
         if not way.components:
             return None

@@ -109,6 +109,7 @@ class Results:
 
     def texts(self) -> "pd.DataFrame":
         """A frame of the cells as text, '' where there is nothing, in the order of the table."""
+        import pandas as pd
         import pyarrow as pa  # type: ignore[import-untyped]
         from pyarrow import csv as arrow_csv
 
@@ -125,8 +126,11 @@ class Results:
                 )
         except ValueError as err:
             raise self._no_table(str(err)) from None
-        frame: pd.DataFrame = table.combine_chunks().to_pandas(use_threads=False, self_destruct=True)
-        return frame
+        columns = {}
+        for name in names:  # one at a time, so that no more than one is in memory twice
+            columns[name] = table.select([name]).combine_chunks().to_pandas(use_threads=False)[name]
+            table = table.drop_columns([name])
+        return pd.DataFrame(columns)
 
     def _opened(self) -> BinaryIO:
         try:

@@ -7,10 +7,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from mutator._common.cores import usable_cores
 from mutator._common.files import half_written, read_json, write_json
 from mutator._common.hashing import digest
-from mutator._common.processes import shared
+from mutator._common.processes import processes_for, shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes import propagation
@@ -28,8 +27,6 @@ PROPAGATION = "propagation.parquet"
 TABLES = (CSV, PARQUET, PROPAGATION, TIMINGS_PARQUET)
 SCHEMA, STAMP = "results/1", "results.json"
 _BATCH = 2_000  # experiments that are read before their rows are written
-_WORTH_PROCESSES = 10  # batches
-_PROCESSES = 2  # at most, which share the work on a large table
 
 
 def ensure(run: Path) -> Path:
@@ -91,16 +88,12 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
         if tells_propagation:
             propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))
         batches = _batches(name for name in sorted(planned) if name in records)
-        for lines, table, departures in shared(made, batches, _processes(batches)):
+        for lines, table, departures in shared(made, batches, processes_for(len(records))):
             csv.append(lines)
             parquet.append(table)
             if propagated:
                 propagated.append(departures)
     _write_timings(folder, paths[TIMINGS_PARQUET])
-
-
-def _processes(batches: Sequence[object]) -> int:
-    return min(_PROCESSES, usable_cores()) if len(batches) >= _WORTH_PROCESSES else 1
 
 
 @contextmanager
@@ -175,5 +168,5 @@ def _write_timings(folder: RunFolder, path: Path) -> None:
 
     batches = _batches(sorted(newest))
     with ParquetTable(path, TIMINGS) as file:
-        for table in shared(made, batches, _processes(batches)):
+        for table in shared(made, batches, processes_for(len(newest))):
             file.append(table)

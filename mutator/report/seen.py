@@ -1,13 +1,14 @@
 """What a report needs to know of all experiments beyond their results: read once, kept in columns."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mutator._common.processes import processes_for, shared
 from mutator.model import Record
-from mutator.outcomes.paths import Course, Ways
+from mutator.outcomes.paths import Course, Sight, Ways
 from mutator.outcomes.ranking import places
 from mutator.statistics.times import Alerts
 from mutator.store import plan_file
@@ -16,7 +17,9 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+_PIECE = 5_000  # experiments that are looked at in one go
 PLACE, COURSE = "#place", "#course"  # columns that a frame of results gets; no metric has such a name
+_Alerts = tuple[tuple[str, float], ...]  # of one experiment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,22 +39,18 @@ class Seen:
         cls, folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
     ) -> "Seen":
         """Of a run folder with these results."""
-        faults = plan_file.read_faults(folder.path)
         codes: dict[int, int] = {}  # of courses, which are the same objects for all that have them
         courses: list[Course] = []
         courses_of = np.full(len(texts), -1, dtype=np.int32)
-        alerts: dict[str, tuple[tuple[str, float], ...]] = {}
-        for row, (name, fault) in enumerate(zip(texts["experiment_id"], texts["fault_id"], strict=True)):
-            if name not in records:
-                continue
-            record = records[name]
-            if record.hazards:
-                alerts[name] = record.alerts
-            course = ways.course(faults[fault], record) if ways and fault in faults else None
-            if course is not None:
-                courses_of[row] = code = codes.setdefault(id(course), len(codes))
-                if code == len(courses):
-                    courses.append(course)
+        alerts: dict[str, _Alerts] = {}
+        for number, (sights, told) in enumerate(_looks(folder, texts, records, ways)):
+            alerts |= told
+            for row, sight in enumerate(sights, start=number * _PIECE):
+                course = ways.course_of(sight) if ways and sight else None
+                if course is not None:
+                    courses_of[row] = code = codes.setdefault(id(course), len(codes))
+                    if code == len(courses):
+                        courses.append(course)
         return cls(
             places=places(texts),
             courses_of=courses_of,
@@ -59,6 +58,29 @@ class Seen:
             alerts=alerts,
             timings=timings_of(folder),
         )
+
+
+def _looks(
+    folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
+) -> Iterator[tuple[list[Sight | None], dict[str, _Alerts]]]:
+    """What is seen of each experiment's course, and the alerts of those with a hazard, piece by piece."""
+    faults, pairs = plan_file.read_faults(folder.path), texts[["experiment_id", "fault_id"]]
+
+    def looked_at(piece: "DataFrame") -> tuple[list[Sight | None], dict[str, _Alerts]]:
+        sights: list[Sight | None] = []
+        alerts = {}
+        for name, fault in zip(piece["experiment_id"], piece["fault_id"], strict=True):
+            record, sight = records.get(name), None
+            if record is not None:
+                if record.hazards:
+                    alerts[name] = record.alerts
+                if ways and fault in faults:
+                    sight = ways.sight(faults[fault], record)
+            sights.append(sight)
+        return sights, alerts
+
+    pieces = [pairs[begin : begin + _PIECE] for begin in range(0, len(pairs), _PIECE)]
+    return shared(looked_at, pieces, processes_for(len(pairs)))
 
 
 def timings_of(folder: RunFolder) -> "DataFrame":

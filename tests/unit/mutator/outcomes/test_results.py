@@ -273,7 +273,7 @@ def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
     lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
     lines.close()
     monkeypatch.setattr(results, "_BATCH", batch)
-    monkeypatch.setattr(results, "_processes", lambda batches: processes)
+    monkeypatch.setattr(results, "processes_for", lambda experiments: processes)
     for _ in range(2):
         results.build(folder.path)
         made = {name: (folder.path / name).read_bytes() for name in results.TABLES}
