@@ -118,11 +118,18 @@ class FaultLocation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection:
-    """One fault model applied at one location. `params` are sorted (name, value) pairs."""
+    """One fault model applied at one location. `params` are sorted (name, value) pairs.
+
+    It acts only `where` a condition over names known there holds; and then only in execution number `call`,
+    or in every one whose number `every` divides, counted from when the fault became active.
+    """
 
     location: FaultLocation
     model: str
     params: tuple[tuple[str, Value], ...] = ()
+    where: str | None = added(None)
+    call: int | None = added(None)
+    every: int | None = added(None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,9 +9,10 @@ from pydantic import Field
 
 from mutator._common.text import shown
 from mutator.config import units
+from mutator.config.instances import instance_condition
 from mutator.config.locations import AtModel
 from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.model import FaultLocation
+from mutator.model import FIXED_ANCHORS, AnchorKind, FaultLocation
 
 DIMENSIONLESS = "1"
 _REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
@@ -58,6 +59,9 @@ class InjectionSpec:
     params: tuple[ParamSpec, ...]
     unit: str | None
     keys: Keys
+    where: str | None = None
+    call: int | None = None
+    every: int | None = None
 
 
 class InjectionModel(StrictModel, title="An injection"):
@@ -77,6 +81,22 @@ class InjectionModel(StrictModel, title="An injection"):
         "number that is written in one unit and read as another.",
     )
 
+    where: str | None = Field(
+        None,
+        description="A condition that chooses one instance among several, over names that the function "
+        "knows: `index == 2`, `self.name == 'left'`, `item is self.items[0]`. Names, attributes, items, "
+        "constants, comparisons, `and`, `or`, `not`. It is asked only while the fault is active.",
+    )
+    call: int | None = Field(
+        None,
+        ge=1,
+        description="The fault acts only in this execution of the place, counted from 1 each time that it "
+        "becomes active; with `where`, of those for which that holds.",
+    )
+    every: int | None = Field(
+        None, ge=1, description="The fault acts in every so many executions of the place, counted likewise."
+    )
+
     def injection(self, source: Source, keys: Keys) -> InjectionSpec:
         """The injection; errors point into `source` at `keys`."""
         if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
@@ -92,13 +112,42 @@ class InjectionModel(StrictModel, title="An injection"):
             place = (*keys, "params", key)
             suffix = unit.suffix if unit else None
             params.append(ParamSpec(name=name, unit=suffix, value=_value(value, source, place), keys=place))
+        location = self.at.location(source, (*keys, "at"))
+        self._check_instance(location.anchor.kind, source, keys)
         return InjectionSpec(
-            location=self.at.location(source, (*keys, "at")),
+            location=location,
             model=self.model,
             params=tuple(params),
             unit=self.unit,
             keys=keys,
+            where=None if self.where is None else instance_condition(self.where),
+            call=self.call,
+            every=self.every,
         )
+
+    def _check_instance(self, kind: AnchorKind, source: Source, keys: Keys) -> None:
+        """What chooses among instances and executions must fit the place, and each other."""
+        given = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
+        if given and kind in FIXED_ANCHORS:
+            raise source.error(
+                (*keys, given[0]),
+                f"`{given[0]}` at a {kind.value}",
+                expected="none: it is set for all, once in each step",
+                remedy="leave it out, or anchor where the value is used",
+            )
+        if {"call", "every"} <= set(given):
+            raise source.error(
+                (*keys, "every"), "`call` and `every`", expected="one of them", remedy="leave one out"
+            )
+        try:
+            instance_condition("True" if self.where is None else self.where)
+        except ValueError:
+            raise source.error(
+                (*keys, "where"),
+                shown(self.where),
+                expected="names, attributes, items, constants, comparisons, `and`, `or` and `not`",
+                remedy="ask for something that the function knows, e.g. `where: index == 2`",
+            ) from None
 
 
 def _value(value: Any, source: Source, keys: Keys) -> ParamValue:

@@ -49,7 +49,14 @@ def resolve(
                 expected=schema.about,
                 remedy=f"add {resolver.key(schema)}",
             )
-    return Injection(location=spec.location, model=model.name, params=tuple(sorted(params.items())))
+    return Injection(
+        location=spec.location,
+        model=model.name,
+        params=tuple(sorted(params.items())),
+        where=spec.where,
+        call=spec.call,
+        every=spec.every,
+    )
 
 
 class _Resolver:

@@ -10,7 +10,8 @@ from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site
 from mutator.mutants.expressions import NO_PARTS, Expression, enclosed, parts_of
 from mutator.mutants.imported_names import importers
-from mutator.mutants.probe import ORIGINAL, set_constant, set_default
+from mutator.mutants.limiting import check_instance, limited
+from mutator.mutants.probe import ORIGINAL, asks_for, set_constant, set_default
 from mutator.mutants.rendering import changed_value, snippet
 from mutator.mutants.reusable_changes import reuse_key
 from mutator.mutants.scopes import as_compiled, moved_names
@@ -53,7 +54,8 @@ def injection_edit(
         raise _needs_more(file, model, site.first)
     if model.needs is not None:
         site, texts = written_out(file, site, model.needs)
-    code = snippet(model, dict(injection.params), name, texts)
+    check_instance(file, site.names, site.first, injection)
+    code = limited(snippet(model, dict(injection.params), name, texts), injection, name, model)
     make = guard if model.kind is SnippetKind.GUARD else insertion
     edit = make(file, site, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
@@ -77,8 +79,10 @@ def replaced_value(
 
 def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
     expression, changed = replaced_value(file, model, injection, name)
-    _variables(file, file.names(injection.location), expression.start[0], model, injection)
-    return value_change(file, expression, changed, name)
+    names = file.names(injection.location)
+    _variables(file, names, expression.start[0], model, injection)
+    check_instance(file, names, expression.start[0], injection)
+    return value_change(file, expression, changed, name, asks_for(name, injection))
 
 
 def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
@@ -101,6 +105,8 @@ def _setting(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
 ) -> Edit:
     value, params = file.resolve_fixed(injection.location), dict(injection.params)
+    if model.needs is not None:
+        raise _needs_more(file, model, value.first)
     if model.needs is not None:
         raise _needs_more(file, model, value.first)
     for param in model.params:

@@ -32,10 +32,13 @@ _MARK = "# fi:"
 _TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
 _NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
-_GUARD = re.compile(
-    rf'\s*if (not )?{PROBE_NAME}\.active\("[0-9a-z]+"\)( or {PROBE_NAME}\.steps\(\))?:\Z'.encode()
+_ASKING = (  # what chooses an instance or an execution comes first
+    rf"(?:{PROBE_NAME}\.on\(\) and \(.*?\) and )?"
+    rf'(?P<last>(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
+    rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\))'
 )
-_ASKED = re.compile(rf' if {PROBE_NAME}\.active\("([0-9a-z]+)"\) else '.encode())
+_GUARD = re.compile(rf"\s*if (?:not )?\(?{_ASKING}\)?(?: or {PROBE_NAME}\.steps\(\))?:\Z".encode())
+_ASKED = re.compile(rf" if {_ASKING} else ".encode())
 _SETS = re.compile(rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode())
 _TAGGED_ADDITION = re.compile(rf"^\+.*{_TAG}\r?$", re.MULTILINE)
 _FAULT_ADDITION = re.compile(rf"^\+.*{_MARK}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
@@ -150,7 +153,7 @@ class Tag:
     @property
     def asked_for(self) -> list[str]:
         """The injections whose values a changed line takes only if the probe says so."""
-        return [found.decode() for found in _ASKED.findall(self.code)]
+        return [found["id"].decode() for found in _ASKED.finditer(self.code)]
 
     @property
     def sets(self) -> bool:
@@ -159,9 +162,10 @@ class Tag:
 
     @property
     def changed_parts(self) -> list[tuple[int, int]]:
-        """Where these values stand in the line: from a byte to before another."""
-        ends = [found.start() for found in _ASKED.finditer(self.code)]
-        return [(_last_open(self.code[:end]), end) for end in ends]
+        """Where these values stand in the line, and what chooses an instance: from a byte to before
+        another."""
+        found = _ASKED.finditer(self.code)
+        return [(_last_open(self.code[: one.start()]), one.start("last")) for one in found]
 
 
 def _last_open(code: bytes) -> int:
@@ -195,9 +199,24 @@ def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
     return f"  {_MARK}{'+'.join(ids)} was:".encode() + was
 
 
-def changed_value(tag: str, changed: str) -> str:
-    """What goes before an expression so that it is worth `changed` while the fault is active."""
-    return f'({changed} if {PROBE_NAME}.active("{tag}") else '
+def asks(tag: str) -> str:
+    """How an injected line asks the probe whether to act."""
+    return f'{PROBE_NAME}.active("{tag}")'
+
+
+def asks_for(tag: str, injection: Injection) -> str:
+    """The same of an injection that may be limited to an instance or to some executions: for these it asks
+    only while the fault is active."""
+    asked = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
+    for name in ("call", "every"):
+        if (number := getattr(injection, name)) is not None:
+            asked.append(f'{PROBE_NAME}.{name}("{tag}", {number})')
+    return " and ".join([*asked, asks(tag)])
+
+
+def changed_value(asked: str, changed: str) -> str:
+    """What goes before an expression so that it is worth `changed` when the probe, `asked`, says so."""
+    return f"({changed} if {asked} else "
 
 
 def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:

@@ -16,7 +16,7 @@ from mutator.errors import MutatorError
 from mutator.mutants.anchors import ParsedFile, Site
 from mutator.mutants.expressions import Expression
 from mutator.mutants.fixed_values import FixedValue
-from mutator.mutants.probe import changed_value, import_statement, tag_instead, tag_of, tagged
+from mutator.mutants.probe import asks, changed_value, import_statement, tag_instead, tag_of, tagged
 
 
 class Rank(IntEnum):
@@ -98,13 +98,16 @@ def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
     return Edit(index=value.index, rank=Rank.AFTER_WHOLE, lines=(line,))
 
 
-def value_change(file: ParsedFile, expression: Expression, changed: str, tag: str) -> ValueEdit:
-    """The edit that has `expression` be worth `changed` (source on one line) while the fault is active."""
+def value_change(
+    file: ParsedFile, expression: Expression, changed: str, tag: str, asked: str | None = None
+) -> ValueEdit:
+    """The edit that has `expression` be worth `changed` (source on one line) while the fault is active: when
+    the probe, `asked`, says so."""
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(
         start=expression.start,
         end=expression.end,
-        before=_encoded(file, changed_value(tag, changed) + opened, expression.start[0]),
+        before=_encoded(file, changed_value(asked or asks(tag), changed) + opened, expression.start[0]),
         after=closed.encode(),
         tag=tag,
     )

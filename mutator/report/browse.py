@@ -238,6 +238,7 @@ def _spec(fault: Fault) -> str:
             "at": {"file": i.location.path, "function": i.location.function, **_anchor(i.location.anchor)},
             "model": i.model,
             "params": dict(i.params),
+            **{name: getattr(i, name) for name in ("where", "call", "every") if getattr(i, name) is not None},
         }
         for i in fault.injections
     ]

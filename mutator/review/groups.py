@@ -123,7 +123,15 @@ def injection_label(injection: Injection) -> str:
         f"{name}={value}" if value is None or isinstance(value, str | bool) else name
         for name, value in injection.params
     )
-    return f"{location_label(injection.location)}: {injection.model}({', '.join(given)})"
+    return (
+        f"{location_label(injection.location)}: {injection.model}({', '.join(given)}){_instance(injection)}"
+    )
+
+
+def _instance(injection: Injection) -> str:
+    """Which instances and executions it is limited to, without numbers."""
+    where = f" where {re.sub(_NUMBER, '#', injection.where)}" if injection.where else ""
+    return where + "".join(f", {name}" for name in ("call", "every") if getattr(injection, name) is not None)
 
 
 def trigger_kind(trigger: Trigger) -> str:

@@ -27,7 +27,7 @@ MORE = ("smtpd", "imaplib", "poplib", "socketserver", "xdrlib", "wave", "aifc", 
 MORE += ("dataclasses", "enum", "functools", "glob", "gzip", "logging", "numbers", "operator", "opcode")
 MORE += ("os", "platform", "posixpath", "pydoc", "queue", "quopri", "re", "reprlib", "selectors", "shutil")
 MORE += ("signal", "sndhdr", "socket", "ssl", "stat", "statistics", "stringprep", "subprocess", "tempfile")
-MORE += ("threading", "token", "types", "warnings", "weakref", "webbrowser", "xmlrpc.client", "zipimport")
+MORE += ("threading", "token", "types", "warnings", "weakref", "xmlrpc.client", "zipimport")
 MORE += ("asyncio.streams", "concurrent.futures.process", "curses.ascii", "distutils.dist", "idlelib.config")
 MORE += (
     "importlib.metadata",

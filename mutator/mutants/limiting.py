@@ -1,0 +1,37 @@
+"""Injections into one instance among several, or into some executions: what is asked for before the probe."""
+
+from mutator.config.instances import names_of
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModel
+from mutator.model import Injection
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.probe import asks, asks_for
+
+
+def check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
+    """MutatorError if what chooses the instance asks for a name that the function does not know."""
+    unknown = names_of(injection.where or "True") - names
+    if unknown:
+        raise MutatorError(
+            f"'{min(unknown)}' in `where` is not known in {injection.location.function}",
+            where=file.where,
+            line=first + 1,
+            expected=f"names used there: {', '.join(sorted(names))}",
+            remedy="correct `where`",
+        )
+
+
+def limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
+    """The snippet, asking the probe for one instance or some executions, if the injection has these."""
+    plain, asked = asks(name), asks_for(name, injection)
+    if asked == plain:
+        return code
+    heads = {f"if {plain}:": f"if {asked}:", f"if not {plain}:": f"if not ({asked}):"}
+    if sum(line.count(plain) for line in code) != 1 or not any(line in heads for line in code):
+        raise MutatorError(
+            f"model {model.name}, with these parameters, cannot be limited by `where`, `call` or `every`",
+            where=model.template_path,
+            expected=f"lines that ask the probe once, as `if {plain}:` or `if not {plain}:`",
+            remedy="leave these out, or take another model",
+        )
+    return tuple(heads.get(line, line) for line in code)

@@ -1,0 +1,120 @@
+"""Injections into one instance or some executions, in modules of Python's own library: each is a case."""
+
+import ast
+import random
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import pytest
+
+from mutator.config.instances import instance_condition
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.probe import tag_of
+from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
+
+from .test_value_anchors import FEW, MANY, anchors, models, module
+
+ASKING = ("_fi.on", "_fi.call", "_fi.every", "_fi.active")
+SHAPES = (
+    "{0} == 2",
+    "{0} is {1}",
+    "not {0}.left and {1}[0] != 'x'",
+    "{0} in (1, -2.5, None) or {1}['a'].b",
+    "{0} < {1} <= 3",
+)
+
+
+def statements(file: ParsedFile) -> Iterator[FaultLocation]:
+    """Every statement of a file that assigns and can be guarded."""
+    for function, known in file.functions.items():
+        seen = Counter(name for one in known for s in one.statements if not s.reason for name in s.assigns)
+        for name, count in seen.items():
+            for nth in range(1, count + 1):
+                anchor = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name=name, nth=nth)
+                location = FaultLocation(path=file.path, function=function, anchor=anchor)
+                try:
+                    site = file.resolve(location)
+                except MutatorError:
+                    continue
+                if site.alone and site.first != site.last:
+                    yield location
+
+
+class Inactive(ast.NodeTransformer):
+    """What a module does while no fault is active."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def asks(self, test: ast.expr) -> bool:
+        asked = [test.values[0], test.values[-1]] if isinstance(test, ast.BoolOp) else [test]
+        found = all(isinstance(one, ast.Call) and ast.unparse(one.func) in ASKING for one in asked)
+        self.asked += found
+        return found
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        self.generic_visit(node)
+        return node.orelse if self.asks(node.test) else node
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
+        self.generic_visit(node)
+        guards = isinstance(node.test, ast.UnaryOp) and self.asks(node.test.operand)
+        return node.body if guards else node
+
+
+def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -> Injection:
+    """An injection at the place, for an instance among names that the function knows, or some executions."""
+    value = location.anchor.kind is not AnchorKind.BEFORE_ASSIGN
+    made = Injection(
+        location=location,
+        model="stuck" if value else "omission",
+        params=(("value", 3.0),) if value else (),
+    )
+    names = sorted(file.names(location))
+    if names and random_.random() < 0.8:
+        text = random_.choice(SHAPES).format(random_.choice(names), random_.choice(names))
+        made = replace(made, where=instance_condition(text))
+    number = random_.randrange(1, 100)
+    return replace(made, **random_.choice(({"call": number}, {"every": number}, {})))
+
+
+def check(file: ParsedFile, injection: Injection) -> None:
+    """A mutant compiles, un-splices, and is the module while no fault is active; its line is known to ask."""
+    edit = injection_edit(file, models(), injection, "ab")
+    data = joined(apply_edits(file, in_lines(file, [edit])))
+    assert unsplice(data) == file.data, injection
+    tree, inactive = ast.parse(data), Inactive()
+    compile(tree, "<mutant>", "exec", dont_inherit=True)
+    assert ast.dump(inactive.visit(tree)) == ast.dump(ast.parse(file.data)), injection
+    assert inactive.asked == 1
+    (tag, *_) = [tag for line in data.splitlines() if (tag := tag_of(line))]
+    assert tag.asks_probe if tag.was is None else "_fi.active" in data.decode(file.encoding)
+
+
+def checked(names: Sequence[str], count: int) -> int:
+    """Check so many cases drawn from the modules of these names; how many they were."""
+    files = [file for name in names if (file := module(name))]
+    cases = [(file, location) for file in files for _, location in anchors(file)]
+    guarded = [(file, location) for file in files for location in statements(file)]
+    random_ = random.Random(1)
+    chosen = random_.sample(cases, min(count // 2, len(cases)))
+    chosen += random_.sample(guarded, min(count - len(chosen), len(guarded)))
+    for file, location in chosen:
+        check(file, limited(random_, file, location))
+    return len(chosen)
+
+
+def test_an_instance_is_all_that_differs() -> None:
+    """A mutant that is limited compiles, un-splices to every byte, asks the probe once, and does what the
+    module does while no fault is active."""
+    assert checked(FEW[:2], 130) == 130
+
+
+@pytest.mark.slow
+def test_an_instance_is_all_that_differs_at_large() -> None:
+    """The same of thousands of cases."""
+    assert checked((*FEW, *MANY[:20]), 4000) == 4000

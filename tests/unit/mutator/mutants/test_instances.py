@@ -1,0 +1,186 @@
+"""One instance among several, one execution, every so many: how a mutant asks, and what then acts."""
+
+import types
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.config.instances import instance_condition
+from mutator.config.yaml_files import Source
+from mutator.errors import MutatorError
+from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
+from mutator.mutants import probe as contract
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.rendering import render
+from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
+from mutator.targets.observation import Observation
+from mutator.workspace import Workspace
+
+SOURCE = """def drive(lanes, seen):
+    for index, lane in enumerate(lanes):
+        gap = lane["gap"]
+        seen.append((index, gap))
+    return lanes
+"""
+AFTER = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
+VALUE = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="gap")
+SENT = Anchor(kind=AnchorKind.BEFORE_CALL, name="seen.append")
+
+
+def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any) -> bytes:
+    if model == "offset":
+        target = (("target", "gap"),) if anchor is AFTER else ()
+        given = {"params": (("by", 10.0), *target)} | given
+    location = FaultLocation(path="m.py", function="drive", anchor=anchor)
+    file = parse_file("m.py", SOURCE.encode(), Path("x"))
+    edit = injection_edit(file, clone.fault_models(), Injection(location=location, model=model, **given), "a")
+    data = joined(apply_edits(file, in_lines(file, [probe_import(file, None), edit])))
+    assert unsplice(data) == file.data
+    return data
+
+
+def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list[list[int]], Any]:
+    """What each step saw of three lanes, at these times, with a fault that is active from 1 to 3; the probe's
+    report on it."""
+    nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
+    observation = Observation(location=nowhere, time="t", values=(), derived=())
+    trigger = Trigger(name="test", condition="t >= 1 and t < 3")
+    values = contract.template_values("m", trigger, Hold.WHILE, ("a",), observation, 1.0)
+    fi, models = types.ModuleType("_fi"), clone.fault_models()
+    exec(render(models.probe, values, models.folder / "_fi.py.j2"), vars(fi))
+    names: dict[str, Any] = {"_fi": fi}
+    exec(data.replace(b"import _fi", b"pass"), names)
+    seen = []
+    for t in times:
+        fi.observe(t=t)
+        step: list[tuple[int, int]] = []
+        names["drive"]([{"gap": 1}, {"gap": 2}, {"gap": 3}], step)
+        seen.append([gap for _, gap in step])
+    return seen, fi.report()["injections"]["a"]
+
+
+@pytest.mark.parametrize("anchor", [AFTER, VALUE], ids=["statement", "value"])
+@pytest.mark.parametrize(
+    ("given", "active", "count"),
+    [
+        ({"where": "index == 1"}, [[1, 12, 3], [1, 12, 3]], 2),
+        ({"where": "lane['gap'] in (1, 3) and not index == 0"}, [[1, 2, 13], [1, 2, 13]], 2),
+        ({"where": "index > 5"}, [[1, 2, 3], [1, 2, 3]], 0),
+        ({"call": 2}, [[1, 12, 3], [1, 2, 3]], 1),
+        ({"call": 5}, [[1, 2, 3], [1, 12, 3]], 1),
+        ({"every": 2}, [[1, 12, 3], [11, 2, 13]], 3),
+        ({"where": "index > 0", "every": 3}, [[1, 2, 3], [1, 12, 3]], 1),
+    ],
+)
+def test_what_acts(
+    clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
+) -> None:
+    """An instance is the one for which the condition holds; executions count from the activation, those of
+    the instance alone; only what acted is counted as an activation."""
+    seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
+    assert seen == [[1, 2, 3], *active, [1, 2, 3]]
+    assert told["count"] == count
+
+
+def test_executions_count_anew_in_each_stretch(clone: Workspace) -> None:
+    """The second execution is one of each stretch of activity, and of each run."""
+    seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
+    assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
+    assert told["count"] == 1, "of the newest run"
+
+
+def test_a_guard_leaves_out_one(clone: Workspace) -> None:
+    """A statement is left out for one instance alone."""
+    data = mutant(clone, SENT, "omission", where="index == 0")
+    assert drive(clone, data, (0.0, 1.0, 3.0))[0] == [[1, 2, 3], [2, 3], [1, 2, 3]]
+
+
+def test_how_it_reads(clone: Workspace) -> None:
+    """The target's names are asked only while the fault is active, and the probe counts last."""
+    lines = {
+        AFTER: b'if _fi.on() and (index == 2) and _fi.every("a", 5) and _fi.active("a"):  # fi:a',
+        VALUE: b'gap = (lane["gap"] + 10 if _fi.on() and (index == 2) and _fi.every("a", 5) and '
+        b'_fi.active("a") else lane["gap"])  # fi:a was:        gap = lane["gap"]',
+    }
+    for anchor, line in lines.items():
+        found = mutant(clone, anchor, where="index == 2", every=5).splitlines()
+        assert line in [one.strip() for one in found]
+    guarded = mutant(clone, SENT, "omission", call=3).splitlines()
+    assert b'        if not (_fi.call("a", 3) and _fi.active("a")):  # fi:a guard:1' in guarded
+
+
+def test_tags_know_what_asks(clone: Workspace) -> None:
+    """A line that asks for an instance asks the probe, and what chooses the instance is the injection's."""
+    for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
+        data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
+        tags = [tag for line in data.splitlines() if (tag := contract.tag_of(line)) and tag.id == "a"]
+        assert tags[0].asks_probe
+    data = mutant(clone, VALUE, where="lane['gap'] == 2", every=3)
+    (tag,) = [t for line in data.splitlines() if (t := contract.tag_of(line)) and t.was is not None]
+    assert tag.asked_for == ["a"]
+    ((first, end),) = tag.changed_parts
+    assert tag.code[first:end].endswith(b"""lane["gap"] + 10 if _fi.on() and (lane['gap'] == 2) and """)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "f(x)",
+        "x + 1 == 2",
+        "(y := 2)",
+        "[i for i in x]",
+        "_fi.t == 1",
+        "a = 1",
+        "x == '# fi:a'",
+        "lambda: 0",
+        "",
+    ],
+)
+def test_other_conditions_are_refused(text: str) -> None:
+    """A condition neither calls nor calculates nor sets anything, and does not know the probe."""
+    with pytest.raises(ValueError, match=r".*"):
+        instance_condition(text)
+
+
+def test_unknown_names_and_models_that_ask_twice_are_refused(clone: Workspace) -> None:
+    """A name that the function does not know is told with those that it does; so is a model that acts longer
+    than the fault is active."""
+    with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
+        mutant(clone, AFTER, where="side == 'left'")
+    params = (("per_step", 1.0), ("stays", True), ("target", "gap"))
+    with pytest.raises(MutatorError, match=r"model drift, with these parameters, cannot be limited"):
+        mutant(clone, AFTER, "drift", params=params, call=1)
+
+
+def read(**given: Any) -> InjectionSpec:
+    at = {"file": "m.py", "function": "f", "after_assign": "gap"}
+    model = InjectionModel.model_validate({"at": at, "model": "omission", **given})
+    return model.injection(Source(path=Path("spec.yaml"), data={}, lines={}), ())
+
+
+def test_as_yaml_writes_them() -> None:
+    """A condition is kept as Python writes it, whatever its spaces and quotes."""
+    found = read(where='name=="left"  and not (index < 2)', every=3)
+    assert (found.where, found.call, found.every) == ("name == 'left' and (not index < 2)", None, 3)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"where": "f(x)"}, "f\\(x\\).*expected names, attributes"),
+        ({"where": ""}, "expected names, attributes"),
+        ({"call": 2, "every": 3}, "`call` and `every`; expected one of them"),
+        (
+            {"at": {"file": "m.py", "constant": "C"}, "where": "x == 1"},
+            "`where` at a constant; expected none",
+        ),
+        ({"at": {"file": "m.py", "function": "f", "default": "x"}, "call": 1}, "`call` at a default"),
+    ],
+)
+def test_refused_in_yaml(given: dict[str, Any], words: str) -> None:
+    """What no condition is, what excludes each other, and what is set for all is refused, and says why."""
+    with pytest.raises(MutatorError, match=words):
+        read(**given)
