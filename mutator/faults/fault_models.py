@@ -241,7 +241,7 @@ def _load(path: Path) -> FaultModel:
         about=model.about,
         raises=model.raises,
         needs=Needs(model.needs) if model.needs else None,
-        params=(*params, _TARGET) if kind is SnippetKind.VALUE else params,
+        params=(*params, _TARGET) if kind is SnippetKind.VALUE and model.needs != "call" else params,
         examples=tuple(
             Example(
                 about=example.about,

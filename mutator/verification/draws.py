@@ -6,7 +6,7 @@ from jinja2 import TemplateError
 from jinja2.meta import find_undeclared_variables
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from mutator.faults.fault_models import NAMES, FaultModels
+from mutator.faults.fault_models import NAMES, FaultModels, SnippetKind
 from mutator.faults.injections import Drawn, InjectionSpec, reference
 from mutator.faults.specs import FaultSpec
 from mutator.verification.findings import Finding, Level, Place
@@ -56,6 +56,8 @@ def _of_models(models: FaultModels) -> Iterator[Place]:
             used = find_undeclared_variables(environment.parse(model.template))
         except TemplateError:  # told when it is rendered
             continue
+        if model.kind is SnippetKind.VALUE:
+            used.add("target")  # what is changed at a statement; the template knows it as `original`
         for param in model.params:
             if param.name not in used:
                 what = f"parameter '{param.name}' of model {model.name}: its template does not use it"

@@ -24,7 +24,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
         "vision_output/camera_unavailable",
         "none: People are not simulated",
         "control structure: structure.svg",
-        "all well: 19 causal factors, 24 fault specs",
+        "all well: 22 causal factors, 27 fault specs",
     ):
         assert wanted in answer.out
     assert (nowhere / "structure.svg").read_text().startswith("<svg ")
