@@ -4,7 +4,6 @@ Lines are those of the tree that was run: where the target has changed since, th
 a fault was on, so nothing is shown.
 """
 
-import ast
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -134,24 +133,21 @@ def _marks(
 
 
 def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
-    text = file.data.decode(file.encoding)
-    lines = [line.rstrip("\r\n") for line in text.splitlines(keepends=True)]
-    shown = _joined(_around(ast.parse(file.data), line, len(file.lines)) for line in marks)
-    return MarkedFile(path=file.path, data=file.data, lines=lines, shown=shown, marks=marks)
+    return MarkedFile(
+        path=file.path,
+        data=file.data,
+        lines=[line.rstrip(b"\r\n").decode(file.encoding) for line in file.lines],
+        shown=_joined(_around(file, line) for line in marks),
+        marks=marks,
+    )
 
 
-def _around(node: ast.AST, line: int, count: int) -> range:
+def _around(file: ParsedFile, line: int) -> range:
     """The lines of the outermost function around a line; of one in no function a few around it."""
-    for child in ast.iter_child_nodes(node):
-        if not isinstance(child, ast.stmt) or child.end_lineno is None:
-            continue
-        decorators = getattr(child, "decorator_list", ())
-        first = min(part.lineno for part in (child, *decorators))
-        if first <= line <= child.end_lineno:
-            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
-                return range(first, child.end_lineno + 1)
-            return _around(child, line, count)
-    return range(max(1, line - _AROUND), min(count, line + _AROUND) + 1)
+    function = file.outer_function(line - 1)
+    if function is not None:
+        return range(function.start + 1, function.stop + 1)
+    return range(max(1, line - _AROUND), min(len(file.lines), line + _AROUND) + 1)
 
 
 def _joined(parts: Iterable[range]) -> tuple[range, ...]:

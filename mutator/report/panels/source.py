@@ -145,9 +145,9 @@ def _coloured(file: MarkedFile) -> list[Markup]:
     """The lines of a file as HTML, in the colours that diffs have."""
     made, done = [Markup("")] * len(file.lines), [0] * len(file.lines)
     for line, start, end, name in _parts(file):
-        text = file.lines[line]
-        made[line] += escape(text[done[line] : start]) + _PART.format(name, text[start:end])
-        done[line] = end
+        text, begin = file.lines[line], max(start, done[line])
+        made[line] += escape(text[done[line] : begin]) + _PART.format(name, text[begin:end])
+        done[line] = max(end, begin)
     return [html + escape(text[end:]) for html, text, end in zip(made, file.lines, done, strict=True)]
 
 
