@@ -14,6 +14,8 @@ PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target d
 _NAMELESS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
 _ASSIGNMENTS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
+_NO_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what `ast` says of a text that is none
+
 
 class AtModel(StrictModel, title="A place"):
     """Exactly one anchor is given. It must be found exactly once in the function, in statement position; if
@@ -144,7 +146,7 @@ def is_expression(text: str) -> bool:
     """Whether `text` is an expression of Python, without the probe."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError):
+    except _NO_PYTHON:
         return False
     return not any(isinstance(node, ast.Name) and node.id == PROBE_NAME for node in ast.walk(tree))
 
@@ -154,9 +156,11 @@ def assignable(text: str) -> bool:
     constant or a name."""
     try:
         node: ast.expr = ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, RecursionError):
+        ast.parse(f"({text})", mode="eval")  # a comment would swallow the bracket
+    except _NO_PYTHON:
         return False
-    return isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _is_chain(node)
+    whole = isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _is_chain(node)
+    return whole and text.isprintable()  # so on one line
 
 
 def base_name(text: str) -> str:

@@ -36,6 +36,13 @@ def resolve(
     for param in spec.params:
         schema = resolver.schema(param)
         params[schema.name] = resolver.value(param, schema)
+        if schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET:
+            raise source.error(
+                param.keys,
+                f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
+                expected="none: what is anchored is what changes",
+                remedy="leave it out, or anchor at a statement",
+            )
     for schema in model.params:
         if schema.type == "seed":
             params[schema.name] = int(generator(seed, f"{key}/{schema.name}").random() * 2**53)

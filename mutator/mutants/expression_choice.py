@@ -16,7 +16,7 @@ def as_written(name: str) -> str:
     """The text by which anchors know an expression; a text that is none stays as it is."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
-    except (SyntaxError, ValueError, RecursionError):
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         return name
 
 

@@ -336,9 +336,3 @@ def parts_of(expression: Expression) -> dict[str, object]:
 def _enclosed(node: ast.expr) -> str:
     text = ast.unparse(node)
     return text if isinstance(node, _ATOMS) else f"({text})"
-
-
-def enclosed(text: str) -> str:
-    """An expression's source, in parentheses if a comma beside it could tear it apart."""
-    node = ast.parse(text, mode="eval").body
-    return f"({text})" if isinstance(node, ast.Tuple | ast.NamedExpr | ast.Lambda) else text

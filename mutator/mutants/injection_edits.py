@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site
-from mutator.mutants.expressions import NO_PARTS, Expression, enclosed, parts_of
+from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
 from mutator.mutants.imported_names import importers
 from mutator.mutants.limiting import check_instance, limited
 from mutator.mutants.probe import ORIGINAL, asks_for, set_constant, set_default
@@ -82,7 +82,28 @@ def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name:
     names = file.names(injection.location)
     _variables(file, names, expression.start[0], model, injection)
     check_instance(file, names, expression.start[0], injection)
+    _check_sets_nothing(file, model, expression, changed)
     return value_change(file, expression, changed, name, asks_for(name, injection))
+
+
+def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Expression, changed: str) -> None:
+    """MutatorError if the changed value sets a name that the expression itself does not set."""
+    new = (
+        _set_within(ast.parse(changed, mode="eval")) - _set_within(expression.node) if ":=" in changed else ()
+    )
+    if new:
+        raise MutatorError(
+            f"the template sets '{min(new)}': {changed}",
+            where=file.where,
+            line=expression.start[0] + 1,
+            expected="an expression that sets no name",
+            remedy=f"correct {model.template_path.name}",
+        )
+
+
+def _set_within(node: ast.AST) -> set[str]:
+    """The names that an expression sets by `:=`: they become names of the function."""
+    return {one.target.id for one in ast.walk(node) if isinstance(one, ast.NamedExpr)}
 
 
 def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
@@ -118,7 +139,7 @@ def _setting(
                 expected="no variable: what the probe sets is in no function",
                 remedy=f"leave `{param.name}` out, or anchor in a function",
             )
-    changed = enclosed(changed_value(model, params, name, ORIGINAL, NO_PARTS))
+    changed = changed_value(model, params, name, ORIGINAL, NO_PARTS)
     if value.kind is AnchorKind.CONSTANT:
         of_module = "." not in value.name
         imported = importers(tree, file.path, value.name) if tree and of_module else ()

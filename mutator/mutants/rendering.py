@@ -116,7 +116,7 @@ def snippet(
     MutatorError when the template fails or its result is not whole lines of Python.
     """
     if model.kind is SnippetKind.VALUE:
-        target = str(params["target"])
+        target = str(_checked(next(param for param in model.params if param.name == "target"), params))
         return (
             f'if {PROBE_NAME}.active("{fi}"):',
             f"    {target} = {changed_value(model, params, fi, target)}",
@@ -152,14 +152,15 @@ def changed_value(
     }
     names |= {"fi": fi, "original": original, **(parts or {})}
     text = render(model.expression, names, model.template_path)
-    if not _is_expression(normalized(text, (fi,))):
+    plain = normalized(text, (fi,))
+    if not _is_expression(plain):
         raise MutatorError(
             f"the template gives {text!r}",
             where=model.template_path,
-            expected="one expression on one line",
+            expected="one expression on one line, no comment",
             remedy="correct the template",
         )
-    return text
+    return text if _holds_together(plain) else f"({text})"
 
 
 @lru_cache(maxsize=1024)
@@ -167,9 +168,19 @@ def _is_expression(text: str) -> bool:
     """Whether normalized source is an expression that does not yield, and so is all that it stands for."""
     try:
         tree = ast.parse(text, mode="eval")
+        ast.parse(f"({text})", mode="eval")  # a comment would swallow the bracket
     except (SyntaxError, ValueError, RecursionError):
         return False
     return "\n" not in text and not any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(tree))
+
+
+@lru_cache(maxsize=1024)
+def _holds_together(text: str) -> bool:
+    """Whether an expression is what an `if` behind it takes: all but a tuple, a lambda, another `if`."""
+    whole = ast.parse(f"{text} if 0 else 0", mode="eval").body
+    return isinstance(whole, ast.IfExp) and ast.dump(whole.body) == ast.dump(
+        ast.parse(text, mode="eval").body
+    )
 
 
 def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:

@@ -79,7 +79,8 @@ def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> 
 
     It then un-splices too, since that depends on the tags alone, which are part of the key.
     """
-    lines = "".join(text for *_, text in key).encode(file.encoding).splitlines()
+    texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line may have no end
+    lines = "\n".join(texts).encode(file.encoding).splitlines()
     return compiles(change.filled(lines).data)
 
 

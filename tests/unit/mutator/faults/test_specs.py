@@ -177,6 +177,18 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "17: 'd rel' for 'target'; expected a name as in the source; correct the value",
         ),
         (
+            "params: {by_m: error}",
+            'params: {by_m: error, target: "gap # or so"}',
+            "17: 'gap # or so' for 'target'; expected a name as in the source; correct the value",
+        ),
+        (
+            "after_assign: gap}\n          model: offset\n          unit: m\n          params: {by_m: error}",
+            "assigned_value: gap}\n          model: offset\n          unit: m\n"
+            "          params: {by_m: error, target: gap}",
+            "17: 'gap' for 'target' at `assigned_value`; expected none: what is anchored is what changes; "
+            "leave it out, or anchor at a statement",
+        ),
+        (
             "model: offset\n          unit: m\n          params: {by_m: error}",
             "model: bit_flip\n          params: {bit: 64}",
             "16: 64 for 'bit'; expected at least 0 and at most 63; correct the value",

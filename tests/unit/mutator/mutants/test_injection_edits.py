@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import FaultModels
+from mutator.faults.fault_models import FaultModels, load_fault_models
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, joined
+from mutator.mutants.splicing import apply_edits, in_lines, joined
 from mutator.workspace import Workspace
 
 MODELS = Workspace.find(root=Path(__file__).parents[4]).fault_models()
@@ -53,7 +53,9 @@ def injected(
     place = FaultLocation(path="m.py", function=function, anchor=anchor or Anchor(kind=AnchorKind.ENTRY))
     given = {"value": 1.0, **params} if model == "stuck" else params
     injection = Injection(location=place, model=model, params=tuple(sorted(given.items())))
-    return joined(apply_edits(file, [injection_edit(file, models, injection, "ab12")])).decode()
+    return joined(
+        apply_edits(file, in_lines(file, [injection_edit(file, models, injection, "ab12")]))
+    ).decode()
 
 
 @pytest.mark.parametrize(
@@ -119,6 +121,15 @@ def test_names_of_a_template(models: FaultModels) -> None:
     with pytest.raises(MutatorError, match="set 'z', a name that the function uses"):
         injected(models, "sets", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="z"), target="x")
     assert "z = 1.0" in injected(models, "sets", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="z"), target="z")
+
+
+def test_a_value_that_sets_a_name(tmp_path: Path) -> None:
+    """A template that sets a name within an expression would make it one of the function's own."""
+    templates = Path(shutil.copytree(MODELS.folder, tmp_path / "templates"))
+    (templates / "sign_flip.py.j2").write_text("(limit := -{{ original }})\n")
+    place = Anchor(kind=AnchorKind.RETURN_VALUE)
+    with pytest.raises(MutatorError, match=r"root/m.py:7: the template sets 'limit'"):
+        injected(load_fault_models(templates), "reads", place, "sign_flip")
 
 
 def test_a_name_that_is_imported() -> None:

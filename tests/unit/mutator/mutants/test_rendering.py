@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value
 from mutator.mutants.probe import template_values
-from mutator.mutants.rendering import render, snippet
+from mutator.mutants.rendering import changed_value, render, snippet
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
@@ -132,6 +132,40 @@ def test_a_guard_opens_a_block() -> None:
     assert rendered("if not {{ target }}:\n", SnippetKind.GUARD) == ("if not x:",)
     with pytest.raises(MutatorError, match="a guard's last line must open a block"):
         rendered("x = 1\n", SnippetKind.GUARD)
+
+
+@pytest.mark.parametrize(
+    ("template", "text"),
+    [
+        ("0 if {{ original }} else 1", "(0 if y else 1)"),
+        ("lambda: {{ original }}", "(lambda: y)"),
+        ("{{ original }}, 1", "(y, 1)"),
+        ("({{ original }}), (1)", "((y), (1))"),
+        ("({{ original }}, 1)", "(y, 1)"),
+        ("not {{ original }} or 1", "not y or 1"),
+    ],
+)
+def test_a_value_holds_together(template: str, text: str) -> None:
+    """Beside the `if` that asks the probe, the expression of a template is one: in brackets if it must be."""
+    made = replace(model(template, SnippetKind.VALUE), expression=template)
+    assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
+
+
+@pytest.mark.parametrize("template", ["{{ original }} # why", "1\n", "yield 1", "x = 1", ""])
+def test_a_value_is_an_expression(template: str) -> None:
+    """On one line, and nothing else: a comment would end the line before its time."""
+    made = replace(model(template, SnippetKind.VALUE), expression=template)
+    with pytest.raises(MutatorError, match="expected one expression on one line"):
+        changed_value(made, {"by": 1.0}, "ab12", "y")
+
+
+@pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
+def test_a_target_is_a_name_and_nothing_else(target: Value) -> None:
+    """With a comment in it, an assignment would be none, and the fault would do nothing."""
+    made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
+    for one in (made, model("{{ target }} = {{ target }} + 1")):
+        with pytest.raises(MutatorError, match="for 'target'"):
+            snippet(one, {"target": target, "by": 1.0}, "ab12")
 
 
 CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)

@@ -59,6 +59,30 @@ def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
     assert reusable.filled(lines) == made
 
 
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
+    """So too where a value changes in the line that lines are inserted after, the last one included."""
+    file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
+
+    def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
+        anchor = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="x")
+        value_at = file.resolve_value(FaultLocation(path="m.py", function="f", anchor=anchor))
+        after = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x")
+        site = file.resolve(FaultLocation(path="m.py", function="f", anchor=after))
+        observes = splicing.insertion(file, site, ["_fi.observe(t=x)"], "observe")
+        edits = splicing.in_lines(file, [observes, splicing.value_change(file, value_at, value, name)])
+        pieces = splicing.apply_edits(file, edits)
+        made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
+        reusable = ReusableChange.of(made)
+        assert splicing.unsplice(made.data) == file.data
+        assert always_compiles(file, reusable, reuse_key(file, edits, [name]))
+        return reusable, made, inserted_lines(edits)
+
+    (reusable, *_), (other, made, lines) = changed("00000001", "3.25"), changed("abcdefab", "1e-300")
+    assert reusable == other
+    assert reusable.filled(lines) == made
+
+
 def test_a_change_that_compiles_only_with_some_values() -> None:
     """A change that compiles with these values, but not with all, is not said to compile always."""
     assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
