@@ -26,7 +26,8 @@ A variable keeps its kind: an integer stays an integer where the parameters are 
 
 In the examples, lines with `+` are what the model adds to a source. `_fi` is
 [the probe](../explanation/concepts.md#proof-before-counting): `active` asks whether the trigger holds, and
-`like` gives a number as the variable's kind.
+`like` gives a number as the variable's kind. [Failure modes](../explanation/failure-modes.md) says what each
+model stands for in standards and in the literature.
 """
 
 _DOES = {
