@@ -26,8 +26,9 @@ def plan(
     found = open_workspace(workspace)
     if out is None:
         return make_plan(found, campaign, choices)
-    folder, tally = freeze_and_tell(Planning(found, campaign, choices), Path(out), found)
-    return load_plan(folder, tally)  # knows what a run took, once one was driven here
+    planning = Planning(found, campaign, choices)
+    folder, tally = freeze_and_tell(planning, Path(out), found)
+    return load_plan(folder, tally, planning.told)  # knows what a run took, once one was driven here
 
 
 def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TypeVar
 
-from mutator.campaigns.campaign_model import CampaignModel
+from mutator.campaigns.campaign_model import CampaignModel, SelectionModel
+from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.campaigns.studies import Study, find_study
 from mutator.campaigns.trigger_choice import (
     EVERY_READING,
@@ -24,7 +25,7 @@ _Told = TypeVar("_Told")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
     """Faults taken from the library: specs by glob over `<module>/<fault_type>/<variant>`; or `file`, a spec
-    file, whole.
+    file, whole; or mutants of `operators`, and no spec.
 
     `values` is how many of a variant's values are taken, spread evenly over them in the order of the spec
     (None: all).
@@ -33,6 +34,7 @@ class Selection:
     spec: str
     file: Path | None = None
     values: int | None = None
+    operators: OperatorSelection | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +136,12 @@ def load_campaign(path: Path) -> Campaign:
         scenarios=tuple(model.scenarios),
         setting={reading: tuple(names) for reading, names in model.setting.items()},
         faults=tuple(
-            Selection(spec=item.spec, file=_spec_file(path, item.spec), values=item.values)
+            Selection(
+                spec=item.spec or "",
+                file=_spec_file(path, item.spec or ""),
+                values=item.values,
+                operators=_operators(item),
+            )
             for item in model.faults
         ),
         reading=model.reading,
@@ -153,6 +160,17 @@ def load_campaign(path: Path) -> Campaign:
         chunk=model.chunk,
         after_hazard=model.after_hazard,
         yaml=source,
+    )
+
+
+def _operators(item: SelectionModel) -> OperatorSelection | None:
+    if item.operators is None:
+        return None
+    return OperatorSelection(
+        operators=tuple(dict.fromkeys(item.operators)),
+        places=tuple(item.in_ or ()),
+        sample=item.sample,
+        when=tuple(dict.fromkeys(item.when or When)),
     )
 
 

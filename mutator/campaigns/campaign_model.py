@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
+from mutator.campaigns.operator_selection import When
 from mutator.campaigns.trigger_choice import (
     EVERY_READING,
     MOST,
@@ -13,18 +14,54 @@ from mutator.campaigns.trigger_choice import (
 )
 from mutator.config.yaml_files import StrictModel
 from mutator.model import AfterHazard, Method
+from mutator.operators.names import Operator
 
 
-class _SelectionModel(StrictModel, title="A selection"):
-    """Faults of the library, by the names of their specs, or of a spec file."""
+class SelectionModel(StrictModel, title="A selection"):
+    """Faults of the library, by the names of their specs, or of a spec file; or, without a spec, mutants of
+    `operators`."""
 
-    spec: str = Field(
+    spec: str | None = Field(
+        None,
         description="A glob over `<module>/<fault_type>/<variant>`: `sensor/*`, `sensor/speed/low`; or a "
-        "spec file that is not in the library, by its path from the folder of the campaign: `my_fault.yaml`."
+        "spec file that is not in the library, by its path from the folder of the campaign: `my_fault.yaml`.",
     )
     values: int | None = Field(
         None, ge=1, description="How many of each variant's values, spread evenly; without it, all."
     )
+    operators: list[Annotated[Operator, Field(strict=False)]] | None = Field(
+        None,
+        min_length=1,
+        description="Instead of a spec: the mutants of these [operators](operators.md), in lines that golden "
+        "runs of the campaign's scenarios execute.",
+    )
+    in_: list[str] | None = Field(
+        None,
+        alias="in",
+        min_length=1,
+        description="Of operators: where, `PATH::FUNCTION` or `PATH`, with `*`, and `**` over folders.",
+    )
+    sample: int | None = Field(
+        None,
+        ge=1,
+        description="Of operators: how many mutants, drawn by operator and function; without it, all.",
+    )
+    when: list[Annotated[When, Field(strict=False)]] | None = Field(
+        None,
+        min_length=1,
+        description="Of operators: `permanent` (under the trigger `always`), `transient` (under the "
+        "campaign's other triggers) or, without it, both.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "SelectionModel":
+        if (self.spec is None) == (self.operators is None):
+            raise ValueError("either a `spec` or `operators`")
+        if self.operators is not None and (self.in_ is None or self.values is not None):
+            raise ValueError("`operators` with `in`, and without `values`")
+        if self.operators is None and any((self.in_, self.sample, self.when)):
+            raise ValueError("`in`, `sample` and `when` with `operators` alone")
+        return self
 
 
 MOST_SEEDS = 10_000
@@ -88,7 +125,7 @@ class CampaignModel(StrictModel, title="The file"):
         description="Changes of the manifest that every run is made with, fault-free ones included: one "
         "list, or one for each reading by its name.",
     )
-    faults: list[_SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
+    faults: list[SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
     reading: str | None = Field(
         None,
         description="One of the library's [readings](fault-spec.md#readings); without it, the first. "
@@ -139,6 +176,8 @@ class CampaignModel(StrictModel, title="The file"):
     def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
             raise ValueError("proportional without sample: say how many")
+        if self.proportional and any(one.operators for one in self.faults):
+            raise ValueError("proportional with `operators`: they have a `sample` of their own")
         if (self.seed is None) == (self.seeds is None):
             raise ValueError(
                 "either `seed` or `seeds`" if self.seed is None else "`seed` or `seeds`, not both"

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import Campaign
+from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
+from mutator.campaigns.operator_selection import When
 from mutator.campaigns.sampling import spread
 from mutator.campaigns.trigger_choice import listed_triggers
 from mutator.config.yaml_files import Keys
@@ -16,8 +18,9 @@ from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.specs import FaultSpec
 from mutator.model import Experiment, Fault, Method, Trigger
+from mutator.operators.executed import GoldenDrive
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import at_time, draw_time
+from mutator.triggers.kinds import always, at_time, draw_time
 from mutator.workspace import Workspace
 
 _Numbered = tuple[int, Fault]  # a fault and its place among the values of its variant
@@ -39,6 +42,7 @@ class Expansion:
         self._digests: dict[str, str] = {}
         self._specs: list[tuple[FaultSpec, ...]] = []
         self._models = workspace.fault_models()
+        self._operators = OperatorFaults(manifest, self._models, campaign.limits)
 
     def with_seed(self, seed: int) -> "Expansion":
         """The same with another seed; files that were read are not read again."""
@@ -46,15 +50,24 @@ class Expansion:
         other.seed = seed
         return other
 
+    @property
+    def told(self) -> tuple[str, ...]:
+        """How many mutants of operators there were, and what was left out."""
+        return tuple(self._operators.told)
+
     def experiments(self) -> tuple[Experiment, ...]:
         """All of them, runs of the same scenario and changes side by side (they share a golden run)."""
         self._check_setting()
         faults = self._selected()
+        mutants = self._mutants()
         triggers = self._triggers()
         made = [
             (order, experiment)
             for order, scenario in enumerate(self.campaign.scenarios)
-            for experiment in self._of_scenario(scenario, faults, triggers)
+            for experiment in (
+                *self._of_scenario(scenario, faults, triggers),
+                *self._of_operators(scenario, mutants, triggers),
+            )
         ]
         made.sort(key=lambda item: (item[0], item[1].changes))
         return tuple(experiment for _, experiment in made)
@@ -134,6 +147,8 @@ class Expansion:
         library, files = self._library(), self._files()
         selected: dict[str, _Numbered] = {}
         for i, selection in enumerate(self.campaign.faults):
+            if selection.operators is not None:
+                continue
             variants: dict[str, list[_Numbered]] = {}
             for numbered in files.get(i, library):
                 if i in files or fnmatchcase(numbered[1].spec, selection.spec):
@@ -144,6 +159,27 @@ class Expansion:
                 wanted = spread(len(faults), selection.values or len(faults))
                 selected |= {faults[k][1].id: faults[k] for k in wanted if faults[k][1].id not in selected}
         return list(selected.values())
+
+    def _mutants(self) -> list[OperatorFault]:
+        """The mutants of operators, each once."""
+        found: dict[str, OperatorFault] = {}
+        for i, selection in enumerate(self.campaign.faults):
+            if selection.operators is not None:
+                with self._placed(("faults", i, "in")):
+                    mutants = self._operators.of(selection.operators, self._drives(), self.seed, self.reading)
+                found = {one.fault.id: one for one in mutants} | found
+        return list(found.values())
+
+    def _drives(self) -> dict[str, GoldenDrive]:
+        """The golden run of each scenario, for the lines that it executes."""
+        return {
+            name: GoldenDrive(
+                scenario=self._scenario_file(name),
+                changes=self.campaign.setting_in(self.reading),
+                seed=self.seed,
+            )
+            for name in self.campaign.scenarios
+        }
 
     def _unmatched(self, keys: Keys, pattern: str, library: Sequence[_Numbered] = ()) -> MutatorError:
         whole = f"{pattern}/*"
@@ -183,6 +219,22 @@ class Expansion:
                     trigger = self._trigger(method, scenario, fault, number, row)
                     yield self._experiment(fault, scenario, method, trigger)
 
+    def _of_operators(
+        self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
+    ) -> Iterator[Experiment]:
+        """Permanent ones always, transient ones under the other triggers, in scenarios that come to them."""
+        permanent = always(armed_after_s=self.armed_after_s)
+        for one in mutants:
+            if scenario not in one.scenarios:
+                continue
+            if When.PERMANENT in one.when:
+                yield self._experiment(one.fault, scenario, Method.GUIDED, permanent)
+            if When.TRANSIENT in one.when:
+                number = int(one.fault.id, 16)
+                for made in self._of_scenario(scenario, [(number, one.fault)], triggers):
+                    if made.trigger.condition != permanent.condition:
+                        yield made
+
     def _trigger(self, method: Method, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
         """What a method makes of a context row for one fault."""
         if method is Method.RANDOM:
@@ -215,16 +267,19 @@ class Expansion:
 
     def _scenario_digest(self, scenario: str) -> str:
         if scenario not in self._digests:
-            known = self.workspace.scenarios
-            if scenario not in known:  # a file from anywhere could change, or be another one elsewhere
-                raise self.campaign.error(
-                    self._scenario_keys(scenario),
-                    f"no scenario '{scenario}' in the library",
-                    expected=f"one of {', '.join(known) or 'none'}",
-                    remedy="correct the name, or put the file into the library's scenarios/",
-                )
-            self._digests[scenario] = digest(self.workspace.scenario(scenario).read_bytes())
+            self._digests[scenario] = digest(self._scenario_file(scenario).read_bytes())
         return self._digests[scenario]
+
+    def _scenario_file(self, scenario: str) -> Path:
+        known = self.workspace.scenarios
+        if scenario not in known:  # a file from anywhere could change, or be another one elsewhere
+            raise self.campaign.error(
+                self._scenario_keys(scenario),
+                f"no scenario '{scenario}' in the library",
+                expected=f"one of {', '.join(known) or 'none'}",
+                remedy="correct the name, or put the file into the library's scenarios/",
+            )
+        return self.workspace.scenario(scenario)
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:

@@ -103,6 +103,7 @@ class Plan:
     runs: int
     digest: str  # same campaign, choices, library and scenarios: same digest on every machine
     run_cpu_s: float | None = None
+    told: tuple[str, ...] = ()  # of mutants of operators, in a plan made now: how many, what was left out
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -196,6 +197,11 @@ class Planning:
         """The seed, or the first of several."""
         return self.seeds[0]
 
+    @property
+    def told(self) -> tuple[str, ...]:
+        """How many mutants of operators there were, and what was left out, once the parts were made."""
+        return self._expansion.told
+
     def empty_tally(self) -> Tally:
         """A tally of no part yet."""
         return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
@@ -275,6 +281,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
         canary=canary,
         digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
         runs=sum(part.runs for part in parts),
+        told=planning.told,
     )
 
 
@@ -304,9 +311,10 @@ def _sample(
         ) from None
 
 
-def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
+def load_plan(folder: RunFolder, tally: Tally | None = None, told: tuple[str, ...] = ()) -> Plan:
     """The frozen plan of a run folder (workers read single chunks instead); `tally` is what it comes to, if
-    that is known. Of a very large one no experiment is kept in memory."""
+    that is known, and `told` what was told when it was made. Of a very large one no experiment is kept in
+    memory."""
     head = folder.head
     large = head["experiments"] > _IN_MEMORY
     plan = Plan(
@@ -322,6 +330,7 @@ def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
         runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),
+        told=told,
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # what the cached property would find out, experiment by experiment

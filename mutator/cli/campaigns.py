@@ -127,6 +127,8 @@ def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: di
         right=(2,),
         total=True,
     )
+    for text in made.told:
+        terminal.say(text)
     if len(made.seeds) > 1:
         terminal.say(f"{seeds_text(made.seeds)}: {len(made.goldens())} golden runs, as each seed has its own")
     if shared := len(made.experiments) - made.runs:

@@ -8,7 +8,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
 
@@ -18,9 +18,13 @@ from mutator.faults.expansion import expand
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.faults.specs import FaultSpec
 from mutator.model import Fault, FaultLocation, Injection, Trigger
+from mutator.mutants.anchors import parsed
 from mutator.mutants.building import build
 from mutator.mutants.probe import adds_fault
 from mutator.mutants.readable_diffs import adds_file, file_patches
+from mutator.operators.enumeration import mutations_of
+from mutator.operators.facts import facts_of
+from mutator.operators.names import MODELS, Operator, operator_of
 from mutator.review import groups
 from mutator.review.groups import Shape
 from mutator.targets.manifest import TargetManifest
@@ -46,7 +50,8 @@ class Bound:
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Mutants that differ only in values. `what` is one line: the location, the template and the trigger.
+    """Mutants that differ only in values, or those that an operator makes of a function. `what` is one line:
+    the location, the template and the trigger.
 
     `shapes` are its diffs with holes: more than one if a template writes different lines for different
     numbers. Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None
@@ -156,28 +161,44 @@ class _Catalogue:
     ) -> Group:
         faults = {fault.id: fault for fault, _ in members}
         shapes = groups.shapes((fault.id, what, patches[fault.injections]) for fault in faults.values())
-        fault, trigger = members[0]
+        fault, _ = members[0]
+        injections = tuple(dict.fromkeys(i for one in faults.values() for i in one.injections))
+        kinds = dict.fromkeys(groups.trigger_kind(trigger) for _, trigger in members)
+        holds = dict.fromkeys(groups.hold_of(*member).value for member in members)
+        operator = operator_of(fault)
         return Group(
             id=self._id(what),
             what=what,
-            injections=tuple(map(groups.injection_label, fault.injections)),
-            files=tuple(dict.fromkeys(i.location.path for i in fault.injections)),
-            functions=tuple(dict.fromkeys(i.location.function for i in fault.injections)),
-            models=tuple(dict.fromkeys(injection.model for injection in fault.injections)),
-            trigger=groups.trigger_kind(trigger),
-            hold=groups.hold_of(fault, trigger).value,
+            injections=(what,) if operator else tuple(map(groups.injection_label, fault.injections)),
+            files=tuple(dict.fromkeys(i.location.path for i in injections)),
+            functions=tuple(dict.fromkeys(i.location.function for i in injections)),
+            models=tuple(dict.fromkeys(injection.model for injection in injections)),
+            trigger=" or ".join(kinds),
+            hold=" or ".join(holds),
             shapes=tuple(
                 s.with_named_holes(groups.parameter_values(faults[m]) for m in s.members) for s in shapes
             ),
             faults=tuple(faults.values()),
             triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
             runs=None if runs is None else runs.get(what, 0),
-            bound=self._bound(
+            bound=self._bound_of_operator(fault, operator)
+            if operator
+            else self._bound(
                 sorted({patches[fault.injections] for fault in faults.values()}, key=groups.without_values),
                 [injection.location for injection in fault.injections],
                 {i.model: self.models.get(i.model).template for i in fault.injections},
             ),
         )
+
+    def _bound_of_operator(self, fault: Fault, operator: Operator) -> Bound:
+        """What all the mutants of an operator in a function follow from, whichever were drawn."""
+        at = fault.injections[0].location
+        file, facts = parsed(self.manifest.tree, at.path), facts_of(self.manifest.tree, at.path)
+        changes = [
+            [one.was, one.now] for one in mutations_of(file, facts, at.function, self.models, [operator])
+        ]
+        templates = {one.name: one.template for one in self.models if one.name in MODELS}
+        return replace(self._bound([], [at], templates), diff=content_id(changes))
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:
         """What every mutant has: the probe, its import, and the statement that observes."""

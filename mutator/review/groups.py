@@ -16,6 +16,7 @@ from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
 from mutator.mutants.probe import INJECTION_ID, settings, tagged_additions
 from mutator.mutants.readable_diffs import adds_file, file_patches
+from mutator.operators.names import operator_of
 from mutator.triggers.conditions import TIME, names_in
 
 Span = tuple[int, int, str]  # of a value in a patch: begin, end, name (empty: not known yet)
@@ -102,8 +103,12 @@ def without_values(patch: str) -> str:
 def group_label(fault: Fault, trigger: Trigger) -> str:
     """Where, what and when, in words without values; only mutants with one label can share a shape.
 
-    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap); state, while`.
+    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap); state, while`. The mutants of an
+    operator share one in each function: `pkg/sensor.py Sensor.measure: operator constant`.
     """
+    if operator := operator_of(fault):
+        location = fault.injections[0].location
+        return f"{location.path} {location.function}: operator {operator}"
     when = f"{trigger_kind(trigger)}, {hold_of(fault, trigger).value}"
     return "; ".join((*map(injection_label, fault.injections), when))
 

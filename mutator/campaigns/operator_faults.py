@@ -1,0 +1,74 @@
+"""What a campaign takes of mutation operators: the faults of one selection, where they are driven, and when
+they are active."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from mutator._common.text import counted
+from mutator.campaigns.operator_selection import OperatorSelection, When
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Fault, Limits
+from mutator.operators.chosen import Found, find_mutations, sampled
+from mutator.operators.executed import Executed, GoldenDrive, lines_of
+from mutator.operators.facts import facts_of
+from mutator.operators.mutations import Mutation
+from mutator.targets.manifest import TargetManifest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OperatorFault:
+    """A fault of such a selection, and the scenarios whose golden runs execute its line."""
+
+    fault: Fault
+    when: tuple[When, ...]
+    scenarios: frozenset[str]
+
+
+class OperatorFaults:
+    """The faults of selections, for any seed; what was enumerated is kept for the next one."""
+
+    def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
+        self._manifest, self._models, self._limits = manifest, models, limits
+        self._found: dict[tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], Found] = {}
+        self.told: dict[str, None] = {}  # how many there were and what was left out, each text once
+
+    def of(
+        self, selection: OperatorSelection, drives: Mapping[str, GoldenDrive], seed: int, reading: str
+    ) -> list[OperatorFault]:
+        """The faults of a selection, driven in these scenarios. MutatorError where there are none."""
+        executed = dict(
+            zip(drives, lines_of(self._manifest, list(drives.values()), self._limits), strict=True)
+        )
+        found = self._enumerated(selection, list(executed.values()))
+        drawn = sampled(found, selection.sample, seed)
+        if not drawn:
+            raise MutatorError(
+                f"no mutant in {', '.join(selection.places)} ({found.told})",
+                expected="places with lines that a scenario of the campaign executes",
+                remedy="name other places, operators or scenarios",
+            )
+        draws = f"{counted(len(drawn), 'draw')} of " if len(drawn) < len(found.mutations) else ""
+        self.told[f"{', '.join(selection.places)}: {draws}{found.told}"] = None
+        return [
+            OperatorFault(
+                fault=one.fault(reading),
+                when=selection.when,
+                scenarios=frozenset(name for name in executed if self._runs(one, executed[name])),
+            )
+            for one in drawn
+        ]
+
+    def _enumerated(self, selection: OperatorSelection, executed: Sequence[Executed]) -> Found:
+        files = dict.fromkeys(path for lines in executed for path in lines)
+        union = {path: frozenset().union(*(lines.get(path, ()) for lines in executed)) for path in files}
+        key = (selection, frozenset(union.items()))
+        if key not in self._found:
+            self._found[key] = find_mutations(
+                self._manifest, self._models, selection.operators, selection.places, union
+            )
+        return self._found[key]
+
+    def _runs(self, mutation: Mutation, lines: Mapping[str, Collection[int]]) -> bool:
+        path = mutation.location.path
+        return mutation.line + 1 in facts_of(self._manifest.tree, path).executed(lines.get(path, ()))

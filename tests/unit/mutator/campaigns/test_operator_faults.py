@@ -1,0 +1,134 @@
+"""Campaigns with mutants of operators: what is planned, when it is active, what is refused."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns import operator_faults
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.errors import MutatorError
+from mutator.model import Hold, Limits, Method
+from mutator.operators.executed import Executed, GoldenDrive
+from mutator.review.catalogue import of_plan
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'], sample: 12}"
+
+
+@pytest.fixture(autouse=True)
+def lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a golden run would tell, without driving one: the driver's lines up to the one of its gas."""
+
+    def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
+        return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
+
+    monkeypatch.setattr(operator_faults, "lines_of", known)
+
+
+@pytest.fixture
+def campaign(toycar: Workspace, tmp_path: Path) -> Path:
+    """A campaign of mutants of operators alone, with random times of half a second."""
+    text = toycar.campaign("small").read_text()
+    begin, end = text.index("faults:"), text.index("methods:")
+    text = f"{text[:begin]}faults:\n{ENTRY}\n{text[end:]}".replace("[guided, random]", "[random]")
+    text = text.replace("  table: near_far\n", "  list: [always]\n  hold_s: 0.5\n")
+    path = tmp_path / "operators.yaml"
+    path.write_text(text)
+    return path
+
+
+def _edited(campaign: Path, old: str, new: str) -> Path:
+    text = campaign.read_text()
+    assert old in text
+    campaign.write_text(text.replace(old, new))
+    return campaign
+
+
+def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) -> None:
+    """Each drawn mutant is planned under `always` and at a random time; ids, order and digest are the same
+    each time, and the plan tells what was left out."""
+    plan = make_plan(toycar, campaign)
+    assert len({one.fault.id for one in plan.experiments}) == 12 == len(plan.experiments) / 2
+    found = Counter((one.method, one.trigger.hold) for one in plan.experiments)
+    assert found == {(Method.GUIDED, Hold.TO_END): 12, (Method.RANDOM, Hold.FOR): 12}
+    permanent = [one for one in plan.experiments if one.trigger.name == "always"]
+    assert len(permanent) == 12
+    assert make_plan(toycar, campaign).digest == plan.digest
+    [told] = plan.told
+    assert told.startswith("toycar/driver.py::Driver.*: 12 draws of ")
+    assert "in lines that no golden run executes" in told
+
+
+def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
+    """`when` takes permanent ones or transient ones alone; context rows and specs stand beside them."""
+    _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
+    kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
+    assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
+    _edited(campaign, "when: [permanent]", "when: [transient]")
+    _edited(campaign, "list: [always]", "table: near_far")
+    _edited(campaign, "[random]", "[guided]")
+    kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
+    assert kinds[("operators", "near")] == 2 == kinds[("operators", "far")]
+
+
+def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
+    """The draw follows from the seed: another one takes other mutants."""
+    drawn = [
+        {one.fault.id for one in make_plan(toycar, campaign, Choices(seed=seed)).experiments}
+        for seed in (3, 4)
+    ]
+    assert drawn[0] != drawn[1] and len(drawn[0]) == len(drawn[1])
+
+
+def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
+    """There is a group for each operator in each function, whichever mutants were drawn."""
+
+    def groups(plan: Plan) -> dict[str, object]:
+        return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
+
+    some = groups(make_plan(toycar, campaign))
+    assert set(some) == {
+        f"toycar/driver.py Driver.drive: operator {name}" for name in ("arithmetic", "branch")
+    }
+    _edited(campaign, "sample: 12", "sample: 30")
+    assert groups(make_plan(toycar, campaign)) == some
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("operators: [arithmetic, branch], ", "", "either a `spec` or `operators`"),
+        ("{operators", "{spec: 'sensor/*', operators", "either a `spec` or `operators`"),
+        ("in: ['toycar/driver.py::Driver.*'], ", "", "`operators` with `in`"),
+        ("sample: 12", "sample: 12, values: 3", "without `values`"),
+        ("sample: 12", "sample: 0", "greater than or equal to 1"),
+        ("arithmetic, branch", "arithmetics", "'arithmetic', 'comparison'"),
+        ("sample: 12", "when: [sometimes]", "'permanent' or 'transient'"),
+        ("seed: 3", "seed: 3\nsample: 4\nproportional: true", "a `sample` of their own"),
+    ],
+)
+def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: str) -> None:
+    """What does not go together, and unknown words, are told with file and line."""
+    with pytest.raises(MutatorError, match=r"operators\.yaml:\d+") as caught:
+        load_campaign(_edited(campaign, old, new))
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("toycar/drivers.py", "no Python file 'toycar/drivers.py'"),
+        ("toycar/driver.py::Drive", "no function 'Drive' in"),
+        ("toycar/sensing.py", "no mutant in toycar/sensing.py"),
+    ],
+)
+def test_a_place_without_mutants_is_refused(toycar: Workspace, campaign: Path, place: str, said: str) -> None:
+    """A place that is not there, or that no golden run comes to, is told at the selection's line."""
+    _edited(campaign, "toycar/driver.py::Driver.*", place)
+    with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
+        make_plan(toycar, campaign)
+    assert said in str(caught.value)
