@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from mutator.model import OPERATORS, Fault, FaultLocation, Injection, Value
 from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
-from mutator.operators.names import MODULE, Operator
+from mutator.operators.names import Operator
 
 _LONGEST = 60  # characters of either side of a change
 _AROUND = 20  # of what stays the same at either end of what differs

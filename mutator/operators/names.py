@@ -5,11 +5,10 @@ from enum import StrEnum
 
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
-from mutator.model import Fault
+from mutator.model import OPERATORS, Fault
 
 _OWN = ("constant", "drop", "empty", "infix", "prefix", "swap")
 MODELS = (*(f"operator_{name}" for name in _OWN), "omission")  # fault models that they use
-MODULE = "operators"  # of the faults that operators make
 
 
 class Operator(StrEnum):
@@ -26,7 +25,7 @@ class Operator(StrEnum):
 
 def operator_of(fault: Fault) -> Operator | None:
     """The operator that made a fault, if one did: no spec's name has `::`."""
-    return Operator(fault.fault_type) if fault.module == MODULE and "::" in fault.spec else None
+    return Operator(fault.fault_type) if fault.module == OPERATORS and "::" in fault.spec else None
 
 
 def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
