@@ -35,6 +35,14 @@ GAP = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
 CLOSING = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="closing")
 OFFSET = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="offset")
 SENT = Anchor(kind=AnchorKind.BEFORE_CALL, name="self.publish")
+PUBLISHED = Anchor(kind=AnchorKind.RESULT, name="self.publish")
+GAP_VALUE = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="gap")
+CLOSING_VALUE = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="closing")
+GAS = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="gas")
+AT_LEAST = Anchor(kind=AnchorKind.RESULT, name="max", nth=1)
+WARNED = Anchor(kind=AnchorKind.AFTER_CALL, name="self.warned.append")
+TOO_FAST = Anchor(kind=AnchorKind.CONDITION, name="speed > 30.0")
+OF_DRIVER = (GAS, AT_LEAST, WARNED, TOO_FAST)
 
 MODELS: dict[str, tuple[str, Anchor, dict[str, Value]]] = {
     "offset": ("offset", GAP, {"target": "gap", "by": 30.0, "low": 0.0}),
@@ -52,6 +60,19 @@ MODELS: dict[str, tuple[str, Anchor, dict[str, Value]]] = {
         {"distance_name": "gap", "speed_name": "closing", "distance": 9.0, "speed": -1.0},
     ),
     "bit_flip": ("bit_flip", OFFSET, {"target": "offset", "bit": 62}),
+    "clamp": ("clamp", GAP, {"target": "gap", "high": 20.0}),
+    "infinity": ("infinity", GAP_VALUE, {}),
+    "nan": ("nan", OFFSET, {"target": "offset"}),
+    "none": ("none", PUBLISHED, {}),
+    "quantise": ("quantise", GAP_VALUE, {"step": 7.0}),
+    "reordering": ("reordering", GAS, {}),
+    "repetition": ("repetition", WARNED, {}),
+    "sign_flip": ("sign_flip", CLOSING_VALUE, {}),
+    "slow_call": ("slow_call", AT_LEAST, {"duration": 0.33}),
+    "stale": ("stale", CLOSING_VALUE, {"steps": 9}),
+    "swapped_arguments": ("swapped_arguments", AT_LEAST, {"first": 1, "second": 2}),
+    "unit_mix_up": ("unit_mix_up", GAP_VALUE, {"written_in": "kph", "read_as": "mps"}),
+    "wrong_branch": ("wrong_branch", TOO_FAST, {"holds": "always"}),
     "image_effect": (
         "image_effect",
         GAP,
@@ -78,7 +99,9 @@ TRIGGERS = {
 
 
 def fault(model: str, anchor: Anchor, params: dict[str, Value]) -> Fault:
-    place = FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
+    in_driver = anchor in OF_DRIVER
+    path, function = ("driver", "Driver.drive") if in_driver else ("sensing", "Sensor.sense")
+    place = FaultLocation(path=f"toycar/{path}.py", function=function, anchor=anchor)
     return fault_at(place, model, params)
 
 
@@ -184,7 +207,7 @@ def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Executio
     return execution
 
 
-@pytest.mark.parametrize("model", ["offset", "omission", "image_effect"])
+@pytest.mark.parametrize("model", ["offset", "omission", "image_effect", "reordering", "slow_call"])
 def test_same_bytes(three: Engines, model: str) -> None:
     """A fault that is active in a context gives the reference engine's bytes, without its interpreter."""
     execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), RunMode.FORK)
