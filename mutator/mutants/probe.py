@@ -5,12 +5,10 @@ injected lines asks this module. Code inside a target's process cannot import it
 code needs.
 """
 
-import io
+import ast
 import math
 import re
-import tokenize
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from types import CodeType
 from typing import Any
@@ -34,11 +32,12 @@ _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
 _NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
 _ASKING = (  # what chooses an instance or an execution comes first
     rf"(?:{PROBE_NAME}\.on\(\) and \(.*?\) and )?"
-    rf'(?P<last>(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
-    rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\))'
+    rf'(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
+    rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
 )
 _GUARD = re.compile(rf"\s*if (?:not )?\(?{_ASKING}\)?(?: or {PROBE_NAME}\.steps\(\))?:\Z".encode())
 _ASKED = re.compile(rf" if {_ASKING} else ".encode())
+_OF_EXECUTION = [f"{PROBE_NAME}.{name}" for name in ("call", "every", "active")]
 _SETS = re.compile(rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode())
 _TAGGED_ADDITION = re.compile(rf"^\+.*{_TAG}\r?$", re.MULTILINE)
 _FAULT_ADDITION = re.compile(rf"^\+.*{_MARK}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
@@ -160,24 +159,18 @@ class Tag:
         """Whether the line tells the probe of a value that it is to set while the fault is active."""
         return _SETS.match(self.code) is not None
 
-    @property
-    def changed_parts(self) -> list[tuple[int, int]]:
-        """Where these values stand in the line, and what chooses an instance: from a byte to before
-        another."""
-        found = _ASKED.finditer(self.code)
-        return [(_last_open(self.code[: one.start()]), one.start("last")) for one in found]
 
-
-def _last_open(code: bytes) -> int:
-    """The byte after the last bracket in a line's beginning that is still open there."""
-    lines, opened = io.StringIO(code.decode("utf-8", "replace")), [0]
-    with suppress(tokenize.TokenError, IndentationError):
-        for token in tokenize.generate_tokens(lines.readline):
-            if token.string in ("(", "[", "{"):
-                opened.append(token.end[1])
-            elif token.string in (")", "]", "}") and len(opened) > 1:
-                opened.pop()
-    return len(code.decode("utf-8", "replace")[: opened[-1]].encode())
+def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
+    """What a changed file has in place of values, and what chooses an instance: the injection, the line, the
+    column and that of the end. Lines count from 1, columns in bytes of UTF-8, as in tracebacks."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.IfExp):
+            asked = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
+            own = [
+                one for one in asked if isinstance(one, ast.Call) and ast.unparse(one.func) in _OF_EXECUTION
+            ]
+            if own and isinstance(name := own[0].args[0], ast.Constant):
+                yield str(name.value), node.body.lineno, node.body.col_offset, own[0].col_offset
 
 
 def tag_of(line: bytes) -> Tag | None:

@@ -157,8 +157,8 @@ def changed_value(
         raise MutatorError(
             f"the template gives {text!r}",
             where=model.template_path,
-            expected="one expression on one line, no comment",
-            remedy="correct the template",
+            expected="one expression on one line, no comment, no `yield`",
+            remedy="correct the template, or anchor at an expression that does not yield",
         )
     return text if _holds_together(plain) else f"({text})"
 

@@ -11,17 +11,41 @@ from itertools import dropwhile
 
 from mutator.engines.jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
-from mutator.mutants.probe import Tag, is_probe, tag_of
+from mutator.mutants.probe import Tag, changed_parts, is_probe, tag_of
 
-_Lines = Mapping[str, Sequence[bytes]]  # of the changed files
+_At = tuple[str, int, int]  # file, line, column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Source:
-    """What an exception came out of that is not the target's: an injected line, or (no tag) the probe."""
+    """What an exception came out of that is not the target's: what injections (their `ids`) put into a line,
+    or (no tag) the probe."""
 
     place: str
     tag: Tag | None = None
+    ids: Sequence[str] = ()
+
+
+class _Files:
+    """The changed files of a mutant, as they are found by what was on a stack."""
+
+    def __init__(self, files: Mapping[str, bytes]) -> None:
+        self._files = files
+        self._lines = {path: data.splitlines() for path, data in files.items()}
+
+    def tag_at(self, at: _At) -> Tag | None:
+        """The tag of that line, if it was injected."""
+        file, line = self._lines.get(at[0], ()), at[1]
+        return tag_of(file[line - 1]) if 0 < line <= len(file) else None
+
+    def injected_at(self, at: _At, tag: Tag, in_probe: bool) -> Sequence[str]:
+        """The injections that have the line do what raised there; none: it does what it did, or asks the
+        probe. A changed line does what it did, too."""
+        if tag.was is None:
+            return tag.ids if tag.of_fault and not (in_probe and tag.asks_probe) else ()
+        file, line, column = at
+        parts = changed_parts(self._files[file])
+        return [name for name, there, begin, end in parts if there == line and begin <= column < end]
 
 
 def assign_blame(
@@ -34,12 +58,12 @@ def assign_blame(
     status, detail, raised = execution.status, execution.detail, execution.raised
     if status not in (Status.CRASHED, Status.TIMEOUT):
         return status, detail
-    source = _source(raised, {path: data.splitlines() for path, data in files.items()}) if raised else None
+    source = _source(raised, _Files(files)) if raised else None
     if (source and not source.tag) or (raised and execution.probe is None):
         return Status.HARNESS_ERROR, f"the probe failed: {detail}"
     if not execution.active:
         return Status.HARNESS_ERROR, f"{detail}, before the fault was active"
-    if source and source.tag and not any(name in raising for name in source.tag.ids):
+    if source and source.tag and not any(name in raising for name in source.ids):
         code = source.tag.code.decode("utf-8", "replace").strip()
         return Status.INVALID_MUTANT, f"{source.place}: the injected `{code}` ended the run: {detail}"
     return status, detail
@@ -50,39 +74,25 @@ def error_of(raised: Raised | None) -> RunError | None:
     return RunError(kind=raised.kind, message=raised.message, place=raised.place) if raised else None
 
 
-def _source(raised: Raised, lines: _Lines) -> _Source | None:
+def _source(raised: Raised, files: _Files) -> _Source | None:
     """What the exception came out of; None: the target's own code."""
     own, *others = raised.stacks
     if raised.kind == RecursionError.__name__:  # which call is one too many is chance
-        own = tuple(dropwhile(lambda at: is_probe(at[0]) or _tag_at(at, lines) is not None, own))
-    found = [source for stack in (own, *others) if (source := _on_stack(stack, lines))]
+        own = tuple(dropwhile(lambda at: is_probe(at[0]) or files.tag_at(at) is not None, own))
+    found = [source for stack in (own, *others) if (source := _on_stack(stack, files))]
     return min(found, key=lambda source: source.tag is not None, default=None)  # the probe goes first
 
 
-def _on_stack(stack: Stack, lines: _Lines) -> _Source | None:
+def _on_stack(stack: Stack, files: _Files) -> _Source | None:
     """The innermost line of it that is not the target's. What a helper of the probe cannot do with a value is
     put down to the line that called it, and whether the fault is active to the probe."""
     in_probe = False
     for at in stack:
-        place, tag = f"{at[0]}:{at[1]}", _tag_at(at, lines)
+        place, tag = f"{at[0]}:{at[1]}", files.tag_at(at)
         if is_probe(at[0]):
             in_probe = True
-        elif tag and _is_injected(tag, at[2], in_probe):
-            return _Source(place=place, tag=tag)
+        elif tag and (ids := files.injected_at(at, tag, in_probe)):
+            return _Source(place=place, tag=tag, ids=ids)
         elif in_probe or (tag and tag.was is None):
             return _Source(place=place)
     return _Source(place="") if in_probe else None
-
-
-def _is_injected(tag: Tag, column: int, in_probe: bool) -> bool:
-    """Whether what an injection has the line do is what raised there. A changed line does what it did,
-    too."""
-    if tag.was is None:
-        return tag.of_fault and not (in_probe and tag.asks_probe)
-    return any(first <= column < end for first, end in tag.changed_parts)
-
-
-def _tag_at(at: tuple[str, int, int], lines: _Lines) -> Tag | None:
-    """The tag of that line, if it was injected."""
-    file, line = lines.get(at[0], ()), at[1]
-    return tag_of(file[line - 1]) if 0 < line <= len(file) else None

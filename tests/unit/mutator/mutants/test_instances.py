@@ -121,8 +121,11 @@ def test_tags_know_what_asks(clone: Workspace) -> None:
     data = mutant(clone, VALUE, where="lane['gap'] == 2", every=3)
     (tag,) = [t for line in data.splitlines() if (t := contract.tag_of(line)) and t.was is not None]
     assert tag.asked_for == ["a"]
-    ((first, end),) = tag.changed_parts
-    assert tag.code[first:end].endswith(b"""lane["gap"] + 10 if _fi.on() and (lane['gap'] == 2) and """)
+    ((name, line, first, end),) = contract.changed_parts(data)
+    assert name == "a"
+    assert data.splitlines()[line - 1][first:end].endswith(
+        b"""lane["gap"] + 10 if _fi.on() and (lane['gap'] == 2) and """
+    )
 
 
 @pytest.mark.parametrize(

@@ -92,6 +92,51 @@ def test_a_changed_line_still_does_what_it_did(stack: Stack, status: Status) -> 
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
 
+IN_A_STRING = b"""def say(low):
+    text = '''it's
+    ''' + str((None.x if _fi.active("a0") else low))  # fi:a0 was:    ''' + str(low)
+"""
+LATIN = """# coding: latin-1
+def say(x):
+    return "\xe9\xe9" + (1 / 0 if _fi.active("a0") else x) + []  # fi:a0 was:    return "\xe9\xe9" + x + []
+""".encode("latin-1")
+TWO = b"""def say(x):
+    a = (no() if _fi.active("a0") else x), (1 / 0 if _fi.active("b1") else 1)  # fi:a0+b1 was:    a = x, 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("data", "of_fault"),
+    [(IN_A_STRING, "None.x"), (LATIN, "1 / 0"), (TWO, "no()"), (TWO, "1 / 0")],
+)
+def test_what_raised_is_found_wherever_it_stands(data: bytes, of_fault: str) -> None:
+    """In a line that begins in a string or has letters of another encoding, columns are those of the
+    traceback: bytes of UTF-8. What begins before or after the injection's part is the target's."""
+    encoding = "latin-1" if b"latin" in data else "utf-8"
+    number = 1 + next(n for n, line in enumerate(data.splitlines()) if b"# fi:" in line)
+    line = data.splitlines()[number - 1].decode(encoding)
+    begin = len(line[: line.index(of_fault)].encode())
+    end = len(line[: line.index(" if _fi", line.index(of_fault))].encode())
+    told = {
+        column: assign_blame(execution((("car/radar.py", number, column),)), {"car/radar.py": data}, ())[0]
+        for column in (begin - 2, begin, end - 1, len(line[: line.index(" else ")].encode()))
+    }
+    assert list(told.values()) == [
+        *(Status.CRASHED, Status.INVALID_MUTANT, Status.INVALID_MUTANT, Status.CRASHED)
+    ]
+
+
+def test_each_of_two_in_a_line_answers_for_itself() -> None:
+    """That one injection is there to raise does not excuse the other one in its line."""
+    line = TWO.splitlines()[1]
+    columns = [line.index(b"no()"), line.index(b"1 / 0")]
+    told = [
+        assign_blame(execution((("car/radar.py", 2, column),)), {"car/radar.py": TWO}, ("a0",))[0]
+        for column in columns
+    ]
+    assert told == [Status.CRASHED, Status.INVALID_MUTANT]
+
+
 def test_words() -> None:
     """Who is to blame is said with the line or the reason."""
     told = [
