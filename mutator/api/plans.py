@@ -28,7 +28,7 @@ def plan(
         return make_plan(found, campaign, choices)
     planning = Planning(found, campaign, choices)
     folder, tally = freeze_and_tell(planning, Path(out), found)
-    return load_plan(folder, tally, planning.told)  # knows what a run took, once one was driven here
+    return load_plan(folder, tally)  # knows what a run took, once one was driven here
 
 
 def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:

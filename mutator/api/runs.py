@@ -117,7 +117,8 @@ class Run(RunContents):
             alerts = alerts_by_drive(self.fault_free())
         except (MutatorError, KeyError):  # no target or golden runs here: no alert can be compared
             alerts = None
-        return score_sheet(prepare(texts), self.faults, alerts)
+        told = self.folder.head.get("operators", ())
+        return score_sheet(prepare(texts), self.faults, alerts, told)
 
     def mutation_totals(self) -> Table:
         """The score in total, in few columns. No rows for a run without mutants of operators."""

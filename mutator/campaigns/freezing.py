@@ -156,6 +156,7 @@ def _head(
         "seed": plan.seed,
         **({"seeds": [plan.seeds[0], plan.seeds[-1]]} if len(plan.seeds) > 1 else {}),
         "reading": plan.reading,
+        **({"operators": list(plan.told)} if plan.told else {}),
         "choices": asdict(plan.choices),
         "experiments": tally.experiments,
         "runs": tally.runs,

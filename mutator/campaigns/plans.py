@@ -103,7 +103,7 @@ class Plan:
     runs: int
     digest: str  # same campaign, choices, library and scenarios: same digest on every machine
     run_cpu_s: float | None = None
-    told: tuple[str, ...] = ()  # of mutants of operators, in a plan made now: how many, what was left out
+    told: tuple[str, ...] = ()  # of mutants of operators: how many there were, and what was left out
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -311,10 +311,9 @@ def _sample(
         ) from None
 
 
-def load_plan(folder: RunFolder, tally: Tally | None = None, told: tuple[str, ...] = ()) -> Plan:
+def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
     """The frozen plan of a run folder (workers read single chunks instead); `tally` is what it comes to, if
-    that is known, and `told` what was told when it was made. Of a very large one no experiment is kept in
-    memory."""
+    that is known. Of a very large one no experiment is kept in memory."""
     head = folder.head
     large = head["experiments"] > _IN_MEMORY
     plan = Plan(
@@ -330,7 +329,7 @@ def load_plan(folder: RunFolder, tally: Tally | None = None, told: tuple[str, ..
         runs=head.get("runs", head["experiments"]),
         digest=head["plan"],
         run_cpu_s=measured_cpu_s(folder),
-        told=told,
+        told=tuple(head.get("operators", ())),
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # what the cached property would find out, experiment by experiment

@@ -6,7 +6,7 @@ mutant could not be made, are in no count (`frame.load` has left them out).
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -85,19 +85,24 @@ def _new_alerts(found: pd.DataFrame, golden_alerts: GoldenAlerts) -> list[bool]:
 
 
 def score_sheet(
-    frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
+    frame: pd.DataFrame,
+    faults: Mapping[str, Fault],
+    golden_alerts: GoldenAlerts | None,
+    told: Sequence[str] = (),
 ) -> Sheet:
     """The score in total, by operator and by function, permanent faults beside transient ones; no lines where
     no operator's mutant has a result. `faults` are those of the plan, `golden_alerts` the names of the alerts
-    that the golden runs raise (None: they are not known)."""
+    that the golden runs raise (None: they are not known), `told` how many mutants there were to choose from
+    and what was left out."""
     drives = drives_of(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
     without = f" {missing} of {len(planned)} mutants have no result and are in no count." if missing else ""
+    chosen = f" Chosen in {'; '.join(told)}." if told else ""
     return Sheet(
         name="mutation_score",
         title="Mutation score",
-        note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS) + without,
+        note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS) + chosen + without,
         heads=_HEADS,
         lines=tuple(_lines(drives)),
     )

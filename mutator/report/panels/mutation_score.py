@@ -28,7 +28,10 @@ def score_panel(run: ReportedRun) -> Panel | None:
         return None
     runs = run.fault_free()
     score = score_sheet(
-        run.frame, plan_file.read_faults(run.folder.path), alerts_by_drive(runs) if runs else None
+        run.frame,
+        plan_file.read_faults(run.folder.path),
+        alerts_by_drive(runs) if runs else None,
+        run.folder.head.get("operators", ()),
     )
     write_sheets([score], run.out)
     html = rendered(_HTML, score=score, general=_part(score, False), functions=_part(score, True))

@@ -8,7 +8,8 @@ import pytest
 
 from mutator.campaigns import operator_faults
 from mutator.campaigns.campaign_files import load_campaign
-from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import Choices, Plan, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
 from mutator.operators.executed import Executed, GoldenDrive
@@ -61,6 +62,14 @@ def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) 
     [told] = plan.told
     assert told.startswith("toycar/driver.py::Driver.*: 12 draws of ")
     assert "in lines that no golden run executes" in told
+
+
+def test_a_run_folder_keeps_what_was_left_out(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
+    """What the plan told when it was made is known of the frozen one; other plans have no such key."""
+    plan = make_plan(toycar, campaign)
+    folder = freeze(plan, tmp_path / "run", toycar)
+    assert load_plan(folder).told == plan.told == tuple(folder.head["operators"])
+    assert "operators" not in freeze(make_plan(toycar, "small"), tmp_path / "other", toycar).head
 
 
 def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
