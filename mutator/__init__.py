@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         check_target,
         doctor,
         draw_control_structure,
+        find_places,
         init_library,
         upgrade_manifest,
     )
@@ -60,6 +61,7 @@ _HOMES = {
         "check_target",
         "doctor",
         "draw_control_structure",
+        "find_places",
         "init_library",
         "upgrade_manifest",
     ),
@@ -125,6 +127,7 @@ __all__ = [
     "compare",
     "doctor",
     "draw_control_structure",
+    "find_places",
     "init_library",
     "load_review",
     "load_run",

@@ -9,6 +9,8 @@ from mutator._common.files import write_atomic
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
+from mutator.mutants.anchors import parsed
+from mutator.mutants.listed_places import ListedPlace, places_of
 from mutator.onboarding.marks import unfilled
 from mutator.onboarding.new_library import write_library_for
 from mutator.onboarding.survey import look_at
@@ -16,6 +18,7 @@ from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
 from mutator.targets import manifest_files
+from mutator.targets.locations import check_file
 from mutator.targets.upgrade import Upgrade
 from mutator.verification import fast_engines, library
 from mutator.verification.doctor import examine
@@ -65,6 +68,21 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
     """
     found = open_workspace(workspace)
     return library.check_library(found, found.target_name(target))
+
+
+def find_places(
+    where: str, workspace: WorkspaceLike = None, *, target: str | None = None
+) -> list[ListedPlace]:
+    """Where faults can be injected in a file of the target, or (`FILE::FUNCTION`) in one of its functions:
+    line, anchor and fault models of each place, from the top of the file to its end.
+
+    MutatorError for a file in which no fault may be, and for a function that it does not have.
+    """
+    found = open_workspace(workspace)
+    manifest = found.manifest(found.target_name(target))
+    path, _, function = where.partition("::")
+    check_file(manifest, path)
+    return places_of(parsed(manifest.tree, path), found.fault_models(), function or None)
 
 
 def check_target(

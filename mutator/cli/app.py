@@ -29,6 +29,7 @@ from mutator.cli import (
     hazard_analysis,
     library,
     new_library,
+    places,
     reviews,
     run_folders,
 )
@@ -54,7 +55,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "init", "upgrade", "stpa", "check", "doctor", "cache")),
+    ("Look around", ("list", "places", "init", "upgrade", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before they run", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
@@ -120,6 +121,7 @@ for module in (
     library,
     new_library,
     hazard_analysis,
+    places,
     faults,
     reviews,
     campaigns,

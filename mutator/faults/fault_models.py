@@ -1,5 +1,6 @@
 """Fault models: what a fault does to a statement. Each is a Jinja2 template and a YAML, no Python."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -27,6 +28,7 @@ ParamType = Literal[
     "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
 ]
 NAMES = ("variable", "import")
+_PARTS = re.compile(r"\b(?:left|right|called|arguments)\b")
 
 
 class SnippetKind(StrEnum):
@@ -110,6 +112,11 @@ class FaultModel:
     def param(self, name: str) -> ParamSchema | None:
         """The parameter `name`, if the model has it."""
         return next((p for p in self.params if p.name == name), None)
+
+    @property
+    def parts(self) -> frozenset[str]:
+        """The parts of an expression that the template of its value asks for beside the whole."""
+        return frozenset(_PARTS.findall(self.expression or ""))
 
     def changes_nothing(self, params: Mapping[str, object]) -> bool:
         """Whether these values leave everything as it is; one with a bound may not."""

@@ -108,11 +108,11 @@ def _set_within(node: ast.AST) -> set[str]:
 
 def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     wanted = {
+        None: f"an expression that has {', '.join(sorted(model.parts))}",
         Needs.CALL: "a call: an anchor `result`, or another whose expression is a call",
         Needs.STATEMENT: "a statement, or an expression in a function",
         Needs.NEXT_STATEMENT: "a statement, and another one after it",
     }
-    assert model.needs is not None
     return MutatorError(
         f"model {model.name} needs more than this anchor has",
         where=file.where,
@@ -126,9 +126,7 @@ def _setting(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
 ) -> Edit:
     value, params = file.resolve_fixed(injection.location), dict(injection.params)
-    if model.needs is not None:
-        raise _needs_more(file, model, value.first)
-    if model.needs is not None:
+    if model.needs is Needs.CALL or model.parts:
         raise _needs_more(file, model, value.first)
     for param in model.params:
         if param.type == "variable" and params.get(param.name) is not None:

@@ -84,7 +84,7 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
 
 def check(file: ParsedFile, injection: Injection) -> None:
     """A mutant compiles, un-splices, and is the module while no fault is active; its line is known to ask."""
-    edit = injection_edit(file, models(), injection, "ab")
+    edit = injection_edit(file, models(), injection, "0a1b2c3d")
     data = joined(apply_edits(file, in_lines(file, [edit])))
     assert unsplice(data) == file.data, injection
     tree, inactive = ast.parse(data), Inactive()

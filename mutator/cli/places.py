@@ -1,0 +1,78 @@
+"""`places`: where in a file faults can be injected, in the words of a spec, and with which models."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+import yaml
+
+import mutator
+from mutator._common.text import counted
+from mutator.cli.console import Terminal
+from mutator.cli.options import Json, Manifest, Place, with_place
+
+if TYPE_CHECKING:
+    from mutator.mutants.listed_places import ListedPlace
+
+PLACES_EXAMPLES = """\b
+Examples:
+  mutator places pkg/sensor.py                      every place of the file
+  mutator places pkg/sensor.py::Sensor.measure      those of one function
+  mutator places pkg/sensor.py --json               the same for a program
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    app.command("places", epilog=PLACES_EXAMPLES)(list_places)
+
+
+@with_place
+def list_places(
+    where: Annotated[
+        str, typer.Argument(metavar="FILE[::FUNCTION]", help="A file of the target, and a function in it.")
+    ],
+    manifest: Manifest = None,
+    as_json: Json = False,
+    *,
+    place: Place,
+) -> None:
+    """List where faults can be injected, and with which models.
+
+    Each line has an anchor as a spec writes it at `at`: a statement, a value that is changed where it
+    stands, a constant, or a default.
+    """
+    terminal = Terminal(as_json)
+    found = mutator.find_places(where, place.workspace(), target=manifest)
+    if as_json:
+        terminal.emit([{"line": one.line, "at": one.at, "models": one.models} for one in found])
+        return
+    _print(terminal, found)
+
+
+def _print(terminal: Terminal, found: Sequence["ListedPlace"]) -> None:
+    """A table of the places; sets of models have letters, told at the end."""
+    letters: dict[tuple[str, ...], str] = {}
+    rows = []
+    for one in found:
+        letter = letters.setdefault(one.models, _letter(len(letters)))
+        rows.append([one.line, _yaml(one.at), letter])
+    terminal.table(["line", "at", "models"], rows, right=[0])
+    terminal.say()
+    for models, letter in letters.items():
+        terminal.say(f"{letter}: {', '.join(models)}")
+    terminal.say(f"{counted(len(found), 'place')} on {counted(len({one.line for one in found}), 'line')}")
+
+
+def _letter(number: int) -> str:
+    """A, B, ..., Z, AA, AB, ..."""
+    tens, ones = divmod(number, 26)
+    return (_letter(tens - 1) if tens else "") + chr(ord("A") + ones)
+
+
+def _yaml(at: Mapping[str, Any]) -> str:
+    """The anchor on one line of YAML, without the file, which is the same for all."""
+    told = {key: value for key, value in at.items() if key != "file"}
+    line = yaml.safe_dump(told, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True)
+    return str(line).strip()

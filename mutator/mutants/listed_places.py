@@ -1,0 +1,159 @@
+"""Every place of a file where a fault can be injected, as a spec names it, and the fault models for each."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mutator._common.text import suggestion
+from mutator.config.locations import assignable, dotted_name
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
+from mutator.model import Anchor, AnchorKind, FaultLocation
+from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
+from mutator.mutants.scopes import as_compiled
+from mutator.mutants.statement_texts import written_out
+
+_OF_OPERATORS = "operator_"  # models that mutation operators use, which find their own places
+_VERBS = {
+    "assign": (AnchorKind.BEFORE_ASSIGN, AnchorKind.AFTER_ASSIGN),
+    "call": (AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL),
+    "return": (AnchorKind.BEFORE_RETURN,),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListedPlace:
+    """A place: its line (from 1), the location, and the names of the fault models that work there."""
+
+    line: int
+    location: FaultLocation
+    models: tuple[str, ...]
+
+    @property
+    def at(self) -> dict[str, Any]:
+        """What a spec writes at `at`."""
+        location, anchor = self.location, self.location.anchor
+        found: dict[str, Any] = {"file": location.path}
+        found |= {"function": location.function} if location.function else {}
+        found[anchor.kind.value] = anchor.name if anchor.kind is not AnchorKind.ENTRY else True
+        if anchor.which is not None:
+            found["which"] = int(anchor.which) if anchor.which.isdecimal() else anchor.which
+        return found | ({"nth": anchor.nth} if anchor.nth is not None else {})
+
+
+def places_of(file: ParsedFile, models: FaultModels, function: str | None = None) -> list[ListedPlace]:
+    """All places of a file, or of one of its functions, from its top to its end: a statement under each name
+    that it assigns or calls, an expression under the most telling of its anchors.
+
+    MutatorError with the file's functions if it has none of that name.
+    """
+    lister = _Lister(file, [model for model in models if not model.name.startswith(_OF_OPERATORS)])
+    names = tuple(file.functions) if function is None else (_known(file, function),)
+    found = [place for name in names for place in lister.of_function(name)]
+    found += lister.fixed(None if function is None else names[0])
+    return sorted(found, key=lambda place: place.line)
+
+
+def _known(file: ParsedFile, function: str) -> str:
+    name = as_compiled(function.replace(".<locals>", ""))
+    if name not in file.functions:
+        known = list(file.functions)
+        raise MutatorError(
+            f"no function '{function}'",
+            where=file.where,
+            expected=f"one of {', '.join(known) or 'none: the file has no function'}",
+            remedy="correct the qualified name" + suggestion(name, known),
+        )
+    return name
+
+
+class _Lister:
+    def __init__(self, file: ParsedFile, models: Sequence[FaultModel]) -> None:
+        self.file = file
+        self.models = models
+
+    def of_function(self, name: str) -> Iterator[ListedPlace]:
+        """Places of the functions of this name."""
+        functions = self.file.functions[name]
+        for i, function in enumerate(functions):
+            if function.entry is not None:
+                yield from self.statement(name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None)
+        for verb, kinds in _VERBS.items():
+            statements = [s for f in functions for s in f.statements if not s.reason]
+            count, seen = (Counter[str]() for _ in range(2))
+            count.update(one for s in statements for one in s.names(verb))
+            for statement in statements:
+                names = statement.names(verb)
+                seen.update(names)
+                told = [one for one in names if writable(one)]
+                for one in told[-1:] if verb == "return" else told:
+                    for kind in kinds:
+                        yield from self.statement(name, kind, one, seen[one] if count[one] > 1 else None)
+        yield from self.values(name)
+
+    def statement(self, function: str, kind: AnchorKind, name: str, nth: int | None) -> Iterator[ListedPlace]:
+        location = self.location(function, Anchor(kind=kind, name=name, nth=nth))
+        try:
+            site = self.file.resolve(location)
+        except MutatorError:
+            return  # it shares its line, or there is nothing after it
+        models = tuple(model.name for model in self.models if self.fits(model, kind, site))
+        if models:
+            yield ListedPlace(
+                line=min(site.first, len(self.file.lines) - 1) + 1, location=location, models=models
+            )
+
+    def fits(self, model: FaultModel, kind: AnchorKind, site: Site) -> bool:
+        """Whether a model works at a statement."""
+        if model.needs is Needs.CALL or (
+            model.kind is SnippetKind.VALUE and kind is not AnchorKind.AFTER_ASSIGN
+        ):
+            return False
+        if model.kind is SnippetKind.VALUE and model.parts:
+            return False
+        if model.kind is SnippetKind.GUARD and (site.first == site.last or not site.alone or site.after):
+            return False
+        if model.needs is not None:
+            try:
+                written_out(self.file, site, model.needs)
+            except MutatorError:
+                return False
+        return True
+
+    def values(self, function: str) -> Iterator[ListedPlace]:
+        known = self.file.expressions.get(function, ())
+        count = Counter(role for one in known for role in dict.fromkeys(one.roles))
+        seen = Counter[Any]()
+        for one in known:
+            kind, name, which = role = one.roles[0]
+            seen.update(dict.fromkeys(one.roles, 1))
+            nth = seen[role] if count[role] > 1 else None
+            location = self.location(function, Anchor(kind=kind, name=name, which=which, nth=nth))
+            models = tuple(model.name for model in self.models if changes(model, one))
+            yield ListedPlace(line=one.start[0] + 1, location=location, models=models)
+
+    def fixed(self, function: str | None) -> Iterator[ListedPlace]:
+        models = tuple(model.name for model in self.models if changes(model, None))
+        for one in self.file.fixed:
+            if one.reason is None and function in (None, one.function):
+                location = self.location(one.function, Anchor(kind=one.kind, name=one.name))
+                yield ListedPlace(line=one.first + 1, location=location, models=models)
+
+    def location(self, function: str, anchor: Anchor) -> FaultLocation:
+        return FaultLocation(path=self.file.path, function=function, anchor=anchor)
+
+
+def writable(name: str) -> bool:
+    """Whether a spec may write this name of a statement: `None` is none."""
+    return not name or dotted_name(name) or assignable(name)
+
+
+def changes(model: FaultModel, expression: Expression | None) -> bool:
+    """Whether a model changes the value of an expression; None: of a constant or default."""
+    if model.expression is None:
+        return False
+    parts = parts_of(expression) if expression else NO_PARTS
+    needed = {"called"} if model.needs is Needs.CALL else set()
+    return all(parts[name] is not None and parts[name] != [] for name in needed | model.parts)
