@@ -23,8 +23,11 @@ from mutator.triggers.conditions import TIME, check_condition, to_code
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
 ORIGINAL = "original"  # what a line that sets a value calls it as the program has it
-# in quotes, in a name or in a tag: a number of eight digits is none
-INJECTION_ID = r"(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
+# in quotes, in a name or in a tag, which may have several: a number of eight digits is none
+INJECTION_ID = (
+    r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
+    r"|(?<=[0-9a-f]\+)[0-9a-f]{8}(?=(?:\+[0-9a-f]{8})* was:))"
+)
 
 _MARK = "# fi:"
 _TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"

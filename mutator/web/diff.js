@@ -11,12 +11,12 @@ const Diff = (() => {
       "lambda nonlocal not or pass raise return try while with yield True False None self").split(" "));
   const TAGS = JSON.parse(document.getElementById("tags").textContent);
   const MARK = TAGS.mark.replace(/[^\w\s]/g, "\\$&");
-  const TAG = new RegExp(`${MARK}\\S+.*$`);
+  const TAG = new RegExp(`${MARK}\\S+[^\\n]*$`);
   // What the probe needs to be called at all is the same in every mutant.
   const PROBE = new RegExp(`${MARK}(?:${TAGS.probe.join("|")})\\b`);
   // In this order: holes of a shape, the tag of an injected line, comment, strings (whole or to the line's end), number, word.
   const REST =
-    /(#.*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/;
+    /(#[^\n]*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/;
   const TOKENS = new RegExp(`(⟨[^⟩]*⟩)|(${TAG.source})|${REST.source}`, "g");
   const CLASSES = [null, "hole", "tag", "comment", "string", "number", "word"];
 
@@ -24,7 +24,7 @@ const Diff = (() => {
   function parse(patch) {
     const files = [];
     let file = null, hunk = null, left = 0, right = 0;
-    for (const line of patch.split("\n")) {
+    for (const line of patch.split(/\r?\n/)) {
       if (line.startsWith("diff --git ")) {
         file = { path: line.split(" b/").pop(), isNew: false, hunks: [] };
         files.push(file);

@@ -111,3 +111,13 @@ def test_pristine_lines_are_never_cut() -> None:
     assert without_values(patch).count("\0") == 2
     assert without_values(patch) != without_values(patch.replace("x = 3", "x = 5"))
     assert without_values(patch) == without_values(patch.replace("y = 4", "y = -5.5e-7"))
+
+
+def test_a_tag_of_several_injections_has_no_numbers() -> None:
+    """Mutants that change the same two values in a line are alike, whatever the ids in its tag."""
+    patch = (
+        "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,1 @@\n-x = y, z\n"
+        '+x = (0 if _fi.active("0123456a") else y), (0 if _fi.active("0123456b") else z)'
+        "  # fi:0123456a+0123456b was:x = y, z\n"
+    )
+    assert without_values(patch) == without_values(patch.replace("012345", "fedcba"))
