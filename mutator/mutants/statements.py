@@ -1,7 +1,7 @@
 """What a function's statements assign, call and return, and the lines they are on."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import libcst as cst
@@ -190,7 +190,7 @@ class _Collector(cst.CSTVisitor):
         decorators = first.decorators if isinstance(first, cst.FunctionDef | cst.ClassDef) else ()
         opens = min(self.positions[one].start.line for one in (first, *decorators)) - 1
         line = self.positions[target].start.line - 1
-        statements.append(Statement(first=line, last=opens, assigns=tuple(names), opens=opens))
+        statements.append(Statement(first=line, last=opens, assigns=tuple(_that_stay(names)), opens=opens))
 
     def _add_other(self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False) -> None:
         statements = self.open[-1] if self.open else None
@@ -236,8 +236,19 @@ def _effects(
     if isinstance(small, cst.Return):
         returned = called or dotted(small.value)
         returns = ["", returned] if returned else [""]
-    unique = tuple(dict.fromkeys(assigns))
+    unique = tuple(_that_stay(assigns))
     return unique, (called,) if called else (), tuple(returns)
+
+
+def _that_stay(names: Sequence[str]) -> Iterator[str]:
+    """The names that are assigned to, each once, but for items of which something is assigned to after them:
+    in `a[i], i = 1, 2` the item is another one then."""
+    unique = list(dict.fromkeys(names))
+    for place, name in enumerate(unique, 1):
+        parts = ast.walk(ast.parse(name, mode="eval")) if "[" in name else ()
+        within = {ast.unparse(part) for part in parts if isinstance(part, ast.expr)}
+        if within.isdisjoint(unique[place:]):
+            yield name
 
 
 def _targets(node: cst.CSTNode) -> list[str]:

@@ -84,6 +84,26 @@ def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line
     assert lines(kind, name, nth=nth) == (line, line)
 
 
+@pytest.mark.parametrize(
+    ("targets", "named"),
+    [
+        ("a[i], i", ["i"]),
+        ("i, a[i]", ["i", "a[i]"]),
+        ("self.x[self.i], self.i", ["self.i"]),
+        ("a[0], b, a", ["b", "a"]),
+        ("a['i'], i, a[j]", ["a['i']", "i", "a[j]"]),
+    ],
+)
+def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]) -> None:
+    """What an index was is not known afterwards if the same statement sets it after the item."""
+    for source in (
+        f"def f(self):\n    {targets} = g()\n",
+        f"def f(self):\n    for {targets} in g():\n        h()\n",
+    ):
+        (function,) = parsed(source).functions["f"]
+        assert [name for one in function.statements for name in one.assigns] == named
+
+
 def test_functions_are_found_by_qualified_name() -> None:
     """Nested functions have their own statements, with `<locals>` or without."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
