@@ -13,6 +13,7 @@ _SMALL = (
     ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return | ast.Delete | ast.Raise | ast.Assert
 )
 _SMALL |= ast.Pass | ast.Break | ast.Continue
+_LAST = ast.Return | ast.Raise | ast.Break | ast.Continue
 _BLOCKS = ("body", "orelse", "finalbody")
 
 
@@ -25,6 +26,8 @@ def written_out(file: ParsedFile, site: Site, needs: Needs) -> tuple[Site, dict[
     anchored, following = _small_statements(file.data).get(site.first, (None, None))
     if anchored is None or site.first == site.last or not site.alone:
         raise _unfit(file, site, "no statement that is alone on its lines is anchored here")
+    if isinstance(anchored, _LAST):
+        raise _unfit(file, site, f"`{ast.unparse(anchored)}` is the last thing that its block does")
     texts = {"statement": _one_line(file, site, anchored)}
     if needs is Needs.NEXT_STATEMENT:
         if following is None:

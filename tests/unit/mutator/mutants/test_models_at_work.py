@@ -193,6 +193,12 @@ def test_no_statement_to_repeat(toy: Make) -> None:
         toy("def f(x):\n    return x\n", AnchorKind.ENTRY, "", "repetition")
 
 
+def test_a_return_is_not_repeated(toy: Make) -> None:
+    """Nothing comes after it, so its call would be made once, as ever; at the call's result it is made twice."""
+    with pytest.raises(MutatorError, match=r"`return g\(x\)` is the last thing that its block does"):
+        toy("def f(x):\n    return g(x)\n", AnchorKind.BEFORE_CALL, "g", "repetition")
+
+
 def test_arguments_that_are_swapped(toy: Make) -> None:
     """Their values change places, whether or not they have keywords; the order of the others stays."""
     source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"

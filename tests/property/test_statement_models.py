@@ -1,0 +1,74 @@
+"""Statements that fault models repeat or exchange, all over the controller that ships."""
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
+from mutator.mutants.anchors import ParsedFile, parse_file
+from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.splicing import apply_edits, joined, unsplice
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[2]
+TARGET = CLONE / "target"
+FEW = [TARGET / "selfdrive/controls/lib/longcontrol.py"]
+ALL = sorted(p for part in ("car", "controls") for p in (TARGET / "selfdrive" / part).rglob("*.py"))
+EXCUSES = (
+    "no other statement follows",
+    "no statement that is alone on its lines",
+    "the anchored statement",
+    "the template yields",
+    "is the last thing that its block does",
+)
+
+
+class _Inactive(ast.NodeTransformer):
+    """Takes out what asks the probe first; what stands beneath `else:` stays."""
+
+    def visit_If(self, node: ast.If) -> ast.stmt | list[ast.stmt] | None:
+        self.generic_visit(node)
+        return node.orelse if ast.unparse(node.test).startswith("_fi.active(") else node
+
+
+def locations(file: ParsedFile) -> Iterator[FaultLocation]:
+    """Each statement of each function, by the first thing that it does."""
+    for function, found in file.functions.items():
+        seen: Counter[tuple[str, str]] = Counter()
+        for statement in (s for one in found for s in one.statements if s.reason is None and s.opens is None):
+            for verb in ("assign", "call", "return"):
+                for name in dict.fromkeys(statement.names(verb)):
+                    seen[verb, name] += 1
+                    kind = AnchorKind(f"before_{verb}")
+                    anchor = Anchor(kind=kind, name=name, nth=seen[verb, name])
+                    yield FaultLocation(path=file.path, function=function, anchor=anchor)
+
+
+@pytest.mark.parametrize(
+    ("files", "least"), [(FEW, 20), pytest.param(ALL, 400, marks=pytest.mark.slow)], ids=["few", "all"]
+)
+@pytest.mark.parametrize("model", ["reordering", "repetition"])
+def test_statements_of_the_controller(model: str, files: list[Path], least: int) -> None:
+    """Wherever two statements are exchanged, or one is repeated, the file compiles, un-splices to its bytes,
+    and is to `ast` what it was once the active branch is gone; what is refused has a reason."""
+    models, made = Workspace.find(root=CLONE).fault_models(), 0
+    for path in files:
+        file = parse_file(path.name, path.read_bytes(), TARGET)
+        whole = ast.dump(ast.parse(file.data))
+        for location in locations(file):
+            injection = Injection(location=location, model=model)
+            try:
+                edit = injection_edit(file, models, injection, "ab12")
+            except MutatorError as error:
+                assert any(excuse in error.got for excuse in EXCUSES), error
+                continue
+            data = joined(apply_edits(file, [edit]))  # type: ignore[list-item]
+            compile(data, "m.py", "exec")
+            assert unsplice(data) == file.data
+            assert ast.dump(_Inactive().visit(ast.parse(data))) == whole
+            made += 1
+    assert made > least
