@@ -194,7 +194,7 @@ def test_no_statement_to_repeat(toy: Make) -> None:
 
 
 def test_a_return_is_not_repeated(toy: Make) -> None:
-    """Nothing comes after it, so its call would be made once, as ever; at the call's result it is made twice."""
+    """Nothing comes after it, so its call would be made once, as ever; its result can be repeated."""
     with pytest.raises(MutatorError, match=r"`return g\(x\)` is the last thing that its block does"):
         toy("def f(x):\n    return g(x)\n", AnchorKind.BEFORE_CALL, "g", "repetition")
 
