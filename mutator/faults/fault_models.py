@@ -29,6 +29,7 @@ ParamType = Literal[
 ]
 NAMES = ("variable", "import")
 _PARTS = re.compile(r"\b(?:left|right|called|arguments)\b")
+_GIVEN = ("fi", "original", "left", "right", "called", "arguments", "statement", "next_statement")
 
 
 class SnippetKind(StrEnum):
@@ -268,8 +269,15 @@ def _load(path: Path) -> FaultModel:
 
 def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
     keys = ("params", name)
-    if not name.isidentifier() or units.split(name)[1] or name == "fi":
+    if not name.isidentifier() or units.split(name)[1]:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
+    if name in _GIVEN:
+        raise source.error(
+            keys,
+            f"parameter '{name}'",
+            expected=f"none of the names that templates have anyway: {', '.join(_GIVEN)}",
+            remedy="rename it",
+        )
     if model.unit not in (None, TARGET_UNIT, *units.UNITS):
         raise source.error((*keys, "unit"), f"'{model.unit}'", expected=f"target or one of {units.KNOWN}")
     if (model.type == "choice") != bool(model.choices):
