@@ -10,6 +10,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.changed_functions import compile_changed
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.normalized_source import compiles, normalized
 from mutator.mutants.patches import changed_file, new_file
@@ -168,9 +169,14 @@ class _Splicer:
 
     def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
         """The file with the edits made; InvalidMutant unless it compiles and un-splices to the original."""
+        change = self.spliced(file, edits)
+        _compile(change.data, file.where)
+        return change
+
+    def spliced(self, file: ParsedFile, edits: Sequence[Edit]) -> Change:
+        """The same, not compiled."""
         pieces = apply_edits(file, edits)
         data = joined(pieces)
-        _compile(data, file.where)
         if unsplice(data) != file.data:
             raise InvalidMutant(
                 "the mutated file does not un-splice to the original",
@@ -194,7 +200,13 @@ class _ReusingSplicer(_Splicer):
         known = known_changes(self._tree, file.path)
         key = reuse_key(file, edits, ids)
         if key in known:
-            return known[key].filled(inserted_lines(edits))
+            found = known[key]
+            if isinstance(found, Change):  # most changes of an expression are made once
+                found = known[key] = ReusableChange.of(found)
+            return found.filled(inserted_lines(edits))
+        if compile_changed(file, edits, key):
+            known[key] = change = self.spliced(file, edits)
+            return change
         change = super().change(file, edits, ids)
         reusable = ReusableChange.of(change)
         if always_compiles(file, reusable, key):

@@ -30,6 +30,7 @@ INJECTION_ID = (
 )
 
 _MARK = "# fi:"
+_MARK_BYTES = _MARK.encode()
 _TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
 _NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
@@ -178,6 +179,8 @@ def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
 
 def tag_of(line: bytes) -> Tag | None:
     """The tag of a line, with or without its line end; None for a line of the target."""
+    if _MARK_BYTES not in line:
+        return None
     match = _TAG_OF_LINE.search(line)
     if match is None:
         return None

@@ -52,12 +52,13 @@ class ReusableChange:
         return Change(data=b"".join(data), patch="".join(patch))
 
 
-def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange]:
-    """The reusable changes of a file so far; kept with the tree, for callers to add to."""
+def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange | Change]:
+    """The reusable changes of a file so far, or one of their changes; kept with the tree, for callers to add
+    to."""
     return tree.derived(path, _none_yet)
 
 
-def _none_yet(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChange]:
+def _none_yet(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChange | Change]:
     return {}
 
 

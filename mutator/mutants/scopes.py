@@ -7,6 +7,7 @@ not the assignment is ever carried out.
 import unicodedata
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from symtable import Symbol, SymbolTable, symtable
 
 FunctionNames = Mapping[tuple[int, str], frozenset[str]]
@@ -66,7 +67,7 @@ def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterat
 
     SyntaxError if `after` is not valid.
     """
-    return _moved(_table(before), _table(after), inserted)
+    return _moved(_table_of_target(before), _table(after), inserted)
 
 
 def _moved(before: SymbolTable, after: SymbolTable, inserted: Container[int]) -> Iterator[Moved]:
@@ -88,3 +89,6 @@ def _home(symbol: Symbol) -> str:
 
 def _table(data: bytes) -> SymbolTable:
     return symtable(data, "<source>", "exec")  # type: ignore[arg-type]  # bytes, as `compile`
+
+
+_table_of_target = lru_cache(maxsize=16)(_table)

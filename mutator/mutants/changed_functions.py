@@ -1,0 +1,57 @@
+"""Whether a changed file compiles, told from its changed functions: most of a file is as it was."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import replace
+
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.functions_alone import compiled_alone
+from mutator.mutants.reusable_changes import ReuseKey
+from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
+
+
+def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
+    """Whether the file certainly compiles with these edits, and with all others of their key: the functions
+    that they change do, as they are and with normalized lines, and so does the file with the import of the
+    probe.
+
+    False says nothing: an edit may lie outside of functions.
+    """
+    as_they_are = in_order(edits)
+    normalized = [
+        replace(edit, lines=tuple(text.encode(file.encoding).splitlines(keepends=True)))
+        for edit, (*_, text) in zip(as_they_are, key, strict=True)
+    ]
+    return all(_all_compile(file, some) for some in (as_they_are, normalized))
+
+
+def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
+    functions: dict[range, list[Edit]] = defaultdict(list)
+    outside: list[Edit] = []
+    for edit in edits:
+        function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
+        (outside if function is None else functions[function]).append(edit)
+    return _compile_with(file, tuple(outside)) and all(
+        _compiles(file, function, own) for function, own in functions.items()
+    )
+
+
+def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
+    """Whether the file compiles with edits outside of functions: with that of the probe's import, asked
+    once."""
+    if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
+        return False
+    if outside not in file.sound:
+        try:
+            compile(joined(apply_edits(file, outside)), "<import>", "exec", dont_inherit=True)
+        except (SyntaxError, ValueError, RecursionError):
+            return False
+        file.sound.add(outside)
+    return True
+
+
+def _compiles(file: ParsedFile, function: range, edits: Iterable[Edit]) -> bool:
+    alone = replace(file, lines=file.lines[function.start : function.stop])
+    moved = [replace(edit, index=edit.index - function.start) for edit in edits]
+    data = joined(apply_edits(alone, moved))
+    return compiled_alone(data.splitlines(keepends=True), file.encoding) is not None
